@@ -1,0 +1,76 @@
+"""What the commands share: experiments of the files named, and JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Experiment
+from simulator.settings import hint
+
+
+def add_file(parser: ArgumentParser, several: bool = False) -> None:
+    """Add the experiment file, or several of them, and the choice of a variant."""
+    parser.add_argument("files", metavar="FILE", nargs="+" if several else 1, type=Path, help="experiment file (YAML)")
+    parser.add_argument(
+        "--variant", metavar="NAME", action="append", default=[], help="only this variant; may be repeated"
+    )
+
+
+def add_json(parser: ArgumentParser) -> None:
+    """Add the choice of JSON."""
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print JSON in metres and radians: an object, or an array of them for several experiments",
+    )
+
+
+def experiments(options: Namespace) -> list[Experiment]:
+    """Experiments of all files, every variant one of its own, less those not chosen.
+
+    :raises ExperimentError: the errors of all files together.
+    """
+    found: list[Experiment] = []
+    messages: list[Message] = []
+    for path in options.files:
+        try:
+            found += load(path)
+        except ExperimentError as error:
+            messages += error.messages
+    if messages:
+        raise ExperimentError(messages)
+    if not options.variant:
+        return found
+    names = {experiment.name for experiment in found if experiment.name is not None}
+    for name in options.variant:
+        if name not in names:
+            files = ", ".join(str(path) for path in options.files)
+            messages.append(Message(files, 0, 0, "", f'no variant "{name}"; {hint(name, sorted(names))}'))
+    if messages:
+        raise ExperimentError(messages)
+    return [experiment for experiment in found if experiment.name in options.variant]
+
+
+def single(options: Namespace) -> Experiment:
+    """The one experiment that the options choose.
+
+    :raises ExperimentError: the file has several variants and none was chosen.
+    """
+    found = experiments(options)
+    if len(found) > 1:
+        names = [str(experiment.name) for experiment in found]
+        text = f"the file has several variants; choose one with --variant: {', '.join(names)}"
+        raise ExperimentError([Message(str(options.files[0]), 0, 0, "", text)])
+    return found[0]
+
+
+def print_json(results: list[dict[str, Any]]) -> None:
+    """One object by itself, several as an array."""
+    json.dump(results[0] if len(results) == 1 else results, sys.stdout, indent=2, allow_nan=False, ensure_ascii=False)
+    print()

@@ -1,0 +1,60 @@
+"""`ballplate fit`: the estimate from real readings."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from .common import add_file, add_json
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser = commands.add_parser(
+        "fit",
+        help="estimate machine errors, balls and poses from readings",
+        description="Estimate all parameters of an experiment from a CSV file of readings with the columns position, "
+        "ball, probe, x_mm, y_mm, z_mm (or another unit). The exit status is 0 if the estimate converged and the rank "
+        "is as expected, otherwise 1.",
+    )
+    add_file(parser)
+    parser.add_argument("readings", metavar="READINGS", type=Path, help="readings (CSV)")
+    parser.add_argument(
+        "--sigma",
+        choices=("estimated", "given"),
+        help="scale the uncertainties by the residuals, or take them as stated; default: what the file says",
+    )
+    parser.add_argument(
+        "--monomials", action="store_true", help="report error functions by the coefficients of t, t^2, ... on [0, 1]"
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: Namespace) -> int:
+    """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
+    from simulator.layout import lay_out
+    from simulator.readings import read_readings
+    from simulator.settings import listing
+
+    from ..study import fit
+    from ..tables import fit_data, fit_lines
+    from .common import print_json, single
+
+    experiment = single(options)
+    observed = read_readings(options.readings, lay_out(experiment))
+    for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
+        if names:
+            print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
+    result = fit(experiment, observed, options.sigma, options.monomials)
+    if options.json:
+        print_json([fit_data(result)])
+    else:
+        print("\n".join(fit_lines(result)))
+    if result.solution.status != "converged":
+        print(f"the estimate has {result.solution.status}; see the record of iterations", file=sys.stderr)
+        return 1
+    if not result.verdict.as_expected:
+        print(f"rank deficiency {result.verdict.deficiency}: what is undetermined is left out", file=sys.stderr)
+        return 1
+    return 0

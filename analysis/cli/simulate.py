@@ -1,0 +1,74 @@
+"""`ballplate simulate`: synthetic readings of the stated true machine."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from .common import add_file
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser = commands.add_parser(
+        "simulate",
+        help="write synthetic readings of a design",
+        description="Write readings that the file's true machine would give of artefacts and poses as drawn, with "
+        "noise of the stated repeatability. The same seed gives the same readings.",
+    )
+    add_file(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="CSV", required=True, type=Path, help="file to write, or - for standard output"
+    )
+    parser.add_argument("--seed", type=_seed, help="seed of the noise, instead of the file's")
+    parser.add_argument("--exact", action="store_true", help="leave the noise out")
+    parser.set_defaults(run=run)
+
+
+def _seed(text: str) -> int:
+    seed = int(text)
+    if seed < 0:
+        raise ValueError
+    return seed
+
+
+def run(options: Namespace) -> int:
+    """Write one set of readings."""
+    import numpy as np
+
+    from simulator.design import State, nominal_state
+    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.generate import NoReadingError, exact_readings, noisy_readings
+    from simulator.layout import lay_out
+    from simulator.machines.truth import true_parameters
+    from simulator.readings import write_readings
+
+    from .common import single
+
+    experiment = single(options)
+    design = lay_out(experiment)
+    drawn = nominal_state(design)
+    truth = State(drawn.balls, drawn.rotations, drawn.origins, true_parameters(experiment.true_machine, design.model))
+    seed = experiment.seed if options.seed is None else options.seed
+    try:
+        if options.exact:
+            readings, x = exact_readings(design, truth)
+        else:
+            generator = np.random.default_rng(np.random.SeedSequence(seed))
+            readings, x = noisy_readings(design, truth, generator)
+    except NoReadingError as error:
+        raise ExperimentError(
+            [Message(str(experiment.source), 0, 0, "true_machine", f"{error}; state smaller ones")]
+        ) from None
+    if str(options.output) == "-":
+        write_readings(sys.stdout, design, readings, x)
+        return 0
+    try:
+        with options.output.open("w", encoding="utf-8", newline="") as stream:
+            write_readings(stream, design, readings, x)
+    except OSError as error:
+        raise ExperimentError(
+            [Message(str(options.output), 0, 0, "", f"cannot be written ({error.strerror}); name another file")]
+        ) from None
+    print(f"{len(readings)} readings written to {options.output}", file=sys.stderr)
+    return 0

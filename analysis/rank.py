@@ -1,0 +1,325 @@
+"""What a design cannot determine, in the names of errors, balls and positions.
+
+A null direction is a change of parameters that no observation notices. It is told as what trades against
+what: error functions with their size and shape, the deformation of the artefact, the motion of positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulator.design import Design
+from simulator.estimation.covariance import Covariance, Spectrum
+from simulator.estimation.parameters import SharedLayout
+from simulator.geometry.motions import without_rigid_motion
+from simulator.machines.protocol import Array
+from simulator.quantities import LengthFunction
+
+# Parts of a direction that move points by less than this fraction of its largest part are not told.
+NEGLIGIBLE = 0.01
+
+# A direction is weak when one standard deviation along it moves corrected points, relative to one another, by more
+# than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
+WEAK = 10.0
+
+SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
+
+
+@dataclass(frozen=True)
+class FunctionPart:
+    """An error function's share of a direction: its largest value along the axis, in `unit`, and its shape."""
+
+    name: str
+    meaning: str
+    peak: float
+    unit: str
+    shape: str
+
+
+@dataclass(frozen=True)
+class ArtefactPart:
+    """An artefact's share: the largest displacement of a ball in metres, and the deformation in words."""
+
+    name: str
+    peak: float
+    words: str
+    balls: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PositionPart:
+    """A position's share: its shift in metres and its turn in radians."""
+
+    name: str
+    shift: float
+    turn: float
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of parameters that observations do not show, or show too weakly.
+
+    Null directions are scaled so that the part that moves points most moves them by one micrometre; weak ones are
+    as long as their standard deviation. `standard_deviation` is what a weak one adds to corrected points, relative
+    to one another, in metres; it is infinite for a null direction.
+    """
+
+    functions: tuple[FunctionPart, ...]
+    artefacts: tuple[ArtefactPart, ...]
+    positions: tuple[PositionPart, ...]
+    standard_deviation: float = float("inf")
+
+    def __str__(self) -> str:
+        return in_words(self)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a design determines its parameters.
+
+    `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`; `gap` is the ratio
+    across the border between determined and undetermined.
+    """
+
+    parameters: int
+    observations: int
+    deficiency: int
+    expected: int | None
+    singular_values: Array
+    gap: float
+    null: tuple[Direction, ...]
+    weak: tuple[Direction, ...]
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the deficiency is the one the file states; a file that states none expects full rank."""
+        return self.deficiency == (self.expected or 0)
+
+
+def verdict(
+    design: Design,
+    layout: SharedLayout,
+    found: Spectrum,
+    spread: Covariance,
+    expected: int | None = None,
+    target: LengthFunction | None = None,
+) -> Verdict:
+    """Judge a design from its spectrum; `spread` supplies how the balls follow the undetermined directions."""
+    return Verdict(
+        design.parameter_count,
+        design.observations,
+        found.deficiency,
+        expected,
+        found.values,
+        found.gap,
+        null_directions(design, layout, spread),
+        weak_directions(design, layout, found, target),
+    )
+
+
+def null_directions(design: Design, layout: SharedLayout, spread: Covariance) -> tuple[Direction, ...]:
+    """The undetermined directions, in a basis in which each involves as little as possible."""
+    sparse = _echelon(spread.shared_null / spread.scale[:, None])
+    found = []
+    for mixture in sparse.T:
+        shared, balls = spread.shared_null @ mixture, spread.ball_null @ mixture
+        moved = np.abs(shared / layout.scale).max(initial=0.0)
+        size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
+        # Told so that the largest change is a positive one.
+        size *= np.sign(shared[np.abs(shared / layout.scale).argmax()]) or 1.0
+        found.append(_describe(design, layout, shared / size, balls / size))
+    return tuple(found)
+
+
+def weak_directions(
+    design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
+) -> tuple[Direction, ...]:
+    """Determined directions whose standard deviation spoils the error map, weakest first."""
+    if not len(design.points) or found.rank == 0:
+        return ()
+    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
+    change = without_rigid_motion(design.points, jacobian @ found.root[layout.model])
+    # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
+    effect = np.sqrt(2.0 * (change**2).mean(axis=(0, 1)))
+    limit = WEAK * float(design.repeatability.max())
+    if target is not None:
+        limit = float(target.at(0.5 * float(np.linalg.norm(design.upper - design.lower))))
+    directions = []
+    for column in np.flatnonzero(effect > limit)[::-1]:
+        root = found.root[:, column]
+        description = _describe(design, layout, root, np.zeros_like(design.balls))
+        directions.append(Direction(description.functions, (), description.positions, float(effect[column])))
+    return tuple(directions)
+
+
+def _echelon(null: Array) -> Array:
+    """Mixtures (k, k) of null directions (s, k) that each have a pivot parameter the others do not touch."""
+    left = null.copy()
+    mixture = np.eye(null.shape[1])
+    for k in range(null.shape[1]):
+        row, column = np.unravel_index(np.abs(left[:, k:]).argmax(), left[:, k:].shape)
+        swap = [k, int(column) + k]
+        left[:, swap], mixture[:, swap] = left[:, swap[::-1]], mixture[:, swap[::-1]]
+        pivot = left[row, k]
+        left[:, k] /= pivot
+        mixture[:, k] /= pivot
+        for other in range(null.shape[1]):
+            if other != k:
+                factor = left[row, other]
+                left[:, other] -= factor * left[:, k]
+                mixture[:, other] -= factor * mixture[:, k]
+    return mixture
+
+
+def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
+    d = design.dimension
+    functions = _function_parts(design, layout, shared)
+    effect = np.abs(shared / layout.scale)
+    largest = max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+    positions = []
+    for k in design.plate_positions:
+        columns = layout.pose_columns[k]
+        values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
+        if effect[columns[columns >= 0]].max(initial=0.0) > NEGLIGIBLE * largest:
+            shift, turn = np.linalg.norm(values[:d]), np.linalg.norm(values[d:])
+            positions.append(PositionPart(design.position_names[k], float(shift), float(turn)))
+    artefacts = []
+    for artefact in np.flatnonzero(design.is_plate):
+        members = np.flatnonzero(design.ball_artefact == artefact)
+        moved = np.sqrt((balls[members] ** 2).sum(axis=1))
+        if moved.max(initial=0.0) > NEGLIGIBLE * largest:
+            touched = tuple(design.ball_names[b] for b in members[moved > 0.1 * moved.max()])
+            words = deformation(design.balls[members], balls[members])
+            artefacts.append(ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched))
+    return Direction(functions, tuple(artefacts), tuple(positions))
+
+
+def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tuple[FunctionPart, ...]:
+    a, parameters = shared[layout.model], layout.parameters[layout.model]
+    effect = np.abs(a / layout.scale[layout.model])
+    largest = float(np.abs(shared / layout.scale).max(initial=0.0))
+    parts = []
+    functions = {f.name: f for f in getattr(design.model, "functions", ())}
+    for name in dict.fromkeys(p.function for p in parameters):
+        members = [i for i, p in enumerate(parameters) if p.function == name]
+        if effect[members].max() <= NEGLIGIBLE * largest:
+            continue
+        parameter = parameters[members[0]]
+        if name in functions:
+            t = np.linspace(0.0, 1.0, 201)
+            values = functions[name].basis.values(t) @ a[members]
+            peak = float(values[np.abs(values).argmax()])
+            parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, shape(t, values)))
+        else:
+            parts.append((effect[members].max(), name, parameter.meaning, float(a[members[0]]), parameter.unit, ""))
+    parts.sort(key=lambda part: -part[0])
+    return tuple(FunctionPart(*part[1:]) for part in parts)
+
+
+def shape(t: Array, values: Array) -> str:
+    """Word for a curve's shape: the lowest degree of polynomial that describes it.
+
+    >>> t = np.linspace(0, 1, 50)
+    >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5)
+    ('linear', 'quadratic', 'of degree 5')
+    """
+    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, 30)
+    size = float(np.abs(values).max())
+    for degree in range(1, 31):
+        part = basis[:, : degree + 1]
+        left = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
+        if np.abs(left).max() <= 1e-3 * size:
+            return SHAPES.get(degree, f"of degree {degree}")
+    return "irregular"
+
+
+def deformation(places: Array, displacement: Array) -> str:
+    """Words for how an artefact deforms, from ball places and their displacements, both (n, d).
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    >>> deformation(square, square * [1.0, -1.0])
+    'stretches along its x and shrinks along its y'
+    """
+    n, d = places.shape
+    moved = without_rigid_motion(places, displacement[:, :, None])[:, :, 0]
+    total = float((moved**2).sum())
+    if total <= 1e-12 * float((displacement**2).sum()):
+        return "moves as a whole"
+    centred = places - places.mean(axis=0)
+    linear = np.linalg.lstsq(centred, moved, rcond=1e-9)[0].T
+    rest = moved - centred @ linear.T
+    extent = np.ptp(places, axis=0)
+    words = []
+    if float(((centred @ linear.T) ** 2).sum()) > 0.02 * total:
+        names = ("x", "y", "z")
+        stretch = np.array([linear[i, i] * (extent[i] > 0) for i in range(d)])
+        flat = [i for i in range(d) if extent[i] > 0]
+        largest = np.abs(linear).max()
+        used = [i for i in flat if abs(stretch[i]) > 0.05 * largest]
+        if len(used) > 1 and np.ptp(stretch[used]) < 0.02 * largest and len(used) == len(flat):
+            words.append("changes its size as a whole")
+        else:
+            grow = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] > 0)
+            shrink = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] < 0)
+            if grow:
+                words.append(f"stretches along {grow}" + (f" and shrinks along {shrink}" if shrink else ""))
+        sheared = [(i, j) for i in flat for j in flat if i < j and abs(linear[i, j] + linear[j, i]) > 0.1 * largest]
+        words += [f"shears in its {names[i]}{names[j]} plane" for i, j in sheared]
+    if float((rest**2).sum()) > 0.02 * total:
+        out_of_plane = d == 3 and extent[2] == 0 and float((rest[:, 2] ** 2).sum()) > 0.5 * float((rest**2).sum())
+        words.append("bends out of its plane" if out_of_plane else "distorts unevenly")
+    return ", ".join(words) if words else "deforms"
+
+
+def in_words(direction: Direction) -> str:
+    """A direction as a sentence: what trades against what, and by how much."""
+    parts = []
+    if direction.functions:
+        told = [_function_words(part) for part in direction.functions[:8]]
+        more = len(direction.functions) - len(told)
+        parts.append(", ".join(told) + (f" and {more} errors more" if more > 0 else ""))
+    for artefact in direction.artefacts:
+        parts.append(f"{artefact.name} {artefact.words} (balls by up to {length(artefact.peak)})")
+    if direction.positions:
+        told = [_position_words(part) for part in direction.positions[:6]]
+        more = len(direction.positions) - len(told)
+        parts.append("moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else ""))
+    if np.isinf(direction.standard_deviation):
+        end = "change together without changing any observation" if len(parts) > 1 else "changes no observation"
+    else:
+        end = f"known only to {length(direction.standard_deviation)} in corrected points, relative to one another"
+    return "; ".join(parts) + f": {end}"
+
+
+def _function_words(part: FunctionPart) -> str:
+    form = f", {part.shape}" if part.shape else ""
+    amount = {"m": length, "rad": angle, "1": ratio}[part.unit](part.peak)
+    return f"{part.name} ({part.meaning}{form}) by {amount}"
+
+
+def _position_words(part: PositionPart) -> str:
+    amounts = [length(part.shift)] if part.shift > 1e-12 else []
+    amounts += [angle(part.turn)] if part.turn > 1e-12 else []
+    return f"{part.name} ({', '.join(amounts)})"
+
+
+def length(value: float) -> str:
+    """A small length in micrometres.
+
+    >>> length(2.5e-7)
+    '0.25 um'
+    """
+    return f"{value * 1e6:.3g} um"
+
+
+def angle(value: float) -> str:
+    """A small angle in microradians."""
+    return f"{value * 1e6:.3g} urad"
+
+
+def ratio(value: float) -> str:
+    """A small ratio in parts per million."""
+    return f"{value * 1e6:.3g} ppm"

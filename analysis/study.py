@@ -1,0 +1,163 @@
+"""What the commands do, without a terminal: check a design, plan with it, fit readings to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from simulator.design import Design, nominal_state
+from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.gauss_newton import Solution, gauss_newton
+from simulator.estimation.initial import initial_state
+from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
+from simulator.experiment.model import Experiment
+from simulator.geometry.motions import vector_from_rotation
+from simulator.layout import lay_out
+from simulator.machines.protocol import Unit
+from simulator.readings import ObservedReadings
+
+from .rank import Verdict, verdict
+from .uncertainty import Quantity, uncertainties
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a design will be worth: the verdict on its rank, and U1 to U6 if they were asked for."""
+
+    label: str
+    title: str
+    design: Design
+    verdict: Verdict
+    quantities: dict[str, Quantity]
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined."""
+
+    name: str
+    value: float
+    standard_uncertainty: float
+    unit: Unit
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An estimate from readings.
+
+    `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
+    freedom, or 1 where the file says that they are given.
+    """
+
+    label: str
+    title: str
+    design: Design
+    solution: Solution
+    verdict: Verdict
+    sigma: float
+    sigma_is_estimated: bool
+    degrees_of_freedom: int
+    quantities: dict[str, Quantity]
+    estimates: tuple[ParameterEstimate, ...]
+
+
+def check(experiment: Experiment) -> Plan:
+    """Judge the rank of an experiment's design at zero machine error."""
+    return _plan(experiment, with_quantities=False)
+
+
+def plan(experiment: Experiment) -> Plan:
+    """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
+    return _plan(experiment, with_quantities=True)
+
+
+def _plan(experiment: Experiment, with_quantities: bool) -> Plan:
+    design = lay_out(experiment)
+    layout, state = shared_layout(design), nominal_state(design)
+    factor = eliminate(design, layout, state)
+    found = spectrum(factor)
+    spread = covariance(design, factor, found) if with_quantities or found.deficiency else _nothing_open(design, found)
+    judged = verdict(design, layout, found, spread, experiment.expected_rank_deficiency, experiment.target_accuracy)
+    quantities = uncertainties(design, layout, state, spread) if with_quantities else {}
+    return Plan(experiment.label, experiment.title, design, judged, quantities)
+
+
+def _nothing_open(design: Design, found: Spectrum) -> Covariance:
+    """A covariance without its values, for a verdict on a design of full rank."""
+    n, d = design.balls.shape
+    empty = np.zeros((n, d, 0))
+    return Covariance(found.root, empty, np.zeros((n, d, d)), found.null, empty, found.scale)
+
+
+def fit(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    sigma: Literal["estimated", "given"] | None = None,
+    monomials: bool = False,
+) -> Fit:
+    """Estimate machine errors, balls and poses from readings.
+
+    `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as the
+    coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
+    """
+    design = observed.design
+    layout = shared_layout(design)
+    solution = gauss_newton(design, observed.x, initial_state(design, observed.x))
+    spread = covariance(design, solution.factor, solution.spectrum)
+    judged = verdict(
+        design, layout, solution.spectrum, spread, experiment.expected_rank_deficiency, experiment.target_accuracy
+    )
+    freedom = design.observations - design.parameter_count + judged.deficiency
+    estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
+    scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
+    return Fit(
+        experiment.label,
+        experiment.title,
+        design,
+        solution,
+        judged,
+        scale,
+        estimated,
+        freedom,
+        uncertainties(design, layout, solution.state, spread, scale),
+        _estimates(design, layout, solution, spread, scale, monomials),
+    )
+
+
+def _estimates(
+    design: Design, layout: SharedLayout, solution: Solution, spread: Covariance, sigma: float, monomials: bool
+) -> tuple[ParameterEstimate, ...]:
+    found: list[ParameterEstimate] = []
+
+    def add(name: str, value: float, uncertainty: float, unit: Unit) -> None:
+        known = not np.isnan(uncertainty)
+        found.append(ParameterEstimate(name, float(value) if known else np.nan, float(sigma * uncertainty), unit))
+
+    state = solution.state
+    own = np.eye(len(layout))
+    matrix, names, units = own[layout.model], [p.name for p in design.model.parameters], None
+    if monomials:
+        reported = design.model.reported()
+        matrix, names, units = reported.matrix @ matrix, list(reported.names), reported.units
+    values = (reported.matrix if monomials else np.eye(len(state.a))) @ state.a
+    for k, uncertainty in enumerate(spread.of_shared(matrix)):
+        add(names[k], values[k], uncertainty, units[k] if units else design.model.parameters[k].unit)
+
+    of_poses = spread.of_shared(own[layout.poses])
+    turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
+    poses = np.concatenate([state.origins, turned], axis=1)
+    words = pose_parameter_names(design.dimension)
+    for k in design.plate_positions:
+        for j, column in enumerate(layout.pose_columns[k]):
+            if column >= 0:
+                unit: Unit = "m" if j < design.dimension else "rad"
+                add(f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
+
+    of_balls = spread.of_balls()
+    for ball in design.plate_balls:
+        for axis, letter in enumerate(("x", "y", "z")[: design.dimension]):
+            add(f"{design.ball_label(ball)}: {letter}", state.balls[ball, axis], of_balls[ball, axis], "m")
+    return tuple(found)

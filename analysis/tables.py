@@ -1,0 +1,205 @@
+"""Results as text for people, and as plain data for programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from .rank import Verdict
+from .study import Fit, Plan
+from .uncertainty import Quantity
+
+# Small lengths and angles are shown in these; the factor takes metres and radians there.
+SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
+
+
+def shown_unit(unit: str) -> str:
+    """Unit in which tables show values of a unit.
+
+    >>> shown_unit("m, rad")
+    'um, urad'
+    """
+    return ", ".join(SHOWN[part] for part in unit.split(", "))
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number with significant digits, and a dash for what is undetermined.
+
+    >>> number(0.123456), number(12345.678), number(float("nan"))
+    ('0.1235', '12350', '-')
+    """
+    if math.isnan(value):
+        return "-"
+    if value == 0:
+        return "0"
+    decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    magnitude = round(value, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
+    """Rows of cells as lines of text with aligned columns.
+
+    >>> aligned([["a", "1"], ["bb", "22"]], [False, True])
+    ['a    1', 'bb  22']
+    """
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if to_right else cell.ljust(width)
+            for cell, width, to_right in zip(row, widths, right, strict=True)
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
+    """U1 to U6 as lines of text."""
+    rows = [["", "standard uncertainty of", "maximum", "average", "unit", "count", "largest at"]]
+    for symbol, quantity in quantities.items():
+        count = str(quantity.count)
+        if quantity.undetermined:
+            count += f" ({quantity.undetermined} undetermined)"
+        rows.append(
+            [
+                symbol.partition(" ")[0] if " " not in symbol else "",
+                quantity.description,
+                number(1e6 * quantity.maximum),
+                number(1e6 * quantity.average),
+                shown_unit(quantity.unit),
+                count,
+                quantity.largest,
+            ]
+        )
+    return aligned(rows, [False, False, True, True, False, False, False])
+
+
+def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
+    """A verdict on rank as lines of text."""
+    lines = []
+    rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
+    if judged.expected is not None or not judged.as_expected:
+        wanted = judged.expected or 0
+        rank += ", as expected" if judged.as_expected else f", expected {wanted or 'full rank'}"
+    lines.append(f"{rank}; {judged.parameters} parameters, {judged.observations} observations")
+    values = judged.singular_values
+    if len(values) and with_values:
+        rank_of = len(values) - judged.deficiency
+        text = (
+            f"singular values {values[0]:.3g} to {values[rank_of - 1]:.3g}" if rank_of else "no singular value counts"
+        )
+        if judged.deficiency:
+            text += f", then {values[rank_of]:.3g} and below (gap {judged.gap:.2g})"
+        lines.append(text + ", in standard deviations per micrometre")
+    for title, directions in (("undetermined", judged.null), ("weakly determined", judged.weak)):
+        for k, direction in enumerate(directions[:20], start=1):
+            lines.append(f"{title} {k}: {direction}")
+        if len(directions) > 20:
+            lines.append(f"{title}: {len(directions) - 20} directions more")
+    return lines
+
+
+def plan_lines(plan: Plan) -> list[str]:
+    """A plan as lines of text: title, verdict and table."""
+    lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True)]
+    return lines + ["", *uncertainty_table(plan.quantities)] if plan.quantities else lines
+
+
+def fit_lines(fit: Fit) -> list[str]:
+    """A fit as lines of text: iterations, verdict, U1 to U6 and the machine's parameters."""
+    record = fit.solution.iterations
+    lines = [f"{fit.label}: {fit.title}", *verdict_lines(fit.verdict, with_values=True)]
+    how = "estimated from the residuals" if fit.sigma_is_estimated else "as given"
+    lines.append(
+        f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g} with "
+        f"{fit.degrees_of_freedom} degrees of freedom; sigma = {fit.sigma:.4g} times the stated uncertainties ({how})"
+    )
+    rows = [["iteration", "step", "S^2"]]
+    rows += [[str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
+    lines += ["", *aligned(rows, [True, True, True]), "", *uncertainty_table(fit.quantities), ""]
+    rows = [["parameter", "value", "standard uncertainty", "unit"]]
+    machine_and_poses = [
+        e for e in fit.estimates if ": origin" not in e.name and not e.name.endswith((": x", ": y", ": z"))
+    ]
+    for estimate in machine_and_poses:
+        rows.append(
+            [
+                estimate.name,
+                number(1e6 * estimate.value, 6),
+                number(1e6 * estimate.standard_uncertainty, 3),
+                SHOWN[estimate.unit],
+            ]
+        )
+    return lines + aligned(rows, [False, True, True, False])
+
+
+def plan_data(plan: Plan) -> dict[str, Any]:
+    """A plan as plain data in metres and radians at full precision; what is undetermined is None."""
+    return {
+        "experiment": plan.label,
+        "title": plan.title,
+        **_verdict_data(plan.verdict),
+        "sigma": 1.0,
+        "quantities": _quantities_data(plan.quantities),
+    }
+
+
+def fit_data(fit: Fit) -> dict[str, Any]:
+    """A fit as plain data in metres and radians at full precision; what is undetermined is None."""
+    return {
+        "experiment": fit.label,
+        "title": fit.title,
+        **_verdict_data(fit.verdict),
+        "status": fit.solution.status,
+        "sigma": fit.sigma,
+        "sigma_is_estimated": fit.sigma_is_estimated,
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "sum_of_squares": fit.solution.factor.sum_of_squares,
+        "iterations": [{"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations],
+        "quantities": _quantities_data(fit.quantities),
+        "estimates": {
+            e.name: {
+                "value": _finite(e.value),
+                "standard_uncertainty": _finite(e.standard_uncertainty),
+                "unit": e.unit,
+            }
+            for e in fit.estimates
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
+    return {
+        symbol: {
+            "maximum": _finite(q.maximum),
+            "average": _finite(q.average),
+            "unit": q.unit,
+            "count": q.count,
+            "undetermined": q.undetermined,
+            "largest_at": q.largest,
+            "description": q.description,
+        }
+        for symbol, q in quantities.items()
+    }
+
+
+def _verdict_data(judged: Verdict) -> dict[str, Any]:
+    return {
+        "parameters": judged.parameters,
+        "observations": judged.observations,
+        "rank_deficiency": judged.deficiency,
+        "expected_rank_deficiency": judged.expected,
+        "as_expected": judged.as_expected,
+        "singular_values": [float(v) for v in judged.singular_values],
+        "gap": _finite(judged.gap),
+        "undetermined": [str(direction) for direction in judged.null],
+        "weakly_determined": [
+            {"text": str(direction), "standard_deviation": direction.standard_deviation} for direction in judged.weak
+        ],
+    }

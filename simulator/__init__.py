@@ -1,0 +1,1 @@
+"""Plans ball-plate experiments for coordinate measuring machines."""

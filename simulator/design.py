@@ -1,0 +1,185 @@
+"""A laid-out experiment: every ball, position, probe, reading and calibration item as arrays in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .machines.protocol import Array, ErrorModel
+
+Integers = NDArray[np.int64]
+
+
+def pose_size(dimension: int) -> int:
+    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
+    return dimension * (dimension + 1) // 2
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Which ball is read in which position with which probe, and how often; all arrays (m,)."""
+
+    ball: Integers
+    position: Integers
+    probe: Integers
+    repeats: Integers
+
+    def __len__(self) -> int:
+        return len(self.ball)
+
+    def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
+        """The readings at the given indices."""
+        return Readings(self.ball[chosen], self.position[chosen], self.probe[chosen], self.repeats[chosen])
+
+    def expanded(self) -> Readings:
+        """One row for each repeat."""
+        chosen = np.repeat(np.arange(len(self)), self.repeats)
+        return replace(self.select(chosen), repeats=np.ones(len(chosen), np.int64))
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Calibrated distances between two balls of an artefact; arrays (m,), lengths in metres.
+
+    `dimensions` is 2 where only the first two co-ordinates of the artefact's frame count.
+    """
+
+    first: Integers
+    second: Integers
+    dimensions: Integers
+    value: Array
+    uncertainty: Array
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Calibrated ball co-ordinates in the artefact's frame; arrays (m,), metres."""
+
+    ball: Integers
+    axis: Integers
+    value: Array
+    uncertainty: Array
+
+    def __len__(self) -> int:
+        return len(self.ball)
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Known lengths of a length standard read in the volume; arrays (m,), metres.
+
+    `first` and `second` index the readings that a length takes part in. `projected` says whether the
+    difference of the corrected points is projected on the standard's nominal direction (m, d) instead of its
+    norm being taken; `with_repeatability` whether the readings' own scatter adds to `uncertainty`.
+    """
+
+    first: Integers
+    second: Integers
+    value: Array
+    uncertainty: Array
+    projected: NDArray[np.bool_]
+    direction: Array
+    with_repeatability: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+@dataclass(frozen=True)
+class Design:
+    """What an experiment consists of, in SI units and integer indices.
+
+    Shapes: `repeatability` (d,), `probes` (l, d), `balls` (n, d) in the frame of their artefact,
+    `rotations` (k, d, d) and `origins` (k, d) with x = R y + o for nominal poses, `held` (k, pose size)
+    marking the pose parameters (origin, then rotation about the machine's axes) that fix a frame or that
+    turn an artefact of collinear balls about its own axis.
+    Balls and positions of length standards stand in the same lists; `is_plate` (artefacts,) tells which
+    artefacts have parameters.
+    """
+
+    model: ErrorModel
+    lower: Array
+    upper: Array
+    repeatability: Array
+    probe_names: tuple[str, ...]
+    probes: Array
+    artefact_names: tuple[str, ...]
+    is_plate: NDArray[np.bool_]
+    ball_names: tuple[str, ...]
+    ball_artefact: Integers
+    balls: Array
+    position_names: tuple[str, ...]
+    position_artefact: Integers
+    rotations: Array
+    origins: Array
+    held: NDArray[np.bool_]
+    readings: Readings
+    distances: Distances
+    coordinates: Coordinates
+    lengths: Lengths
+    points: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    point_probe: int = 0
+
+    @property
+    def dimension(self) -> int:
+        return len(self.repeatability)
+
+    @cached_property
+    def plate_readings(self) -> Integers:
+        """Indices of the readings of plates, whose balls and poses are parameters."""
+        return np.flatnonzero(self.is_plate[self.ball_artefact[self.readings.ball]])
+
+    @cached_property
+    def plate_balls(self) -> Integers:
+        """Indices of the balls that are parameters."""
+        return np.flatnonzero(self.is_plate[self.ball_artefact])
+
+    @cached_property
+    def plate_positions(self) -> Integers:
+        """Indices of the positions whose poses are parameters."""
+        return np.flatnonzero(self.is_plate[self.position_artefact])
+
+    @property
+    def observations(self) -> int:
+        """Number of scalar observations: co-ordinates of all readings of plates, and calibration items."""
+        count = int(self.readings.repeats[self.plate_readings].sum())
+        return self.dimension * count + len(self.distances) + len(self.coordinates) + len(self.lengths)
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of free parameters: balls, poses less what is held, and the error model's."""
+        poses = int((~self.held[self.plate_positions]).sum())
+        return self.dimension * len(self.plate_balls) + poses + len(self.model.parameters)
+
+    def ball_label(self, ball: int) -> str:
+        """Name of a ball, with its artefact's where there are several."""
+        if len(self.artefact_names) == 1:
+            return self.ball_names[ball]
+        return f"{self.artefact_names[self.ball_artefact[ball]]}/{self.ball_names[ball]}"
+
+
+@dataclass(frozen=True)
+class State:
+    """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a` (parameters,)."""
+
+    balls: Array
+    rotations: Array
+    origins: Array
+    a: Array
+
+
+def nominal_state(design: Design) -> State:
+    """The design as drawn, on a machine without errors."""
+    return State(design.balls, design.rotations, design.origins, np.zeros(len(design.model.parameters)))
+
+
+def locations(design: Design, state: State, readings: Readings) -> Array:
+    """True positions (m, d) of the balls that are read, T(y, t) in metres."""
+    turned = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    return np.asarray(turned + state.origins[readings.position])

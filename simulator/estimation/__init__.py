@@ -1,0 +1,1 @@
+"""From a design and its readings to estimates: blocks, elimination, Gauss-Newton, starting values."""

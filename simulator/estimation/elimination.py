@@ -1,0 +1,193 @@
+"""Orthogonal elimination of the balls, a batch of them at a time.
+
+The Jacobian of all readings is block-angular (NPL Report CISE 15/98, section 3.5.3): the rows of one ball
+involve that ball and the shared parameters, poses and machine errors. Each ball's rows are multiplied by an
+orthogonal matrix that leaves three rows for the ball and the rest for the shared parameters alone; the rest
+goes into one small triangular factor. Neither the whole Jacobian nor any normal equation is ever formed, so
+that time and memory grow in proportion to the readings. Balls tied to one another by calibrated distances
+are kept and eliminated together at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..design import Design, Integers, State
+from ..machines.protocol import Array
+from .observations import coordinate_rows, distance_rows, length_rows, reading_blocks
+from .parameters import SharedLayout
+
+# Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
+ROWS_AT_ONCE = 2048
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Triangular factor of the whitened observations, with the right-hand side z = Q' r beside it.
+
+    With d dimensions, s shared parameters, e balls eliminated singly and k kept balls:
+    `ball_root` (e, d, d) and `ball_shared` (e, d, s) with `ball_side` (e, d) are the rows of the balls
+    `eliminated`; `kept_root` (d k, d k), `kept_shared` (d k, s), `kept_side` (d k,) those of the balls
+    `kept`; `root` (s, s) and `side` (s,) those of the shared parameters. `sum_of_squares` is S^2 at the point
+    of linearisation and `remainder` what no change of the parameters can take away.
+    """
+
+    layout: SharedLayout
+    eliminated: Integers
+    ball_root: Array
+    ball_shared: Array
+    ball_side: Array
+    kept: Integers
+    kept_root: Array
+    kept_shared: Array
+    kept_side: Array
+    root: Array
+    side: Array
+    sum_of_squares: float
+    remainder: float
+
+
+def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | None = None) -> Factor:
+    """Factor the observations of a design at `state`.
+
+    `x` (readings, d) holds a scale reading for each of the design's readings, in order. Without it the machine is taken
+    to read without error, as for planning.
+    """
+    d, s = design.dimension, len(layout)
+    kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
+    single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
+    shared = np.zeros((0, s + 1))
+    total = 0.0
+    roots, tops = [], []
+    order = []
+    for balls, by_ball, rest in _batches(design, layout, state, x, np.concatenate([single, kept])):
+        total += float((rest[:, :, -1] ** 2).sum())
+        q, r = np.linalg.qr(by_ball)
+        top = q.transpose(0, 2, 1) @ rest
+        rest -= q @ top
+        shared = _triangle(np.concatenate([shared, rest.reshape(-1, s + 1)]))
+        order.append(balls)
+        roots.append(r)
+        tops.append(top)
+    balls = np.concatenate(order) if order else np.zeros(0, np.int64)
+    root = np.concatenate(roots) if roots else np.zeros((0, d, d))
+    top = np.concatenate(tops) if tops else np.zeros((0, d, s + 1))
+
+    if len(design.lengths):
+        residual, derivative = length_rows(design, state, x)
+        rows = np.zeros((len(residual), s + 1))
+        rows[:, layout.model], rows[:, -1] = derivative, residual
+        total += float(residual @ residual)
+        shared = np.concatenate([shared, rows])
+
+    is_kept = np.isin(balls, kept)
+    kept = balls[is_kept]
+    columns = d * len(kept)
+    distances = distance_rows(design, state)
+    total += float(distances.residual @ distances.residual)
+    last = np.zeros((columns + len(design.distances) + len(shared), columns + s + 1))
+    for place in range(len(kept)):
+        last[d * place : d * place + d, d * place : d * place + d] = root[is_kept][place]
+    last[:columns, columns:] = top[is_kept].reshape(columns, s + 1)
+    place_of = np.zeros(len(design.ball_names), np.int64)
+    place_of[kept] = np.arange(len(kept))
+    rows_at = columns + np.arange(len(design.distances))
+    for axis in range(d):
+        last[rows_at, d * place_of[design.distances.first] + axis] = distances.derivative[:, axis]
+        last[rows_at, d * place_of[design.distances.second] + axis] = -distances.derivative[:, axis]
+    last[rows_at, -1] = distances.residual
+    last[columns + len(design.distances) :, columns:] = shared
+    triangle = _square(_triangle(last), columns + s + 1)
+    return Factor(
+        layout=layout,
+        eliminated=balls[~is_kept],
+        ball_root=root[~is_kept],
+        ball_shared=top[~is_kept][:, :, :-1],
+        ball_side=top[~is_kept][:, :, -1],
+        kept=kept,
+        kept_root=triangle[:columns, :columns],
+        kept_shared=triangle[:columns, columns:-1],
+        kept_side=triangle[:columns, -1],
+        root=triangle[columns:-1, columns:-1],
+        side=triangle[columns:-1, -1],
+        sum_of_squares=total,
+        remainder=float(triangle[-1, -1] ** 2),
+    )
+
+
+def _triangle(rows: Array) -> Array:
+    return np.asarray(np.linalg.qr(rows, mode="r"))
+
+
+def _square(triangle: Array, size: int) -> Array:
+    """Pad a triangular factor of fewer rows than columns with zero rows."""
+    if len(triangle) >= size:
+        return triangle[:size]
+    return np.concatenate([triangle, np.zeros((size - len(triangle), size))])
+
+
+def _batches(
+    design: Design, layout: SharedLayout, state: State, x: Array | None, balls: Integers
+) -> Iterator[tuple[Integers, Array, Array]]:
+    """Balls a batch at a time: their indices (b,), rows by the ball (b, rows, d), by the rest (b, rows, s + 1).
+
+    Balls with fewer rows than the most in their batch are filled up with rows of zeros.
+    """
+    d, s = design.dimension, len(layout)
+    readings = design.readings
+    chosen = design.plate_readings
+    chosen = chosen[np.argsort(readings.ball[chosen], kind="stable")]
+    count = np.bincount(readings.ball[chosen], minlength=len(design.ball_names))
+    start = np.cumsum(count) - count
+    given = design.coordinates
+    by_axis = np.argsort(given.ball, kind="stable")
+    extra = np.bincount(given.ball, minlength=len(design.ball_names))
+    extra_start = np.cumsum(extra) - extra
+    certificate = coordinate_rows(design, state)
+
+    rows = d * count + extra
+    balls = balls[np.argsort(rows[balls], kind="stable")]
+    at = 0
+    while at < len(balls):
+        most = max(int(rows[balls[at]]), 1)
+        batch = balls[at : at + max(ROWS_AT_ONCE // most, 1)]
+        at += len(batch)
+        m, c = int(count[batch].max(initial=0)), int(extra[batch].max(initial=0))
+        by_ball = np.zeros((len(batch), max(d * m + c, d), d))
+        rest = np.zeros((len(batch), max(d * m + c, d), s + 1))
+        present = np.arange(m) < count[batch][:, None]
+        which = np.where(present, start[batch][:, None] + np.arange(m), 0)
+        if m:
+            index = chosen[which.ravel()]
+            rows_of = reading_blocks(design, state, readings.select(index), None if x is None else x[index])
+            columns = layout.pose_columns[readings.position[index]]
+            _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout.model, present)
+        if c:
+            member = np.arange(c) < extra[batch][:, None]
+            source = by_axis[np.where(member, extra_start[batch][:, None] + np.arange(c), 0)]
+            by_ball[:, d * m : d * m + c] = certificate.derivative[source] * member[:, :, None]
+            rest[:, d * m : d * m + c, -1] = certificate.residual[source] * member
+        yield batch, by_ball, rest
+
+
+def _fill(by_ball, rest, blocks, columns, model, present) -> None:  # type: ignore[no-untyped-def]
+    """Write reading blocks (b m, d, ...) into the rows of a batch, in place."""
+    b, m = present.shape
+    d = by_ball.shape[2]
+    by_ball[:] = blocks.by_ball.reshape(b, m * d, d)
+    rest[:, :, model] = blocks.by_model.reshape(b, m * d, -1)
+    rest[:, :, -1] = blocks.residual.reshape(b, m * d)
+    flat = rest.reshape(b, m, d, -1)
+    ball, place = np.nonzero(present)
+    used = columns.reshape(b, m, -1)[ball, place]
+    by_pose = blocks.by_pose.reshape(b, m, d, -1)[ball, place]
+    for j in range(columns.shape[1]):
+        free = used[:, j] >= 0
+        flat[ball[free], place[free], :, used[free, j]] = by_pose[free, :, j]
+    if not present.all():
+        absent = ~present
+        by_ball.reshape(b, m, d, d)[absent] = 0.0
+        flat[absent] = 0.0

@@ -1,0 +1,121 @@
+"""Gauss-Newton on the full non-linear problem of NPL Report CISE 15/98, equation (11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..design import Design, State
+from ..geometry.motions import rotation_from_vector
+from ..machines.protocol import Array
+from .covariance import Spectrum, _solve_balls, spectrum
+from .elimination import Factor, eliminate
+from .parameters import shared_layout
+
+Status = Literal["converged", "not converged", "diverged"]
+
+
+@dataclass(frozen=True)
+class GaussNewtonSettings:
+    """When to stop.
+
+    An iteration is the last when the step, each parameter scaled to its effect in the volume, is below
+    `smallest_step` metres, or when it no longer shrinks because rounding is all that is left.
+    """
+
+    iterations: int = 20
+    smallest_step: float = 1e-13
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One line of the record: Euclidean length of the step that led here, and S^2 here.
+
+    The length mixes metres and radians, as the report's tables do; that of the starting point is zero.
+    """
+
+    step: float
+    sum_of_squares: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the iteration ended: the state, the factor and spectrum there, the record and the verdict."""
+
+    state: State
+    factor: Factor
+    spectrum: Spectrum
+    iterations: tuple[Iteration, ...]
+    status: Status
+
+
+def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSettings | None = None) -> Solution:
+    """Minimise S^2 over balls, poses and machine errors, from `start`.
+
+    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not moved in.
+    A failure to converge is a status, not an exception.
+    """
+    settings = settings or GaussNewtonSettings()
+    layout = shared_layout(design)
+    state = start
+    record: list[Iteration] = []
+    length, previous = 0.0, np.inf
+    status: Status = "not converged"
+    while True:
+        factor = eliminate(design, layout, state, x)
+        found = spectrum(factor)
+        record.append(Iteration(length, factor.sum_of_squares))
+        if not np.isfinite(factor.sum_of_squares):
+            status = "diverged"
+            break
+        if status == "converged" or len(record) > settings.iterations:
+            break
+        shared, balls = newton_step(design, factor, found)
+        size = max(float(np.abs(shared / layout.scale).max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+        length = float(np.sqrt(shared @ shared + (balls**2).sum()))
+        state = moved(design, state, layout.pose_columns, shared, balls, layout.model)
+        rounding = size > 0.5 * previous and size < 1e-9
+        if size < settings.smallest_step or rounding:
+            status = "converged"
+        previous = size
+    return Solution(state, factor, found, tuple(record), status)
+
+
+def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:
+    """The least-squares step: shared parameters (s,) and balls (n, d)."""
+    shared = _shared_step(factor, found)
+    balls = np.zeros((len(design.ball_names), design.dimension))
+    side = factor.ball_side + factor.ball_shared @ shared
+    balls[factor.eliminated] = -_solve_balls(factor.ball_root, side[:, :, None])[:, :, 0]
+    if len(factor.kept):
+        from scipy.linalg import solve_triangular
+
+        kept = -solve_triangular(factor.kept_root, factor.kept_side + factor.kept_shared @ shared)
+        balls[factor.kept] = kept.reshape(-1, design.dimension)
+    return shared, balls
+
+
+def _shared_step(factor: Factor, found: Spectrum) -> Array:
+    if found.deficiency == 0:
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(-solve_triangular(factor.root, factor.side))
+    # root = U diag(values) V' / scale, so U' side follows from root times the directions.
+    left = factor.root @ found.directions[:, : found.rank]
+    left /= np.sqrt((left**2).sum(axis=0))
+    return np.asarray(-(found.root @ (left.T @ factor.side)))
+
+
+def moved(design: Design, state: State, pose_columns: np.ndarray, shared: Array, balls: Array, model: slice) -> State:
+    """The state after a step; rotations are turned about the machine's axes and stay orthogonal."""
+    d = design.dimension
+    poses = np.where(pose_columns >= 0, shared[np.maximum(pose_columns, 0)], 0.0)
+    turn = rotation_from_vector(poses[:, d:])
+    return State(
+        state.balls + balls,
+        turn @ state.rotations,
+        state.origins + poses[:, :d],
+        state.a + shared[model],
+    )

@@ -1,0 +1,114 @@
+"""Starting values for balls and poses, found from the readings alone.
+
+Two positions that share enough balls determine their relative pose. The positions of an artefact are joined one
+after the other to what is known already, so that none of them need read all balls (NPL Report CISE 15/98,
+section 4.1). The machine is taken to be without errors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..design import Design, Integers, State
+from ..geometry.motions import fit_motion
+from ..machines.protocol import Array
+
+# Points whose spread across their main line is below this fraction of their length do not fix a pose.
+FLAT = 1e-3
+
+
+def initial_state(design: Design, x: Array) -> State:
+    """Balls, poses and zero machine errors, from scale readings x (readings, d).
+
+    Where too few balls join a position to the others, the nominal geometry closes the gap.
+    """
+    d = design.dimension
+    balls = design.balls.copy()
+    rotations, origins = design.rotations.copy(), design.origins.copy()
+    seen = _mean_locations(design, x)
+    for artefact in np.flatnonzero(design.is_plate):
+        members = np.flatnonzero(design.ball_artefact == artefact)
+        places = [int(k) for k in np.flatnonzero(design.position_artefact == artefact)]
+        shape, poses = _assemble(seen[places][:, members], design.balls[members], d)
+        turn, shift = _into_frame(design, shape, poses, places, members)
+        balls[members] = np.where(np.isnan(shape), design.balls[members], shape @ turn.T + shift)
+        for place, (rotation, origin) in zip(places, poses, strict=True):
+            rotations[place] = rotation @ turn.T
+            origins[place] = origin - rotations[place] @ shift
+    return State(balls, rotations, origins, np.zeros(len(design.model.parameters)))
+
+
+def _mean_locations(design: Design, x: Array) -> Array:
+    """Where each ball was seen in each position (k, n, d), NaN where it was not."""
+    readings = design.readings
+    total = np.zeros((len(design.position_names), len(design.ball_names), design.dimension))
+    count = np.zeros(total.shape[:2])
+    np.add.at(total, (readings.position, readings.ball), x + design.probes[readings.probe])
+    np.add.at(count, (readings.position, readings.ball), 1.0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(total / count[:, :, None])
+
+
+def _assemble(seen: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Array, Array]]]:
+    """Shape (n, d) of an artefact in the frame of its best-read position, and the poses from there."""
+    present = ~np.isnan(seen[:, :, 0])
+    first = int(present.sum(axis=1).argmax())
+    shape = np.where(present[first][:, None], seen[first], np.nan)
+    weight = present[first].astype(float)
+    poses: list[tuple[Array, Array]] = [(np.eye(d), np.zeros(d))] * len(seen)
+    waiting = [k for k in range(len(seen)) if k != first]
+    while waiting:
+        shared = [present[k] & ~np.isnan(shape[:, 0]) for k in waiting]
+        choice = int(np.argmax([_strength(shape[s], d) for s in shared]))
+        k, common = waiting.pop(choice), shared[choice]
+        if _strength(shape[common], d) > 0:
+            rotation, origin = fit_motion(shape[common], seen[k, common])
+        else:
+            rotation, origin = _by_nominal(seen[k], shape, nominal)
+        poses[k] = (rotation, origin)
+        here = np.where(present[k][:, None], (seen[k] - origin) @ rotation, 0.0)
+        old = np.where(np.isnan(shape), 0.0, shape)
+        total = weight + present[k]
+        with np.errstate(invalid="ignore"):
+            shape = (old * weight[:, None] + here) / total[:, None]
+        weight = total
+    return shape, poses
+
+
+def _strength(points: Array, d: int) -> float:
+    """How well points (n, d) fix a pose: 0 if not at all, otherwise their extent across their main line."""
+    if len(points) < 2:
+        return 0.0
+    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    needed = extent[d - 2]
+    return float(needed) if needed > FLAT * extent[0] else 0.0
+
+
+def _by_nominal(seen: Array, shape: Array, nominal: Array) -> tuple[Array, Array]:
+    here, known = ~np.isnan(seen[:, 0]), ~np.isnan(shape[:, 0])
+    if not here.any() or not known.any():
+        return np.eye(seen.shape[1]), np.zeros(seen.shape[1])
+    to_position, to_position_origin = fit_motion(nominal[here], seen[here])
+    to_shape, to_shape_origin = fit_motion(nominal[known], shape[known])
+    rotation = to_position @ to_shape.T
+    return rotation, to_position_origin - rotation @ to_shape_origin
+
+
+def _into_frame(
+    design: Design, shape: Array, poses: list[tuple[Array, Array]], places: list[int], members: Integers
+) -> tuple[Array, Array]:
+    """Motion that takes the assembled shape into the artefact's own frame."""
+    held = [k for k in places if design.held[k].all()]
+    if held:
+        rotation, origin = poses[places.index(held[0])]
+        turn = design.rotations[held[0]].T @ rotation
+        return turn, design.rotations[held[0]].T @ (origin - design.origins[held[0]])
+    target = design.balls.copy()
+    given = design.coordinates
+    target[given.ball, given.axis] = given.value
+    certified = np.isin(members, given.ball)
+    known = ~np.isnan(shape[:, 0])
+    chosen = certified & known
+    if _strength(target[members[chosen]], design.dimension) == 0.0:
+        chosen = known
+    return fit_motion(shape[chosen], target[members[chosen]])

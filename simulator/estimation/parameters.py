@@ -1,0 +1,86 @@
+"""Names, units and places of the parameters that all balls share: poses and machine errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..design import Design, Integers, pose_size
+from ..machines.protocol import Array, Parameter
+
+AXIS_NAMES = ("x", "y", "z")
+
+
+def pose_parameter_names(dimension: int) -> tuple[str, ...]:
+    """Names of a pose's parameters in order.
+
+    >>> pose_parameter_names(2)
+    ('origin x', 'origin y', 'rotation z')
+    """
+    axes = AXIS_NAMES[:dimension]
+    turns = axes if dimension == 3 else ("z",)
+    return tuple(f"origin {axis}" for axis in axes) + tuple(f"rotation {axis}" for axis in turns)
+
+
+@dataclass(frozen=True)
+class SharedLayout:
+    """Columns of the shared parameters: the free parameters of every pose, then the error model's.
+
+    `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or belongs to a
+    length standard. `scale` (columns,) is the size of each parameter, in its own unit, that moves a point
+    somewhere by about one metre.
+    """
+
+    parameters: tuple[Parameter, ...]
+    pose_columns: Integers
+    model: slice
+    scale: Array
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    @property
+    def poses(self) -> slice:
+        return slice(0, self.model.start)
+
+    @cached_property
+    def is_angle(self) -> NDArray[np.bool_]:
+        return np.array([p.unit == "rad" for p in self.parameters], bool)
+
+    def column(self, name: str) -> int:
+        """Column of a parameter by its name."""
+        return self._columns[name]
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {p.name: k for k, p in enumerate(self.parameters)}
+
+
+def shared_layout(design: Design) -> SharedLayout:
+    """Lay out the shared parameters of a design."""
+    q, d = pose_size(design.dimension), design.dimension
+    names = pose_parameter_names(d)
+    columns = np.full((len(design.position_names), q), -1, np.int64)
+    parameters: list[Parameter] = []
+    for k in design.plate_positions:
+        own = design.balls[design.ball_artefact == design.position_artefact[k]]
+        arm = max(float(np.ptp(own, axis=0).max(initial=0.0)), 1e-3)
+        for j in np.flatnonzero(~design.held[k]):
+            columns[k, j] = len(parameters)
+            turning = j >= d
+            parameters.append(
+                Parameter(
+                    f"{design.position_names[k]}: {names[j]}",
+                    "rad" if turning else "m",
+                    "pose",
+                    f"{names[j]} of position {design.position_names[k]}",
+                    arm if turning else 1.0,
+                )
+            )
+    start = len(parameters)
+    parameters += design.model.parameters
+    scale = np.array([1.0 / p.effect for p in parameters])
+    return SharedLayout(tuple(parameters), columns, slice(start, len(parameters)), scale)

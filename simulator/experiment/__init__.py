@@ -1,0 +1,30 @@
+"""Experiment files: loading them, what they may say, and the messages about what is wrong with them."""
+
+from .load import load
+from .messages import ExperimentError, Message
+from .model import (
+    CoordinateCalibration,
+    DistanceCalibration,
+    Evaluation,
+    Experiment,
+    Machine,
+    Position,
+    ReadingGroup,
+    Volume,
+)
+from .schema import schema
+
+__all__ = [
+    "CoordinateCalibration",
+    "DistanceCalibration",
+    "Evaluation",
+    "Experiment",
+    "ExperimentError",
+    "Machine",
+    "Message",
+    "Position",
+    "ReadingGroup",
+    "Volume",
+    "load",
+    "schema",
+]

@@ -1,0 +1,226 @@
+"""From the settings of a calibration to ball indices, values and uncertainties."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from ..geometry.artefacts import COINCIDENT, BallLayout, corners, pairs
+from ..settings import hint, listing
+from .messages import ExperimentError, Steps
+from .model import Calibration, CoordinateCalibration, DistanceCalibration, Floats, Indices
+from .references import References, frozen
+from .sections import CoordinatesSettings, DistancesSettings
+from .tables import read_table
+from .yamltree import Mark, mark_of
+
+AXES = ("x", "y", "z")
+
+
+def resolve_calibration(
+    settings: DistancesSettings | CoordinatesSettings, steps: Steps, references: References
+) -> Calibration | None:
+    """Return a calibration with its indices and values, or None after saying what is wrong."""
+    artefact = references.artefact(settings.artefact, steps)
+    if artefact is None or artefact not in references.layouts:
+        return None
+    if isinstance(settings, DistancesSettings):
+        return _distances(settings, artefact, steps, references)
+    return _coordinates(settings, artefact, steps, references)
+
+
+def _distances(
+    settings: DistancesSettings, artefact: str, steps: Steps, references: References
+) -> DistanceCalibration | None:
+    layout, is_right = references.layouts[artefact], True
+    if references.artefacts[artefact].role != "length_standard":
+        for key in ("form", "repeatability"):
+            if key in settings.model_fields_set:
+                text = f'is only for artefacts with role: length_standard; remove it, or give "{artefact}" that role'
+                references.problems.add((*steps, key), text, of_key=True)
+                is_right = False
+    if references.dimension == 2 and settings.dimensions == 3:
+        text = "a two-dimensional experiment has distances in 2 dimensions; remove it"
+        references.problems.add((*steps, "dimensions"), text)
+        is_right = False
+    dimensions = settings.dimensions or 3
+    if references.dimension == 2:
+        dimensions = 2
+    indices = _pairs(settings.pairs, layout, (*steps, "pairs"), references)
+    if indices is None or references.dimension is None:
+        return None
+    difference = (layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]])[:, :dimensions]
+    nominal = np.linalg.norm(difference, axis=1)
+    if np.any(nominal < COINCIDENT):
+        i, j = indices[int(np.argmin(nominal))]
+        text = f'balls "{layout.names[i]}" and "{layout.names[j]}" have no distance in the plane; use dimensions: 3'
+        references.problems.add((*steps, "pairs"), text)
+        return None
+    values = _certified_distances(settings, indices, layout, nominal, (*steps, "values"), references)
+    if values is None or not is_right:
+        return None
+    indices.setflags(write=False)
+    return DistanceCalibration(
+        artefact,
+        indices,
+        dimensions,
+        frozen(values),
+        settings.values is not None,
+        settings.standard_uncertainty,
+        frozen(settings.standard_uncertainty.at(nominal)),
+        settings.form,
+        settings.repeatability,
+    )
+
+
+def _pairs(
+    selection: str | tuple[tuple[str, str], ...], layout: BallLayout, steps: Steps, references: References
+) -> Indices | None:
+    if isinstance(selection, str):
+        try:
+            found = pairs(layout, selection)
+        except ValueError as error:
+            references.problems.add(steps, str(error))
+            return None
+        if not references.require(len(found) > 0, steps, "the artefact has a single ball and no pairs; remove it"):
+            return None
+        return found
+    index = {name: i for i, name in enumerate(layout.names)}
+    seen: dict[frozenset[str], int] = {}
+    is_right = True
+    for i, names in enumerate(selection):
+        for j, name in enumerate(names):
+            text = f'unknown ball "{name}"; {hint(name, layout.names) if name not in index else ""}'
+            is_right &= references.require(name in index, (*steps, i, j), text)
+        text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
+        is_right &= references.require(names[0] != names[1], (*steps, i), text)
+        pair = frozenset(names)
+        text = f"stands already in entry [{seen.get(pair)}]; remove one of the two"
+        is_right &= references.require(pair not in seen, (*steps, i), text)
+        seen.setdefault(pair, i)
+    return np.array([[index[a], index[b]] for a, b in selection], dtype=np.intp) if is_right else None
+
+
+def _certified_distances(
+    settings: DistancesSettings,
+    indices: Indices,
+    layout: BallLayout,
+    nominal: Floats,
+    steps: Steps,
+    references: References,
+) -> Floats | None:
+    if settings.values is None:
+        return nominal
+    problems = references.problems
+    # Two names, the distance, and where it is written.
+    entries: list[tuple[tuple[str, str], float, Mark, Steps]]
+    if isinstance(settings.values, str):
+        try:
+            rows = read_table(references.folder / settings.values, ["ball_1", "ball_2"], ["distance"])
+        except ExperimentError as error:
+            problems.take(error, steps)
+            return None
+        entries = [(cast(tuple[str, str], row.texts), row.lengths[0], row.mark, steps) for row in rows]
+    else:
+        entries = [
+            (entry.balls, entry.distance, mark_of(problems.root, (*steps, i)), (*steps, i))
+            for i, entry in enumerate(settings.values)
+        ]
+    before = len(problems.messages)
+    by_pair: dict[frozenset[str], float] = {}
+    for names, distance, mark, place in entries:
+        for name in names:
+            if name not in layout.names:
+                problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
+        pair = frozenset(names)
+        if len(pair) == 1:
+            problems.add_at(mark, place, f'a ball has no distance from itself; name two balls, not "{names[0]}" twice')
+        if pair in by_pair:
+            text = f'the distance of "{names[0]}" and "{names[1]}" is given twice; remove one of the two'
+            problems.add_at(mark, place, text)
+        if distance <= 0:
+            problems.add_at(mark, place, "a distance must be above zero; correct it")
+        by_pair[pair] = distance
+    wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
+    missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
+    if missing and len(problems.messages) == before:
+        problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
+    if len(problems.messages) > before:
+        return None
+    return np.array([by_pair[frozenset(pair)] for pair in wanted])
+
+
+def _coordinates(
+    settings: CoordinatesSettings, artefact: str, steps: Steps, references: References
+) -> CoordinateCalibration | None:
+    problems, layout, dimension = references.problems, references.layouts[artefact], references.dimension
+    if references.artefacts[artefact].role == "length_standard":
+        text = "a length standard carries distances only; use kind: distances, or remove its role: length_standard"
+        problems.add((*steps, "kind"), text)
+        return None
+    uncertainty = settings.standard_uncertainty
+    by_axis = (
+        dict.fromkeys(AXES[:dimension], uncertainty)
+        if isinstance(uncertainty, float)
+        else {axis: getattr(uncertainty, axis) for axis in AXES if getattr(uncertainty, axis) is not None}
+    )
+    place = (*steps, "standard_uncertainty")
+    is_right = references.require(bool(by_axis), place, "calibrates no axis; give at least one, such as {x: 0.2 um}")
+    text = "has no meaning in two dimensions; remove it"
+    is_right &= references.require(dimension != 2 or "z" not in by_axis, (*place, "z"), text)
+    balls: Indices | None
+    if settings.balls == "corners":
+        try:
+            balls = corners(layout)
+        except ValueError as error:
+            problems.add((*steps, "balls"), str(error))
+            balls = None
+    elif settings.balls == "all":
+        balls = np.arange(len(layout.names))
+    else:
+        balls = references.ball_indices(settings.balls, layout, (*steps, "balls"))
+    if balls is None or not is_right or dimension is None:
+        return None
+    values = _certified_coordinates(settings, balls, list(by_axis), layout, (*steps, "values"), references)
+    if values is None:
+        return None
+    balls.setflags(write=False)
+    axes = tuple(AXES.index(axis) for axis in by_axis)
+    return CoordinateCalibration(
+        artefact, balls, axes, frozen(values), settings.values is not None, frozen(list(by_axis.values()))
+    )
+
+
+def _certified_coordinates(
+    settings: CoordinatesSettings,
+    balls: Indices,
+    axes: list[str],
+    layout: BallLayout,
+    steps: Steps,
+    references: References,
+) -> Floats | None:
+    problems = references.problems
+    if settings.values is None:
+        return layout.coordinates[balls][:, [AXES.index(axis) for axis in axes]]
+    try:
+        others = [axis for axis in AXES if axis not in axes]
+        rows = read_table(references.folder / settings.values, ["ball"], axes, others)
+    except ExperimentError as error:
+        problems.take(error, steps)
+        return None
+    before = len(problems.messages)
+    by_ball: dict[str, tuple[float, ...]] = {}
+    for row in rows:
+        name = row.texts[0]
+        if name not in layout.names:
+            problems.add_at(row.mark, steps, f'unknown ball "{name}"; {hint(name, layout.names)}')
+        if name in by_ball:
+            problems.add_at(row.mark, steps, f'ball "{name}" is listed twice; remove one of the two lines')
+        by_ball[name] = row.lengths[: len(axes)]
+    missing = [layout.names[i] for i in balls if layout.names[i] not in by_ball]
+    if missing and len(problems.messages) == before:
+        problems.add(steps, f"no co-ordinates for {listing(missing)}; add them, or leave them out of balls")
+    if len(problems.messages) > before:
+        return None
+    return np.array([by_ball[layout.names[i]] for i in balls])

@@ -1,0 +1,183 @@
+"""Checks that need several sections: names used twice, balls outside the volume, balls nobody reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ..geometry.positions import ball_coordinates
+from ..machines.settings import build_error_model, dimension_of
+from ..machines.truth import TruthError, true_parameters
+from ..quantities import format_length
+from ..settings import listing
+from .messages import Steps
+from .model import Calibration, DistanceCalibration, Floats, Machine, Position, Volume
+from .problems import Problems, written_text
+from .references import References
+from .structure import Sections
+from .yamltree import Mark
+
+TOLERANCE = 1e-9
+AXES = ("x", "y", "z")
+
+
+def check_error_model(sections: Sections, references: References) -> None:
+    """Report an error model for another number of dimensions than the volume has."""
+    settings = sections.get("error_model")
+    if settings is None or references.dimension is None or dimension_of(settings) == references.dimension:
+        return
+    text = (
+        f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '
+        f"{references.dimension}; change one of the two"
+    )
+    references.problems.add(("error_model", "kind"), text)
+
+
+def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
+    """Report values of the true machine that its error model cannot have."""
+    settings, truth = sections.get("error_model"), sections.get("true_machine")
+    if settings is None or truth is None or machine is None or dimension_of(settings) != machine.dimension:
+        return
+    lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
+    try:
+        true_parameters(truth, build_error_model(settings, lower, upper))
+    except TruthError as error:
+        for name, text in error.problems:
+            references.problems.add(("true_machine", "values", name), text)
+
+
+def check_names(position_count: int, problems: Problems) -> None:
+    """Report positions that have the same name."""
+    first: dict[str, int] = {}
+    for i in range(position_count):
+        name = written_text(problems.root, "positions", i, "name")
+        if name is None:
+            continue
+        if name in first:
+            text = f'"{name}" is the name of positions[{first[name]}] already; names of positions must differ'
+            problems.add(("positions", i, "name"), text)
+        first.setdefault(name, i)
+
+
+def check_inside(position: Position, steps: Steps, volume: Volume, references: References) -> None:
+    """Report balls that are read outside the measuring volume."""
+    layout = references.layouts[position.artefact]
+    read = read_balls([position])
+    coordinates = ball_coordinates(position.pose, layout)[read]
+    by_how_much, axes, sides = excess(coordinates, volume)
+    outside = np.flatnonzero(by_how_much > TOLERANCE)
+    if len(outside) == 0:
+        return
+    worst = int(outside[np.argmax(by_how_much[outside])])
+    axis = int(axes[worst])
+    others = f", and {len(outside) - 1} more balls" if len(outside) > 1 else ""
+    others = others[:-1] if len(outside) == 2 else others
+    text = (
+        f'ball "{layout.names[read[worst]]}" is at {AXES[axis]} = {format_length(coordinates[worst, axis])}, '
+        f"{format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others}; "
+        "move the artefact, or read fewer balls"
+    )
+    references.problems.add(steps, text)
+
+
+def excess(points: Floats, volume: Volume) -> tuple[Floats, Floats, list[str]]:
+    """Return how far points (n, d) are outside the volume, along which axis, and on which side."""
+    below, above = volume.lower - points, points - volume.upper
+    by_axis = np.maximum(below, above)
+    axes = np.argmax(by_axis, axis=1)
+    rows = np.arange(len(points))
+    sides = ["below" if is_below else "above" for is_below in below[rows, axes] > above[rows, axes]]
+    return by_axis[rows, axes], axes, sides
+
+
+def check_use(sections: Sections, positions: dict[int, Position], position_count: int, references: References) -> None:
+    """Report artefacts never placed, balls of plates never read, and uncalibrated length standards."""
+    problems = references.problems
+    placed: set[str] = set()
+    uncertain: set[str] = set()
+    for i in range(position_count):
+        name = written_text(problems.root, "positions", i, "artefact")
+        if name is None and len(references.artefact_names) == 1:
+            name = references.artefact_names[0]
+        # A position that cannot be understood may be one of any artefact, or read any ball of its own.
+        names = {name} if name in references.artefact_names else set(references.artefact_names)
+        placed |= {str(name) for name in names}
+        if i not in positions:
+            uncertain |= {str(name) for name in names}
+    for name in references.artefact_names:
+        if position_count and name not in placed:
+            problems.add(("artefacts", name), "is never placed; add a position of it, or remove it", of_key=True)
+        elif name in references.layouts and name not in uncertain:
+            _check_balls_read(name, [one for one in positions.values() if one.artefact == name], references)
+    calibration_count = len(sections.entries("calibration"))
+    for name, settings in references.artefacts.items():
+        if settings.role == "length_standard" and not problems.has_below(("calibration",)):
+            kinds = (
+                [one.kind for one in sections.entries("calibration").values() if one.artefact in (name, None)]
+                if calibration_count
+                else []
+            )
+            if "distances" not in kinds and "coordinates" not in kinds:
+                text = "is a length standard without calibrated distances; add a calibration of kind: distances"
+                problems.add(("artefacts", name), text, of_key=True)
+
+
+def check_calibration_read(
+    calibration: Calibration,
+    steps: Steps,
+    positions: dict[int, Position],
+    position_count: int,
+    references: References,
+) -> None:
+    """Report calibrated balls of a length standard that no position reads; of plates, all are reported."""
+    if references.artefacts[calibration.artefact].role != "length_standard" or len(positions) < position_count:
+        return
+    own = [position for position in positions.values() if position.artefact == calibration.artefact]
+    used = calibration.pairs if isinstance(calibration, DistanceCalibration) else calibration.balls
+    layout = references.layouts[calibration.artefact]
+    unread = np.setdiff1d(used, read_balls(own))
+    if own and len(unread):
+        names = listing(layout.names[i] for i in unread)
+        key = "pairs" if isinstance(calibration, DistanceCalibration) else "balls"
+        references.problems.add(
+            (*steps, key), f"no position reads {_balls(len(unread))} {names}; read them, or leave them out"
+        )
+
+
+def check_points(
+    points: Floats, steps: Steps, volume: Volume, problems: Problems, marks: Sequence[Mark] | None = None
+) -> None:
+    """Report points outside the volume: listed ones one by one, of a table (with ``marks``) the first."""
+    by_how_much, axes, sides = excess(points, volume)
+    outside = np.flatnonzero(by_how_much > TOLERANCE)
+    for i in outside if marks is None else outside[:1]:
+        axis = int(axes[i])
+        others = f", as {len(outside) - 1} further points are" if marks is not None and len(outside) > 1 else ""
+        text = (
+            f"{AXES[axis]} = {format_length(points[i, axis])} is {format_length(by_how_much[i])} {sides[i]} "
+            f"the measuring volume{others}; move the point inside"
+        )
+        if marks is None:
+            problems.add((*steps, int(i)), text)
+        else:
+            problems.add_at(marks[int(i)], steps, text)
+
+
+def read_balls(positions: Iterable[Position]) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Return the indices of the balls that are read in any of the positions of one artefact, in order."""
+    groups = [group.ball_indices for position in positions for group in position.readings]
+    return np.unique(np.concatenate(groups)) if groups else np.zeros(0, dtype=np.intp)
+
+
+def _check_balls_read(name: str, positions: list[Position], references: References) -> None:
+    layout = references.layouts[name]
+    unread = np.setdiff1d(np.arange(len(layout.names)), read_balls(positions))
+    if references.artefacts[name].role == "plate" and len(unread):
+        names = listing(layout.names[i] for i in unread)
+        text = f"no position reads {_balls(len(unread))} {names}; read them, or leave them out of the artefact"
+        references.problems.add(("artefacts", name), text, of_key=True)
+
+
+def _balls(count: int) -> str:
+    return "ball" if count == 1 else "balls"

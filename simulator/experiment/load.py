@@ -1,0 +1,124 @@
+"""Loads an experiment file: from YAML to experiments, or to everything that is wrong with it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .calibrations import resolve_calibration
+from .checks import check_calibration_read, check_error_model, check_inside, check_names, check_true_machine, check_use
+from .machine import resolve_evaluation, resolve_machine
+from .messages import ExperimentError, Message
+from .model import Experiment
+from .placements import resolve_position
+from .problems import Problems, written_count
+from .references import resolve_probes, resolve_references
+from .structure import validate_sections
+from .variants import in_variants, variant_trees
+from .yamltree import Mapping, Node, read_tree
+
+
+def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
+    """Load an experiment file.
+
+    Returns the experiment, or one per variant in the order of the file. Tables that the file names are read
+    from the folder it is in.
+
+    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
+    """
+    source = Path(path)
+    refused: list[Message] = []
+    root = read_tree(source, refused)
+    base_problems = Problems(root)
+    trees = variant_trees(root, base_problems)
+    if not trees:
+        experiment, messages = build(_without_variants(root), source, None)
+        _raise_if_any([*base_problems.messages, *messages], refused, source)
+        assert experiment is not None
+        return (experiment,)
+    experiments = []
+    variants_of: dict[Message, list[str]] = {}
+    for name, tree in trees.items():
+        experiment, messages = build(tree, source, name)
+        experiments += [experiment] if experiment else []
+        for message in messages:
+            variants_of.setdefault(message, []).append(name)
+    found = base_problems.messages + [
+        Message(one.file, one.line, one.column, one.path, one.text + in_variants(names, list(trees)))
+        for one, names in variants_of.items()
+    ]
+    _raise_if_any(found, refused, source)
+    return tuple(experiments)
+
+
+def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
+    """Return the experiment of a tree without variants and no messages, or None and what is wrong."""
+    problems = Problems(root)
+    sections = validate_sections(root, problems)
+    references = resolve_references(sections, source.parent, problems)
+    machine = resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
+    probes = resolve_probes(sections, references)
+    check_error_model(sections, references)
+    check_true_machine(sections, machine, references)
+    for section in ("positions", "calibration"):
+        for i in range(written_count(root, section)):
+            if sections.get(section, i) is None:
+                references.check_written((section, i))
+    position_count = written_count(root, "positions")
+    check_names(position_count, problems)
+    positions = {}
+    for key, settings in sections.entries("positions").items():
+        i = int(key)
+        position = resolve_position(settings, ("positions", i), references)
+        if position is not None:
+            positions[i] = position
+            if machine is not None and machine.dimension == references.dimension:
+                check_inside(position, ("positions", i), machine.volume, references)
+    check_use(sections, positions, position_count, references)
+    calibrations = []
+    for key, settings in sections.entries("calibration").items():
+        i = int(key)
+        calibration = resolve_calibration(settings, ("calibration", i), references)
+        if calibration is not None:
+            calibrations.append(calibration)
+            check_calibration_read(calibration, ("calibration", i), positions, position_count, references)
+    evaluation = resolve_evaluation(sections, machine, references)
+    if problems.messages or machine is None or evaluation is None:
+        return None, problems.messages
+    experiment = Experiment(
+        title=sections.get("title"),
+        description=sections.get("description") or "",
+        name=name,
+        source=source,
+        machine=machine,
+        error_model=sections.get("error_model"),
+        true_machine=sections.get("true_machine"),
+        probes=probes,
+        artefacts=references.artefacts,
+        layouts=references.layouts,
+        positions=tuple(positions.values()),
+        calibration=tuple(calibrations),
+        evaluation=evaluation,
+        target_accuracy=sections.get("target_accuracy"),
+        sigma=sections.get("sigma"),
+        expected_rank_deficiency=sections.get("expected_rank_deficiency"),
+        seed=sections.get("seed"),
+    )
+    return experiment, []
+
+
+def _without_variants(root: Node) -> Node:
+    if not isinstance(root, Mapping):
+        return root
+    items = {key: node for key, node in root.items.items() if key != "variants"}
+    return Mapping(root.mark, items, {key: root.key_marks[key] for key in items})
+
+
+def _raise_if_any(messages: list[Message], refused: list[Message], source: Path) -> None:
+    """Raise the messages by line, the experiment file before its tables."""
+    # What stands at a refused place was made up, and nobody should be told about it.
+    made_up = {(one.file, one.line, one.column) for one in refused}
+    found = [one for one in messages if (one.file, one.line, one.column) not in made_up]
+    every = sorted({*found, *refused}, key=lambda message: (message.file != str(source), message))
+    if every:
+        raise ExperimentError(every)

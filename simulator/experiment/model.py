@@ -1,0 +1,150 @@
+"""An experiment as the rest of the program sees it: in metres, defaults filled in, names resolved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.artefacts import ArtefactSettings, BallLayout
+from ..geometry.positions import Pose
+from ..quantities import LengthFunction
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """The measuring volume: ``lower`` and ``upper`` (d,) in metres."""
+
+    lower: Floats
+    upper: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """The machine. ``repeatability``: (d,) standard uncertainty of a reading per co-ordinate, in metres."""
+
+    volume: Volume
+    repeatability: Floats
+
+    @property
+    def dimension(self) -> int:
+        """Number of co-ordinates, 2 or 3."""
+        return len(self.volume.lower)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingGroup:
+    """Balls read with the same probes: each ball with each probe, ``repeats`` times.
+
+    ``probes``: names. ``balls``: names, ``ball_indices``: (k,) the same as indices into the layout.
+    """
+
+    probes: tuple[str, ...]
+    balls: tuple[str, ...]
+    ball_indices: Indices
+    repeats: int
+
+
+@dataclass(frozen=True, eq=False)
+class Position:
+    """A position of an artefact, its nominal pose in the machine and what is read in it."""
+
+    name: str
+    artefact: str
+    pose: Pose
+    readings: tuple[ReadingGroup, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceCalibration:
+    """Calibrated distances of an artefact.
+
+    ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y. ``values``: (m,)
+    metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres, the function
+    ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability`` matter for length
+    standards only.
+    """
+
+    artefact: str
+    pairs: Indices
+    dimensions: Literal[2, 3]
+    values: Floats
+    certified: bool
+    standard_uncertainty: LengthFunction
+    standard_uncertainties: Floats
+    form: Literal["distance", "projection"]
+    repeatability: Literal["included", "ignored"]
+    kind: Literal["distances"] = "distances"
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinateCalibration:
+    """Calibrated ball co-ordinates in the artefact's frame.
+
+    ``balls``: (k,) indices. ``axes``: the a calibrated axes, 0 to 2. ``values``: (k, a) metres, nominal
+    unless ``certified``. ``standard_uncertainties``: (a,) metres.
+    """
+
+    artefact: str
+    balls: Indices
+    axes: tuple[int, ...]
+    values: Floats
+    certified: bool
+    standard_uncertainties: Floats
+    kind: Literal["coordinates"] = "coordinates"
+
+
+Calibration = DistanceCalibration | CoordinateCalibration
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, and the probe."""
+
+    points: Floats
+    probe: str
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A complete experiment, or one variant of it.
+
+    ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres. ``layouts``:
+    name of an artefact → its balls. ``target_accuracy`` and ``expected_rank_deficiency`` are None where
+    nothing was stated.
+    """
+
+    title: str
+    description: str
+    name: str | None
+    source: Path
+    machine: Machine
+    error_model: Any
+    true_machine: Any
+    probes: Mapping[str, Floats]
+    artefacts: Mapping[str, ArtefactSettings]
+    layouts: Mapping[str, BallLayout]
+    positions: tuple[Position, ...]
+    calibration: tuple[Calibration, ...]
+    evaluation: Evaluation
+    target_accuracy: LengthFunction | None
+    sigma: Literal["estimated", "given"]
+    expected_rank_deficiency: int | None
+    seed: int
+
+    @property
+    def dimension(self) -> int:
+        """Number of co-ordinates, 2 or 3."""
+        return self.machine.dimension
+
+    @property
+    def label(self) -> str:
+        """Name of the file without its ending, and the variant in brackets."""
+        return self.source.stem if self.name is None else f"{self.source.stem}[{self.name}]"

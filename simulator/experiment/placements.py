@@ -1,0 +1,154 @@
+"""From the settings of a position to its pose and its readings."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from ..geometry.artefacts import BallLayout
+from ..geometry.positions import IN_PLANE_AXES, Axis, FreePlacement, PlanePlacement, Pose, nominal_pose
+from .messages import Steps
+from .model import Position, ReadingGroup
+from .references import References
+from .sections import PositionSettings
+
+PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
+READING_KEYS = ("probes", "balls", "repeats")
+
+
+def resolve_position(settings: PositionSettings, steps: Steps, references: References) -> Position | None:
+    """Return a position with its pose and readings, or None after saying what is wrong."""
+    artefact = references.artefact(settings.artefact, steps)
+    layout = references.layouts.get(artefact) if artefact is not None else None
+    readings = _readings(settings, steps, layout, references)
+    placement = _placement(settings, steps, references)
+    if artefact is None or layout is None or readings is None or placement is None or references.dimension is None:
+        return None
+    pose = nominal_pose(placement, layout, references.dimension)
+    for array in (pose.rotation, pose.origin):
+        array.setflags(write=False)
+    return Position(settings.name, artefact, Pose(pose.rotation, pose.origin), readings)
+
+
+def _readings(
+    settings: PositionSettings, steps: Steps, layout: BallLayout | None, references: References
+) -> tuple[ReadingGroup, ...] | None:
+    if settings.readings is None:
+        group = _group(settings.probes, settings.balls or "all", settings.repeats or 1, steps, layout, references)
+        return (group,) if group else None
+    complete = True
+    for key in READING_KEYS:
+        if getattr(settings, key) is not None:
+            references.problems.add(
+                (*steps, key),
+                'does not go with "readings"; move it there, or remove "readings"',
+                of_key=True,
+            )
+            complete = False
+    groups = [
+        _group(group.probes, group.balls, group.repeats, (*steps, "readings", i), layout, references)
+        for i, group in enumerate(settings.readings)
+    ]
+    found = tuple(group for group in groups if group is not None)
+    return found if complete and len(found) == len(groups) else None
+
+
+def _group(
+    probes: tuple[str, ...] | None,
+    balls: Literal["all"] | tuple[str, ...],
+    repeats: int,
+    steps: Steps,
+    layout: BallLayout | None,
+    references: References,
+) -> ReadingGroup | None:
+    probe_names = references.probe_names(probes, steps)
+    if layout is None:
+        return None
+    names = layout.names if balls == "all" else balls
+    indices = (
+        np.arange(len(layout.names)) if balls == "all" else references.ball_indices(names, layout, (*steps, "balls"))
+    )
+    if probe_names is None or indices is None:
+        return None
+    indices.setflags(write=False)
+    return ReadingGroup(probe_names, tuple(names), indices, repeats)
+
+
+def _placement(
+    settings: PositionSettings, steps: Steps, references: References
+) -> PlanePlacement | FreePlacement | None:
+    dimension, problems = references.dimension, references.problems
+    plane_keys = [key for key in PLANE_KEYS if getattr(settings, key) is not None]
+    if settings.pose is not None:
+        for key in plane_keys:
+            problems.add((*steps, key), 'does not go with "pose"; remove one of the two', of_key=True)
+        pose = _free_placement(settings.pose, (*steps, "pose"), references)
+        return None if plane_keys else pose
+    if dimension is None:
+        return None
+    if not {"plane", "level", "corner", "centre"} & set(plane_keys):
+        needed = "corner or centre" if dimension == 2 else "plane, level and corner or centre"
+        problems.add(steps, f"says nothing of where the artefact is; add {needed}, or pose")
+        return None
+    is_right = True
+    if dimension == 2:
+        for key in {"plane", "level"} & set(plane_keys):
+            problems.add((*steps, key), "has no meaning in two dimensions; remove it", of_key=True)
+            is_right = False
+    else:
+        is_right &= references.require(settings.plane is not None, (*steps, "plane"), 'missing; add "plane", x, y or z')
+        text = 'missing; add "level", the co-ordinate of the plane'
+        is_right &= references.require(settings.level is not None, (*steps, "level"), text)
+    if settings.corner is None and settings.centre is None:
+        problems.add((*steps, "corner"), 'missing; add "corner" or "centre"')
+        return None
+    if settings.corner is not None and settings.centre is not None:
+        problems.add((*steps, "centre"), 'does not go with "corner"; remove one of the two', of_key=True)
+        return None
+    plane: Axis | None = "z" if dimension == 2 else settings.plane
+    if plane is None:
+        return None
+    anchor: Literal["corner", "centre"] = "centre" if settings.corner is None else "corner"
+    at = _in_plane(getattr(settings, anchor), plane, (*steps, anchor), references)
+    if at is None or not is_right:
+        return None
+    return PlanePlacement(plane, settings.level or 0.0, anchor, at, settings.quarter_turns or 0)
+
+
+def _in_plane(point: Any, plane: Axis, steps: Steps, references: References) -> tuple[float, float] | None:
+    axes = IN_PLANE_AXES[plane]
+    first, second = sorted(axes)
+    is_right = True
+    for axis in ("x", "y", "z"):
+        is_written = getattr(point, axis) is not None
+        if axis in axes:
+            is_right &= references.require(is_written, (*steps, axis), f'missing; add "{axis}"')
+        elif is_written:
+            text = f"is not an axis of the plane; give {first} and {second}"
+            references.problems.add((*steps, axis), text, of_key=True)
+            is_right = False
+    return (getattr(point, axes[0]), getattr(point, axes[1])) if is_right else None
+
+
+def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlacement | None:
+    dimension = references.dimension
+    if dimension is None:
+        return None
+    is_right = references.require(
+        len(pose.origin) == dimension,
+        (*steps, "origin"),
+        f"has {len(pose.origin)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}",
+    )
+    is_right &= references.require(
+        pose.rotation is None or isinstance(pose.rotation, float) == (dimension == 2),
+        (*steps, "rotation"),
+        "a two-dimensional experiment has one angle; write for example 90 deg"
+        if dimension == 2
+        else "a three-dimensional experiment has three angles; write for example [0 deg, 0 deg, 90 deg]",
+    )
+    if not is_right:
+        return None
+    if pose.rotation is None:
+        return FreePlacement(pose.origin, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0))
+    return FreePlacement(pose.origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,))

@@ -1,0 +1,187 @@
+"""What positions and calibrations refer to: artefacts, probes and balls by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..geometry.artefacts import MOST_BALLS, ArtefactSettings, BallLayout, BallsSettings, coincident_balls
+from ..quantities import format_length
+from ..settings import hint, listing
+from .messages import ExperimentError, Steps
+from .model import Floats, Indices
+from .problems import Problems, written, written_keys, written_text
+from .structure import Sections
+from .tables import read_table
+from .yamltree import Mapping, Node
+from .yamltree import Sequence as SequenceNode
+
+DEFAULT_PROBE = "probe"
+
+
+@dataclass(frozen=True, eq=False)
+class References:
+    """What can be referred to.
+
+    ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in themselves;
+    ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the file does not tell it.
+    """
+
+    problems: Problems
+    folder: Path
+    dimension: int | None
+    probes: tuple[str, ...]
+    artefact_names: tuple[str, ...]
+    artefacts: dict[str, ArtefactSettings]
+    layouts: dict[str, BallLayout]
+
+    def artefact(self, name: str | None, steps: Steps) -> str | None:
+        """Return the artefact that a position or calibration is about, or None after saying what is wrong."""
+        if name is None:
+            if len(self.artefact_names) > 1:
+                choice = listing(self.artefact_names)
+                self.problems.add((*steps, "artefact"), f'missing; add "artefact", one of: {choice}')
+            return self.artefact_names[0] if len(self.artefact_names) == 1 else None
+        if name not in self.artefact_names:
+            self.problems.add((*steps, "artefact"), f'unknown artefact "{name}"; {hint(name, self.artefact_names)}')
+            return None
+        return name
+
+    def check_written(self, steps: Steps) -> None:
+        """Report unknown names in a position or calibration that is wrong in itself."""
+        name = written_text(self.problems.root, *steps, "artefact")
+        if name is not None:
+            self.artefact(name, steps)
+        probes = written(self.problems.root, *steps, "probes")
+        for i in range(len(probes.items)) if isinstance(probes, SequenceNode) else ():
+            probe = written_text(self.problems.root, *steps, "probes", i)
+            if probe is not None and probe not in self.probes:
+                self.problems.add((*steps, "probes", i), f'unknown probe "{probe}"; {hint(probe, self.probes)}')
+
+    def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
+        """Return the probes of a reading, or None after saying what is wrong."""
+        if names is None:
+            if len(self.probes) > 1:
+                choice = listing(self.probes)
+                self.problems.add((*steps, "probes"), f'missing; add "probes", some of: {choice}')
+            return self.probes if len(self.probes) == 1 else None
+        found = [self._once("probe", self.probes, names, (*steps, "probes"), i) for i in range(len(names))]
+        return names if all(found) else None
+
+    def ball_indices(self, names: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
+        """Return the indices of listed balls, or None after saying what is wrong."""
+        found = [self._once("ball", layout.names, names, steps, i) for i in range(len(names))]
+        index = {name: i for i, name in enumerate(layout.names)}
+        return np.array([index[name] for name in names], dtype=np.intp) if all(found) else None
+
+    def _once(self, what: str, known: Sequence[str], names: Sequence[str], steps: Steps, i: int) -> bool:
+        if names[i] not in known:
+            self.problems.add((*steps, i), f'unknown {what} "{names[i]}"; {hint(names[i], known)}')
+            return False
+        if names[i] in names[:i]:
+            self.problems.add((*steps, i), f'{what} "{names[i]}" is listed twice; remove one of the two')
+            return False
+        return True
+
+    def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
+        """Say what is wrong unless it is right; return whether it is."""
+        if not is_right:
+            self.problems.add(steps, text if isinstance(text, str) else text())
+        return is_right
+
+
+def resolve_references(sections: Sections, folder: Path, problems: Problems) -> References:
+    """Return what positions and calibrations can refer to; tables of balls are read from ``folder``."""
+    root = problems.root
+    dimension = _dimension(root)
+    probes = written_keys(root, "probes")
+    if not probes and written(root, "probes") is None and dimension in (2, None):
+        probes = (DEFAULT_PROBE,)
+    artefacts: dict[str, ArtefactSettings] = {}
+    layouts: dict[str, BallLayout] = {}
+    for key, settings in sections.entries("artefacts").items():
+        name, steps = str(key), ("artefacts", str(key))
+        listed = _with_coordinates(settings, folder, steps, problems)
+        if listed is None:
+            continue
+        layout = listed.layout()
+        twins = coincident_balls(layout)
+        for i, j in twins[:3]:
+            text = f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct one of them'
+            problems.add((*steps, "coordinates"), text)
+        if dimension == 2 and np.any(layout.coordinates[:, 2]):
+            high = int(np.flatnonzero(layout.coordinates[:, 2])[0])
+            text = (
+                f'ball "{layout.names[high]}" has the third co-ordinate '
+                f"{format_length(layout.coordinates[high, 2])}, "
+                "but the experiment is two-dimensional; give two co-ordinates, or machine.volume a z axis"
+            )
+            problems.add((*steps, "coordinates"), text)
+        elif not twins:
+            artefacts[name], layouts[name] = listed, layout
+    return References(problems, folder, dimension, probes, written_keys(root, "artefacts"), artefacts, layouts)
+
+
+def resolve_probes(sections: Sections, references: References) -> dict[str, Floats]:
+    """Return the offsets of the probes that are right."""
+    problems, dimension = references.problems, references.dimension
+    if written(problems.root, "probes") is None:
+        if dimension == 3:
+            text = 'missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: offsets from the reference point'
+            problems.add(("probes",), text)
+        return {DEFAULT_PROBE: frozen(np.zeros(dimension))} if dimension == 2 else {}
+    offsets = {}
+    for name, offset in sections.entries("probes").items():
+        if references.require(
+            dimension in (None, len(offset)),
+            ("probes", name),
+            f"has {len(offset)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}",
+        ):
+            offsets[str(name)] = frozen(offset)
+    return offsets
+
+
+def frozen(values: Any) -> Floats:
+    """Return values as an array that cannot be changed."""
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def _with_coordinates(
+    settings: ArtefactSettings, folder: Path, steps: Steps, problems: Problems
+) -> ArtefactSettings | None:
+    if not isinstance(settings, BallsSettings) or settings.file is None:
+        return settings
+    steps = (*steps, "file")
+    try:
+        rows = read_table(folder / settings.file, ["ball"], ["x", "y"], ["z"])
+    except ExperimentError as error:
+        problems.take(error, steps)
+        return None
+    coordinates: dict[str, tuple[float, ...]] = {}
+    complete = True
+    for row in rows:
+        if row.texts[0] in coordinates:
+            problems.add_at(row.mark, steps, f'ball "{row.texts[0]}" is listed twice; remove one of the two lines')
+            complete = False
+        coordinates[row.texts[0]] = row.lengths
+    if len(coordinates) > MOST_BALLS:
+        problems.add(steps, f"has {len(coordinates)} balls; at most {MOST_BALLS} are possible")
+        return None
+    return settings.model_copy(update={"coordinates": coordinates, "file": None}) if complete else None
+
+
+def _dimension(root: Node) -> int | None:
+    """Return the number of axes of the volume as written, even where its values are wrong."""
+    volume = written(root, "machine", "volume")
+    if isinstance(volume, Mapping):
+        # Neither may be meant where an axis has another name.
+        return 3 if "z" in volume.items else 2 if set(volume.items) <= {"x", "y"} else None
+    if isinstance(volume, SequenceNode) and len(volume.items) in (2, 3):
+        return len(volume.items)
+    return None

@@ -1,0 +1,109 @@
+"""Validates the sections of an experiment file one by one, so that no error hides those of others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..geometry.artefacts import AnyArtefactSettings, Coordinates
+from ..settings import describe, hint
+from .messages import Steps
+from .problems import Problems
+from .sections import CalibrationSettings, ExperimentSettings, PositionSettings
+from .wording import explain
+from .yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
+
+# Sections whose entries are validated one by one: form of the section and type of an entry.
+ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
+    "probes": (Mapping, Coordinates),
+    "artefacts": (Mapping, AnyArtefactSettings),
+    "positions": (Sequence, PositionSettings),
+    "calibration": (Sequence, CalibrationSettings),
+}
+
+
+@dataclass(frozen=True)
+class Sections:
+    """What is right in a file: values by path, such as ("machine",) and ("positions", 0)."""
+
+    values: dict[Steps, Any]
+
+    def get(self, *steps: str | int) -> Any:
+        """Return the value of a path, or None where it was missing or wrong."""
+        return self.values.get(steps)
+
+    def entries(self, section: str) -> dict[str | int, Any]:
+        """Return the right entries of a section by key or index, in the order of the file."""
+        return {steps[1]: value for steps, value in self.values.items() if len(steps) == 2 and steps[0] == section}
+
+
+def validate_sections(root: Node, problems: Problems) -> Sections:
+    """Validate what each section says by itself; what is wrong goes to ``problems``."""
+    fields = ExperimentSettings.model_fields
+    values: dict[Steps, Any] = {}
+    if not isinstance(root, Mapping):
+        text = f"expected a mapping that begins with title: …, found {describe(to_python(root))}"
+        problems.add((), text)
+        return Sections(values)
+    for steps, node in walk(root):
+        if isinstance(node, Scalar) and node.value is None:
+            problems.add(steps, "empty; give a value, or leave it out")
+    for key in root.items:
+        if key not in fields:
+            problems.add((key,), f"unknown key; {hint(key, [name for name in fields if name not in root.items])}", True)
+    for key, field in fields.items():
+        node_or_none = root.items.get(key)
+        if node_or_none is None and field.is_required():
+            problems.add((key,), f'missing; add "{key}" ({field.description})')
+        elif node_or_none is None:
+            values[key,] = field.get_default(call_default_factory=True)  # type: ignore[call-arg,unused-ignore]
+        elif key in ENTRIES:
+            values |= _validate_entries(key, node_or_none, problems)
+        elif key != "variants":
+            values |= _validate(_adapter(key), node_or_none, (key,), problems)
+    return Sections(values)
+
+
+def _validate_entries(key: str, node: Node, problems: Problems) -> dict[Steps, Any]:
+    form, _ = ENTRIES[key]
+    description = ExperimentSettings.model_fields[key].description
+    if isinstance(node, Scalar) and node.value is None:
+        return {}
+    if not isinstance(node, form):
+        expected = "a mapping, name: …" if form is Mapping else "a list, each entry beginning with “- ”"
+        found = describe(to_python(node) if isinstance(node, Scalar) else {} if isinstance(node, Mapping) else ())
+        problems.add((key,), f"expected {expected}, found {found} ({description})")
+        return {}
+    if not node.items and key != "calibration":
+        problems.add((key,), f"empty; give at least one entry ({description})")
+    entries = node.items.items() if isinstance(node, Mapping) else enumerate(node.items)
+    values: dict[Steps, Any] = {}
+    for step, item in entries:
+        values |= _validate(_adapter(key), item, (key, step), problems)
+    return values
+
+
+def _validate(adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems) -> dict[Steps, Any]:
+    try:
+        return {steps: adapter.validate_python(to_python(node))}
+    except ValidationError as error:
+        for explanation in explain(error.errors(include_url=False), node, _json_schema(steps[0])):
+            problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)
+        return {}
+
+
+@cache
+def _adapter(key: str) -> TypeAdapter[Any]:
+    if key in ENTRIES:
+        return TypeAdapter(ENTRIES[key][1])
+    field = ExperimentSettings.model_fields[key]
+    annotated: Any = Annotated[field.annotation, field]
+    return TypeAdapter(annotated)
+
+
+@cache
+def _json_schema(key: str | int) -> dict[str, Any]:
+    return _adapter(str(key)).json_schema()

@@ -1,0 +1,136 @@
+"""Tables in CSV files: columns by name, lengths with the unit as a suffix of the column's name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from ..quantities import LENGTH_UNITS, QuantityError, exact_number
+from ..settings import hint, listing, shorten
+from .messages import ExperimentError, Message
+from .yamltree import Mark, read_text
+
+CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
+MOST_ROWS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a table: texts of its named columns and lengths, in metres, of its length columns."""
+
+    mark: Mark
+    texts: tuple[str, ...]
+    lengths: tuple[float, ...]
+
+
+def read_table(
+    path: Path, texts: Sequence[str], lengths: Sequence[str], optional: Sequence[str] = ()
+) -> tuple[Row, ...]:
+    """Read a comma-separated file whose first line names the columns.
+
+    ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a unit such
+    as ``x_mm``; ``optional`` are length columns that may be missing and then are 0. Empty lines and lines
+    that begin with # are skipped.
+
+    :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not a number,
+        there are no rows; all problems of the file at once.
+    """
+    file = str(path)
+    messages: list[Message] = []
+    lines = [
+        (number, line)
+        for number, line in enumerate(read_text(path).splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
+    if not lines:
+        raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {example}")])
+    places, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, example)
+    rows = []
+    for number, line in lines[1 : MOST_ROWS + 1]:
+        mark = Mark(file, number, 1)
+        cells = _cells(line)
+        if cells is None or len(cells) != len(places):
+            what = "a quotation mark too many" if cells is None else f"{len(cells)} columns instead of {len(places)}"
+            messages.append(mark.message("", f"{what}; write one line per row, its columns separated by commas"))
+            continue
+        by_name = {name: cells[i] for i, name in enumerate(places)}
+        row_lengths = []
+        for name in (*lengths, *optional):
+            column, cell = by_name.get(name, (1, "0"))
+            try:
+                row_lengths.append(float(exact_number(cell) * factors.get(name, Fraction(1))))
+            except QuantityError as error:
+                messages.append(Mark(file, number, column).message("", str(error)))
+        for name in texts:
+            if not by_name[name][1]:
+                messages.append(Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name"))
+        rows.append(Row(mark, tuple(by_name[name][1] for name in texts), tuple(row_lengths)))
+    if len(lines) == 1:
+        messages.append(Message(file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"))
+    if len(lines) > MOST_ROWS + 1:
+        messages.append(Message(file, lines[MOST_ROWS][0], 1, "", f"more than {MOST_ROWS} rows; leave some out"))
+    if messages:
+        raise ExperimentError(messages)
+    return tuple(rows)
+
+
+def _columns(
+    mark: Mark,
+    header: str,
+    texts: Sequence[str],
+    lengths: Sequence[str],
+    optional: Sequence[str],
+    example: str,
+) -> tuple[list[str], dict[str, Fraction]]:
+    """Return the names of the columns without their units, and the factor of each unit."""
+    messages: list[Message] = []
+    names: list[str] = []
+    factors: dict[str, Fraction] = {}
+    cells = _cells(header) or []
+    if len(cells) == 1 and re.search("[;\t]", header):
+        raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])
+    for column, cell in cells:
+        place = Mark(mark.file, mark.line, column)
+        name, _, unit = cell.rpartition("_")
+        unit = unit.replace("µ", "u").replace("μ", "u")
+        if cell in texts:
+            name = cell
+        elif name in (*lengths, *optional) and unit in LENGTH_UNITS:
+            factors[name] = LENGTH_UNITS[unit]
+        elif name in (*lengths, *optional):
+            messages.append(place.message("", f'unknown unit in the column "{cell}"; {hint(unit, LENGTH_UNITS)}'))
+        elif cell in (*lengths, *optional):
+            name = cell
+            messages.append(place.message("", f'the column "{cell}" has no unit; write for example {cell}_mm'))
+        else:
+            known = [*texts, *(f"{length}_mm" for length in (*lengths, *optional))]
+            messages.append(place.message("", f'unknown column "{shorten(cell)}"; {hint(cell, known)}'))
+        if name in names:
+            messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one of them'))
+        names.append(name)
+    missing = [name for name in (*texts, *lengths) if name not in names]
+    if missing:
+        messages.append(mark.message("", f"no column for {listing(missing)}; the first line should be {example}"))
+    if messages:
+        raise ExperimentError(messages)
+    return names, factors
+
+
+def _cells(line: str) -> list[tuple[int, str]] | None:
+    """Split a line into cells with their columns, from 1; None if its quotation marks do not match."""
+    cells, start = [], 0
+    while True:
+        match = CELL.match(line, start)
+        if match is None:
+            return None
+        quoted, plain, separator = match.groups()
+        text = plain.strip() if quoted is None else quoted.replace('""', '"')
+        blank = len(match[0]) - len(match[0].lstrip())
+        cells.append((match.start() + (blank if text else 0) + 1, text))
+        if not separator:
+            return cells
+        start = match.end()

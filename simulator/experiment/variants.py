@@ -1,0 +1,114 @@
+"""Variants of an experiment: the same file with some of its nodes replaced."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from ..settings import describe, hint, listing
+from .messages import format_path
+from .problems import Problems
+from .sections import ExperimentSettings
+from .yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
+
+STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
+
+
+def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
+    """Return the tree of every variant by name; those that cannot be made go to ``problems``."""
+    section = child(root, "variants")
+    trees: dict[str, Node] = {}
+    if section is None or not isinstance(root, Mapping):
+        return trees
+    if not isinstance(section, Mapping) or not section.items:
+        found = "nothing" if isinstance(section, Mapping) else describe(_shallow(section))
+        problems.add(("variants",), f"expected a mapping, name: {{path: new value}}, found {found}")
+        return trees
+    base = replace(
+        root,
+        items={key: node for key, node in root.items.items() if key != "variants"},
+        key_marks={key: mark for key, mark in root.key_marks.items() if key != "variants"},
+    )
+    for name, overrides in section.items.items():
+        if not isinstance(overrides, Mapping):
+            problems.add(
+                ("variants", name),
+                f"expected a mapping, path: new value, found {describe(_shallow(overrides))}",
+            )
+            continue
+        tree: Node = base
+        before = len(problems.messages)
+        for path, node in overrides.items.items():
+            try:
+                tree = override(tree, path, node, overrides.key_marks[path])
+            except ValueError as error:
+                problems.add(("variants", name, path), str(error), of_key=True)
+        if len(problems.messages) == before:
+            trees[name] = tree
+    return trees
+
+
+def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
+    """Return the tree with the node at a path replaced; ``mark`` is where the override stands.
+
+    :raises ValueError: the path is malformed, or what it passes through does not exist.
+    """
+    steps = [match[1] or match[2] or "" for match in STEP.finditer(path)]
+    if not path or "".join(match[0] for match in STEP.finditer(path)) != path or "" in steps:
+        raise ValueError(f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size')
+    if len(steps) == 1 and steps[0] not in ExperimentSettings.model_fields or steps[0] == "variants":
+        known = [key for key in ExperimentSettings.model_fields if key != "variants"]
+        raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
+    return _replaced(root, steps, value, mark, ())
+
+
+def _replaced(node: Node, steps: list[str], value: Node, mark: Mark, above: tuple[str, ...]) -> Node:
+    if not steps:
+        return value
+    step, rest, here = steps[0], steps[1:], (*above, steps[0])
+    if isinstance(node, Mapping):
+        if step not in node.items and rest:
+            raise ValueError(f"there is no {format_path(here)}; {hint(step, node.items)}")
+        below = _replaced(node.items[step], rest, value, mark, here) if rest else value
+        marks = node.key_marks if rest else {**node.key_marks, step: mark}
+        return replace(node, items={**node.items, step: below}, key_marks=marks)
+    if isinstance(node, Sequence):
+        i = _index(node, step, above)
+        below = _replaced(node.items[i], rest, value, mark, here)
+        return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
+    raise ValueError(f"{format_path(above)} is {describe(node.value)} and has nothing below it; replace it as a whole")
+
+
+def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:
+    if re.fullmatch(r"[0-9]{1,9}", step):
+        if int(step) < len(node.items):
+            return int(step)
+        raise ValueError(f"there is no {format_path(above)}[{step}]; the indices are 0 to {len(node.items) - 1}")
+    names = [_name(item) for item in node.items]
+    if names.count(step) == 1:
+        return names.index(step)
+    if step in names:
+        raise ValueError(f'several entries of {format_path(above)} are named "{step}"; use an index')
+    known = [name for name in names if name is not None]
+    advice = hint(step, known) if known else f"use an index, 0 to {len(names) - 1}"
+    raise ValueError(f'there is no "{step}" in {format_path(above)}; {advice}')
+
+
+def _name(node: Node) -> str | None:
+    name = child(node, "name")
+    return str(name.value) if isinstance(name, Scalar) else None
+
+
+def _shallow(node: Node) -> object:
+    return to_python(node) if isinstance(node, Scalar) else ()
+
+
+def in_variants(names: list[str], all_names: list[str]) -> str:
+    """Say in which variants a message holds; nothing where it holds in all of them.
+
+    >>> in_variants(["A"], ["A", "B"])
+    ' (in variant A)'
+    """
+    if len(names) == len(all_names):
+        return ""
+    return f" (in variant{'s' if len(names) > 1 else ''} {listing(names, 4)})"

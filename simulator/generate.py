@@ -1,0 +1,66 @@
+"""Synthetic readings of a stated true machine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .design import Design, Readings, State, locations
+from .machines.protocol import Array, ErrorModel
+
+
+class NoReadingError(ValueError):
+    """The true machine's errors are so large that no scale reading belongs to some location."""
+
+
+def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
+    """Scale readings x (m, d) with x + e(x, a, p) = `true`, exact to rounding.
+
+    :raises NoReadingError: the errors are too large for the iteration x <- true - e(x) to settle.
+    """
+    x = true - p
+    rounding = 4e-16 * max(1.0, float(np.abs(true).max(initial=0.0)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(100):
+            change = true - x - model.error(x, a, p)
+            x = x + change
+            largest = float(np.abs(change).max(initial=0.0))
+            if largest <= rounding:
+                return x
+    if not largest <= 10 * rounding:
+        raise NoReadingError("the errors of the true machine are too large for its readings to be found")
+    return x
+
+
+def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
+    """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
+    readings = design.readings.expanded()
+    p = design.probes[readings.probe]
+    return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
+
+
+def noisy_readings(design: Design, truth: State, generator: np.random.Generator) -> tuple[Readings, Array]:
+    """The same with normal noise of the design's repeatability added to each co-ordinate."""
+    readings, x = exact_readings(design, truth)
+    return readings, x + generator.standard_normal(x.shape) * design.repeatability
+
+
+def noisy_certificate(design: Design, truth: State, generator: np.random.Generator) -> Design:
+    """The design with calibration values drawn about those of the true artefacts."""
+    distances, coordinates, lengths = design.distances, design.coordinates, design.lengths
+    difference = truth.balls[distances.first] - truth.balls[distances.second]
+    difference *= np.arange(design.dimension) < distances.dimensions[:, None]
+    true_distance = np.sqrt((difference**2).sum(axis=1))
+    true_coordinate = truth.balls[coordinates.ball, coordinates.axis]
+    return replace(
+        design,
+        distances=replace(
+            distances, value=true_distance + distances.uncertainty * generator.standard_normal(len(distances))
+        ),
+        coordinates=replace(
+            coordinates,
+            value=true_coordinate + coordinates.uncertainty * generator.standard_normal(len(coordinates)),
+        ),
+        lengths=replace(lengths, value=lengths.value + lengths.uncertainty * generator.standard_normal(len(lengths))),
+    )

@@ -1,0 +1,258 @@
+"""Artefacts: what an experiment file says about one, and where its balls are in its own frame.
+
+A further kind of artefact is one settings class with a ``layout`` and one line in ``ARTEFACTS``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag, model_validator
+
+from ..quantities import Length, PositiveLength
+from ..settings import Settings, listing
+
+MOST_BALLS = 40_000
+COINCIDENT = 1e-9
+
+PairSet = Literal["corner sides", "corner diagonals", "corners", "neighbours", "all"]
+Pairs = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BallLayout:
+    """The balls of an artefact in its own frame.
+
+    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name of a set →
+    pairs of ball indices, without "all". ``corner_set``: indices of the corner balls, empty where undefined.
+    """
+
+    names: tuple[str, ...]
+    coordinates: NDArray[np.float64]
+    pair_sets: Mapping[str, Pairs] = field(default_factory=dict)
+    corner_set: tuple[int, ...] = ()
+
+
+def pairs(layout: BallLayout, set_name: str) -> NDArray[np.intp]:
+    """Return the ball indices of a named pair set, (m, 2).
+
+    :raises ValueError: the set is not defined for this artefact; the message names those that are.
+    """
+    if set_name == "all":
+        return np.column_stack(np.triu_indices(len(layout.names), k=1))
+    if set_name not in layout.pair_sets:
+        defined = listing([*layout.pair_sets, "all"])
+        raise ValueError(
+            f'"{set_name}" is not defined for this artefact; choose from: {defined}, or list pairs of balls'
+        )
+    return np.array(layout.pair_sets[set_name], dtype=np.intp).reshape(-1, 2)
+
+
+def corners(layout: BallLayout) -> NDArray[np.intp]:
+    """Return the indices of the corner balls, (k,).
+
+    :raises ValueError: the artefact has no corners.
+    """
+    if not layout.corner_set:
+        raise ValueError('"corners" is not defined for this artefact; write all, or list the balls')
+    return np.array(layout.corner_set, dtype=np.intp)
+
+
+def coincident_balls(layout: BallLayout) -> list[tuple[int, int]]:
+    """Return the pairs of balls nearer than a nanometre to each other."""
+    found: list[tuple[int, int]] = []
+    order = np.lexsort(layout.coordinates.T)
+    last = layout.coordinates[order, -1]
+    for shift in range(1, len(order)):
+        # Only balls as high as one another, and therefore near in this order, can coincide.
+        apart = last[shift:] - last[:-shift]
+        if not (apart < COINCIDENT).any():
+            break
+        differences = layout.coordinates[order[shift:]] - layout.coordinates[order[:-shift]]
+        near = np.flatnonzero(np.linalg.norm(differences, axis=1) < COINCIDENT)
+        found += [(int(min(pair)), int(max(pair))) for pair in zip(order[near], order[near + shift], strict=True)]
+    return sorted(found)
+
+
+def _text_of_whole_number(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+# Numbers are usual as names of balls, and YAML reads them as numbers.
+Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
+Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
+BallsPerSide = Annotated[int, Field(ge=2, le=500)]
+
+
+class ArtefactSettings(Settings):
+    """What artefacts of every kind have."""
+
+    kind: str
+    role: Literal["plate", "length_standard"] = Field(
+        "plate",
+        description="plate: its ball co-ordinates are estimated; length_standard: it only carries distances",
+    )
+
+    def layout(self) -> BallLayout:
+        """Return the balls of the artefact in its own frame."""
+        raise NotImplementedError
+
+
+class GridSettings(ArtefactSettings):
+    """Balls in rows and columns, r1c1 at the lower corner."""
+
+    kind: Literal["grid"] = Field(description="balls in rows and columns")
+    balls: tuple[BallsPerSide, BallsPerSide] = Field(description="number of columns, number of rows")
+    size: tuple[PositiveLength, PositiveLength] = Field(
+        description="distance between the outer balls along the artefact's x and y"
+    )
+
+    @model_validator(mode="after")
+    def _not_too_many_balls(self) -> Self:
+        if self.balls[0] * self.balls[1] > MOST_BALLS:
+            raise ValueError(f"{self.balls[0] * self.balls[1]} balls are too many; at most {MOST_BALLS} are possible")
+        return self
+
+    def layout(self) -> BallLayout:
+        """Return (columns × rows) balls, row by row."""
+        columns, rows = self.balls
+        places = [(row, column) for row in range(rows) for column in range(columns)]
+        return _rectangle(places, (columns, rows), self.size)
+
+
+class SquareSettings(ArtefactSettings):
+    """Balls along the outline of a square, named as those of a grid."""
+
+    kind: Literal["square"] = Field(description="balls along the outline of a square")
+    balls: BallsPerSide = Field(description="number of balls per side, corners included")
+    size: PositiveLength = Field(description="distance between two neighbouring corner balls")
+
+    def layout(self) -> BallLayout:
+        """Return 4 × (balls per side - 1) balls, row by row."""
+        last = self.balls - 1
+        places = [
+            (row, column)
+            for row in range(self.balls)
+            for column in (range(self.balls) if row in (0, last) else (0, last))
+        ]
+        return _rectangle(places, (self.balls, self.balls), (self.size, self.size))
+
+
+def _form_of_coordinates(value: object) -> str:
+    return "<mapping>" if isinstance(value, dict) else "<list>"
+
+
+class BallsSettings(ArtefactSettings):
+    """Balls at listed co-ordinates."""
+
+    kind: Literal["balls"] = Field(description="balls at listed co-ordinates")
+    coordinates: (
+        Annotated[
+            Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_BALLS), Tag("<list>")]
+            | Annotated[dict[Name, Coordinates], Field(min_length=1, max_length=MOST_BALLS), Tag("<mapping>")],
+            Discriminator(_form_of_coordinates),
+        ]
+        | None
+    ) = Field(
+        None,
+        description="2 or 3 co-ordinates per ball, the third 0 if omitted: a list (balls named 1, 2, …) "
+        "or name → co-ordinates",
+    )
+    file: str | None = Field(
+        None, description="CSV file instead of co-ordinates: columns ball, x_mm, y_mm and, if needed, z_mm"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.coordinates is None) == (self.file is None):
+            raise ValueError('needs either "coordinates" or "file"; give exactly one of them')
+        return self
+
+    def layout(self) -> BallLayout:
+        """Return the balls as listed.
+
+        :raises ValueError: the co-ordinates are still in a file.
+        """
+        if self.coordinates is None:
+            raise ValueError(f"the co-ordinates of the balls are still in {self.file}")
+        if isinstance(self.coordinates, dict):
+            names, listed = tuple(self.coordinates), tuple(self.coordinates.values())
+        else:
+            names, listed = tuple(str(i + 1) for i in range(len(self.coordinates))), self.coordinates
+        return BallLayout(names, _frozen([(*xyz, 0.0)[:3] for xyz in listed]))
+
+
+class TwoSpheresSettings(ArtefactSettings):
+    """Two balls along the artefact's x axis, named 1 and 2."""
+
+    kind: Literal["two_spheres"] = Field(description="two balls, as of a ball bar")
+    length: PositiveLength = Field(description="distance between the two balls")
+
+    def layout(self) -> BallLayout:
+        """Return two balls, whose only pair is corner sides, neighbours and all."""
+        only: Pairs = ((0, 1),)
+        return BallLayout(
+            ("1", "2"),
+            _frozen([(0.0, 0.0, 0.0), (self.length, 0.0, 0.0)]),
+            {"corner sides": only, "neighbours": only},
+            (0, 1),
+        )
+
+
+ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
+    "grid": GridSettings,
+    "square": SquareSettings,
+    "balls": BallsSettings,
+    "two_spheres": TwoSpheresSettings,
+}
+
+if TYPE_CHECKING:
+    AnyArtefactSettings = ArtefactSettings
+else:
+    AnyArtefactSettings = Annotated[Union[tuple(ARTEFACTS.values())], Field(discriminator="kind")]  # noqa: UP007
+
+
+def _rectangle(places: list[tuple[int, int]], shape: tuple[int, int], size: tuple[float, float]) -> BallLayout:
+    columns, rows = shape
+    index = {place: i for i, place in enumerate(places)}
+    coordinates = [
+        # Multiplied before divided, so that the last ball is exactly at the size.
+        (size[0] * column / (columns - 1), size[1] * row / (rows - 1), 0.0)
+        for row, column in places
+    ]
+    lower_left, lower_right = index[0, 0], index[0, columns - 1]
+    upper_left, upper_right = index[rows - 1, 0], index[rows - 1, columns - 1]
+    sides: Pairs = (
+        (lower_left, lower_right),
+        (upper_left, upper_right),
+        (lower_left, upper_left),
+        (lower_right, upper_right),
+    )
+    diagonals: Pairs = ((lower_left, upper_right), (lower_right, upper_left))
+    neighbours = tuple(
+        (i, index[neighbour])
+        for (row, column), i in index.items()
+        for neighbour in ((row, column + 1), (row + 1, column))
+        if neighbour in index
+    )
+    return BallLayout(
+        tuple(f"r{row + 1}c{column + 1}" for row, column in places),
+        _frozen(coordinates),
+        {
+            "corner sides": sides,
+            "corner diagonals": diagonals,
+            "corners": sides + diagonals,
+            "neighbours": neighbours,
+        },
+        (lower_left, lower_right, upper_left, upper_right),
+    )
+
+
+def _frozen(values: Any) -> NDArray[np.float64]:
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array

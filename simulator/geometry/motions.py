@@ -1,0 +1,86 @@
+"""Small rotations as vectors, and the rigid motion that fits two sets of points best."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def rotation_from_vector(vector: Array) -> Array:
+    """Rotation matrices (m, d, d) that turn by `vector`: (m, 3) about an axis in space, (m, 1) in the plane.
+
+    >>> rotation_from_vector(np.array([[np.pi / 2]])).round(12).tolist()
+    [[[0.0, -1.0], [1.0, 0.0]]]
+    """
+    if vector.shape[1] == 1:
+        c, s = np.cos(vector[:, 0]), np.sin(vector[:, 0])
+        return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
+    angle = np.sqrt((vector**2).sum(axis=1))
+    # sin(t)/t and (1 - cos t)/t^2, both smooth at 0, where np.sinc is exact.
+    first = np.sinc(angle / np.pi)[:, None, None]
+    second = (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None]
+    cross = np.zeros((len(vector), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2] = -vector[:, 2], vector[:, 1]
+    cross[:, 1, 0], cross[:, 1, 2] = vector[:, 2], -vector[:, 0]
+    cross[:, 2, 0], cross[:, 2, 1] = -vector[:, 1], vector[:, 0]
+    return np.eye(3) + first * cross + second * (cross @ cross)
+
+
+def vector_from_rotation(rotation: Array) -> Array:
+    """Inverse of `rotation_from_vector` for turns below pi: (m, 3) or (m, 1) from (m, d, d).
+
+    >>> vector_from_rotation(rotation_from_vector(np.array([[0.1, -0.2, 0.3]]))).round(12).tolist()
+    [[0.1, -0.2, 0.3]]
+    """
+    if rotation.shape[1] == 2:
+        return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])[:, None]
+    double_sine = np.stack(
+        [
+            rotation[:, 2, 1] - rotation[:, 1, 2],
+            rotation[:, 0, 2] - rotation[:, 2, 0],
+            rotation[:, 1, 0] - rotation[:, 0, 1],
+        ],
+        axis=1,
+    )
+    sine = 0.5 * np.sqrt((double_sine**2).sum(axis=1))
+    angle = np.arctan2(sine, 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0))
+    return np.asarray(0.5 * double_sine / np.sinc(angle / np.pi)[:, None])
+
+
+def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
+    """Rotation (d, d) and origin (d,) that bring points `source` (n, d) closest to `target` (n, d).
+
+    Points in a plane fix a proper rotation in space all the same. Points on a line leave the turn about it open;
+    some rotation is then returned.
+    """
+    centre_source, centre_target = source.mean(axis=0), target.mean(axis=0)
+    u, _, vh = np.linalg.svd((target - centre_target).T @ (source - centre_source))
+    sign = np.ones(source.shape[1])
+    sign[-1] = np.sign(np.linalg.det(u @ vh))
+    rotation = (u * sign) @ vh
+    return rotation, centre_target - rotation @ centre_source
+
+
+def without_rigid_motion(places: Array, errors: Array) -> Array:
+    """Errors (n, d, r) less the small rigid motion of all places (n, d) that each column contains.
+
+    No distance changes by it to first order, and what is left is small where the distances are known well, so
+    that the differences formed from it keep their digits.
+    """
+    n, d = places.shape
+    if n == 0 or errors.shape[2] == 0:
+        return errors
+    motions = np.zeros((n, d, d * (d + 1) // 2))
+    motions[:, range(d), range(d)] = 1.0
+    planes = [(0, 1), (1, 2), (2, 0)] if d == 3 else [(0, 1)]
+    for column, (i, j) in enumerate(planes, start=d):
+        motions[:, i, column], motions[:, j, column] = -places[:, j], places[:, i]
+    basis, sizes, _ = np.linalg.svd(motions.reshape(n * d, -1), full_matrices=False)
+    basis = basis[:, sizes > 1e-12 * sizes.max()]
+    flat = errors.reshape(n * d, -1)
+    # Twice, because the second pass takes out what rounding left of a large motion in the first.
+    for _ in range(2):
+        flat = flat - basis @ (basis.T @ flat)
+    return flat.reshape(errors.shape)

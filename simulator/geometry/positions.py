@@ -1,0 +1,103 @@
+"""Positions of an artefact in the machine: from what an experiment file says to a rotation and an origin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .artefacts import BallLayout
+from .rotations import rotation_matrix
+
+Axis = Literal["x", "y", "z"]
+
+# The artefact's two axes go to these, cyclic so that its third goes to the plane's normal.
+IN_PLANE_AXES: Mapping[str, tuple[Axis, Axis]] = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
+AXIS_INDEX: Mapping[str, int] = {"x": 0, "y": 1, "z": 2}
+QUARTER_TURNS = tuple(
+    np.array(turn, dtype=float)
+    for turn in (
+        ((1, 0), (0, 1)),
+        ((0, -1), (1, 0)),
+        ((-1, 0), (0, -1)),
+        ((0, 1), (-1, 0)),
+    )
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A rigid motion x = ``rotation`` y + ``origin`` from the artefact's frame into the machine's.
+
+    ``rotation``: (d, d), proper. ``origin``: (d,) in metres.
+    """
+
+    rotation: NDArray[np.float64]
+    origin: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlanePlacement:
+    """An artefact parallel to a machine plane.
+
+    ``plane``: axis the plane is normal to; in two dimensions z. ``level``: co-ordinate of the artefact's
+    plane along it, in metres. ``anchor``: which point of the turned bounding rectangle is ``at``, in metres
+    in the order of ``IN_PLANE_AXES[plane]``. ``quarter_turns``: counter-clockwise as seen against the plane's
+    normal.
+    """
+
+    plane: Axis
+    level: float
+    anchor: Literal["corner", "centre"]
+    at: tuple[float, float]
+    quarter_turns: int = 0
+
+
+@dataclass(frozen=True)
+class FreePlacement:
+    """An artefact anywhere: x = R y + ``origin`` (d metres), R from ``rotation`` (3 radians, or 1 in 2-D)."""
+
+    origin: tuple[float, ...]
+    rotation: tuple[float, ...]
+
+
+def nominal_pose(placement: PlanePlacement | FreePlacement, layout: BallLayout, dimension: int) -> Pose:
+    """Return the pose that a placement gives an artefact in a machine of 2 or 3 dimensions.
+
+    :raises ValueError: a placement in a plane other than z in two dimensions, or a free one of another
+        dimension.
+    """
+    if isinstance(placement, FreePlacement):
+        if len(placement.origin) != dimension:
+            raise ValueError(f"a pose with {len(placement.origin)} co-ordinates in {dimension} dimensions")
+        return Pose(rotation_matrix(placement.rotation), np.array(placement.origin))
+    if dimension == 2 and placement.plane != "z":
+        raise ValueError("a plane experiment has no plane but z")
+    turn = QUARTER_TURNS[placement.quarter_turns % 4]
+    rectangle = bounding_rectangle(layout) @ turn.T
+    lower, upper = rectangle.min(axis=0), rectangle.max(axis=0)
+    anchor = lower if placement.anchor == "corner" else (lower + upper) / 2
+    in_plane_origin = np.array(placement.at) - anchor
+    if dimension == 2:
+        return Pose(turn, in_plane_origin)
+    normal = AXIS_INDEX[placement.plane]
+    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[placement.plane])
+    rotation, origin = np.zeros((3, 3)), np.zeros(3)
+    rotation[np.ix_([first, second], [0, 1])] = turn
+    rotation[normal, 2] = 1.0
+    origin[[first, second, normal]] = *in_plane_origin, placement.level
+    return Pose(rotation, origin)
+
+
+def bounding_rectangle(layout: BallLayout) -> NDArray[np.float64]:
+    """Return the lower and the upper corner, (2, 2) metres, of the balls in the artefact's x and y."""
+    plane = layout.coordinates[:, :2]
+    return np.array([plane.min(axis=0), plane.max(axis=0)])
+
+
+def ball_coordinates(pose: Pose, layout: BallLayout) -> NDArray[np.float64]:
+    """Return the nominal co-ordinates (n, d) in metres of an artefact's balls in the machine."""
+    return layout.coordinates[:, : len(pose.origin)] @ pose.rotation.T + pose.origin

@@ -1,0 +1,254 @@
+"""From an experiment to its design: names become indices, and every artefact gets a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .design import Coordinates, Design, Distances, Lengths, Readings, pose_size
+from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment
+from .machines.protocol import Array
+from .machines.settings import build_error_model
+
+# Evaluation points of an experiment that names none.
+DEFAULT_POINTS = 200
+DEFAULT_SEED = 1
+
+# Directions below this fraction of the largest do not count when a frame is fixed or a line recognised.
+FLAT = 1e-9
+
+
+def lay_out(experiment: Experiment) -> Design:
+    """Design of an experiment.
+
+    >>> from pathlib import Path
+    >>> from .experiment.load import load
+    >>> design = lay_out(load(Path("designs/quickstart.yaml"))[0])
+    >>> design.dimension
+    3
+    """
+    machine, d = experiment.machine, experiment.dimension
+    lower, upper = machine.volume.lower, machine.volume.upper
+    model = build_error_model(experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper)))
+    artefacts = list(experiment.artefacts)
+    layouts = [experiment.layouts[name] for name in artefacts]
+    sizes = [len(layout.names) for layout in layouts]
+    first_ball = dict(zip(artefacts, np.cumsum([0, *sizes[:-1]]), strict=True))
+    balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
+    is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
+    probe_index = {name: k for k, name in enumerate(experiment.probes)}
+    places = experiment.positions
+    readings = _readings(experiment, first_ball, probe_index)
+    position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
+    rotations = np.array([place.pose.rotation for place in places])
+    origins = np.array([place.pose.origin for place in places])
+    distances, lengths = _distances(experiment, readings, first_ball, rotations, position_artefact, balls)
+    coordinates = _coordinates(experiment, first_ball)
+    ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
+    points = experiment.evaluation.points
+    if not len(points):
+        points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
+    return Design(
+        model=model,
+        lower=lower,
+        upper=upper,
+        repeatability=machine.repeatability,
+        probe_names=tuple(experiment.probes),
+        probes=np.array([experiment.probes[name] for name in experiment.probes]),
+        artefact_names=tuple(artefacts),
+        is_plate=is_plate,
+        ball_names=tuple(name for layout in layouts for name in layout.names),
+        ball_artefact=ball_artefact,
+        balls=balls,
+        position_names=tuple(place.name for place in places),
+        position_artefact=position_artefact,
+        rotations=rotations,
+        origins=origins,
+        held=_held(readings, balls, ball_artefact, position_artefact, rotations, coordinates, d),
+        readings=readings,
+        distances=distances,
+        coordinates=coordinates,
+        lengths=lengths,
+        points=points,
+        point_probe=probe_index[experiment.evaluation.probe],
+    )
+
+
+def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
+    """Points (count, d) drawn evenly from the volume."""
+    generator = np.random.default_rng(np.random.SeedSequence(seed))
+    return np.asarray(lower + (upper - lower) * generator.random((count, len(lower))))
+
+
+def _readings(experiment: Experiment, first_ball: dict[str, int], probe_index: dict[str, int]) -> Readings:
+    """All readings in the order of the file, the same one named twice merged into one with more repeats."""
+    rows = []
+    for k, place in enumerate(experiment.positions):
+        for group in place.readings:
+            balls = first_ball[place.artefact] + group.ball_indices
+            for name in group.probes:
+                columns = np.full((len(balls), 4), (0, k, probe_index[name], group.repeats), np.int64)
+                columns[:, 0] = balls
+                rows.append(columns)
+    table = np.concatenate(rows)
+    unique, first, inverse = np.unique(table[:, :3], axis=0, return_index=True, return_inverse=True)
+    repeats = np.bincount(inverse.ravel(), weights=table[:, 3], minlength=len(unique)).astype(np.int64)
+    order = np.argsort(first, kind="stable")
+    ball, position, probe = unique[order].T
+    return Readings(ball, position, probe, repeats[order])
+
+
+def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordinates:
+    ball, axis, value, uncertainty = [], [], [], []
+    for item in experiment.calibration:
+        if isinstance(item, CoordinateCalibration):
+            count = len(item.axes)
+            ball.append(np.repeat(first_ball[item.artefact] + item.balls, count))
+            axis.append(np.tile(np.array(item.axes, np.int64), len(item.balls)))
+            value.append(item.values.ravel())
+            uncertainty.append(np.tile(item.standard_uncertainties, len(item.balls)))
+    return Coordinates(_integers(ball), _integers(axis), _floats(value), _floats(uncertainty))
+
+
+def _distances(
+    experiment: Experiment,
+    readings: Readings,
+    first_ball: dict[str, int],
+    rotations: Array,
+    position_artefact: NDArray[np.int64],
+    balls: Array,
+) -> tuple[Distances, Lengths]:
+    """Distances between balls of plates, and the lengths that length standards contribute.
+
+    A length standard contributes each of its calibrated distances once for every position and probe with
+    which both its balls are read.
+    """
+    plates: list[tuple[DistanceCalibration, NDArray[np.int64]]] = []
+    first, second, value, uncertainty, projected, direction, scatter = [], [], [], [], [], [], []
+    artefacts = list(experiment.artefacts)
+    key = {
+        (int(b), int(k), int(p)): i
+        for i, (b, k, p) in enumerate(zip(readings.ball, readings.position, readings.probe, strict=True))
+    }
+    for item in experiment.calibration:
+        if not isinstance(item, DistanceCalibration):
+            continue
+        pairs = np.asarray(item.pairs + first_ball[item.artefact], np.int64)
+        if experiment.artefacts[item.artefact].role == "plate":
+            plates.append((item, pairs))
+            continue
+        for k in np.flatnonzero(position_artefact == artefacts.index(item.artefact)):
+            for probe in range(len(experiment.probes)):
+                for pair, length, u in zip(pairs, item.values, item.standard_uncertainties, strict=True):
+                    ends = [key.get((int(ball), int(k), probe)) for ball in pair]
+                    if ends[0] is None or ends[1] is None:
+                        continue
+                    first.append(ends[0])
+                    second.append(ends[1])
+                    along = rotations[k] @ (balls[pair[0]] - balls[pair[1]])
+                    direction.append(along / np.sqrt(along @ along))
+                    value.append(length)
+                    uncertainty.append(u)
+                    projected.append(item.form == "projection")
+                    scatter.append(item.repeatability == "included")
+    lengths = Lengths(
+        np.array(first, np.int64),
+        np.array(second, np.int64),
+        np.array(value, float),
+        np.array(uncertainty, float),
+        np.array(projected, bool),
+        np.array(direction, float).reshape(-1, experiment.dimension),
+        np.array(scatter, bool),
+    )
+    distances = Distances(
+        _integers([pairs[:, 0] for _, pairs in plates]),
+        _integers([pairs[:, 1] for _, pairs in plates]),
+        _integers([np.full(len(pairs), item.dimensions) for item, pairs in plates]),
+        _floats([item.values for item, _ in plates]),
+        _floats([item.standard_uncertainties for item, _ in plates]),
+    )
+    return distances, lengths
+
+
+def _held(
+    readings: Readings,
+    balls: Array,
+    ball_artefact: NDArray[np.int64],
+    position_artefact: NDArray[np.int64],
+    rotations: Array,
+    coordinates: Coordinates,
+    d: int,
+) -> NDArray[np.bool_]:
+    """Which pose parameters are held (k, pose size).
+
+    An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it. As many
+    parameters of the artefact's first pose are held as are left free: all of them when only distances are
+    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose.
+    """
+    held = np.zeros((len(position_artefact), pose_size(d)), bool)
+    for artefact in np.unique(position_artefact):
+        positions = np.flatnonzero(position_artefact == artefact)
+        own = np.flatnonzero(ball_artefact == artefact)
+        centred = balls[own] - balls[own].mean(axis=0)
+        _, extent, directions = np.linalg.svd(centred)
+        on_a_line = d == 3 and (len(own) == 2 or extent[1] <= FLAT * extent[0])
+        if on_a_line:
+            for k in positions:
+                held[k, d + int(np.abs(rotations[k] @ directions[0]).argmax())] = True
+        chosen = np.isin(coordinates.ball, own)
+        fixed = _motion_of_coordinates(
+            balls[coordinates.ball[chosen]] - balls[own].mean(axis=0), coordinates.axis[chosen], d
+        )
+        free = _null_space(fixed)
+        # A motion of the frame changes the pose that undoes it: in machine axes a shift and a turn.
+        turned = np.zeros((pose_size(d), free.shape[1]))
+        turned[:d] = rotations[positions[0]] @ free[:d]
+        turned[d:] = rotations[positions[0]] @ free[d:] if d == 3 else free[d:]
+        already = held[positions[0]]
+        held[positions[0]] |= _pivots(turned, already, free.shape[1])
+    return held
+
+
+def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Array:
+    """How a small motion of the artefact's frame changes co-ordinates (m, pose size)."""
+    m = len(axis)
+    rows = np.zeros((m, pose_size(d)))
+    rows[np.arange(m), axis] = 1.0
+    for turn in range(pose_size(d) - d):
+        omega = np.eye(3)[turn if d == 3 else 2]
+        padded = np.zeros((m, 3))
+        padded[:, :d] = places
+        rows[:, d + turn] = np.cross(omega, padded)[np.arange(m), axis]
+    return rows
+
+
+def _null_space(rows: Array) -> Array:
+    """Orthonormal columns that span what the rows leave free."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    _, values, directions = np.linalg.svd(rows)
+    rank = int((values > FLAT * values[0]).sum())
+    return np.asarray(directions[rank:].T)
+
+
+def _pivots(motions: Array, already: NDArray[np.bool_], needed: int) -> NDArray[np.bool_]:
+    """Parameters (rows of `motions`) to hold so that no motion remains, largest pivot first."""
+    chosen = np.zeros(len(motions), bool)
+    left = motions.copy()
+    for _ in range(needed):
+        size = np.where(chosen | already, -1.0, (left**2).sum(axis=1))
+        row = int(size.argmax())
+        if size[row] <= FLAT:
+            break
+        chosen[row] = True
+        direction = left[row] / np.sqrt(left[row] @ left[row])
+        left = left - np.outer(left @ direction, direction)
+    return chosen
+
+
+def _integers(parts: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.concatenate(parts).astype(np.int64) if parts else np.zeros(0, np.int64)
+
+
+def _floats(parts: list[Array]) -> Array:
+    return np.concatenate(parts).astype(float) if parts else np.zeros(0)

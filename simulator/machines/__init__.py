@@ -1,0 +1,1 @@
+"""Error models of machines, behind one protocol."""

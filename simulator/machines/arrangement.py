@@ -1,0 +1,38 @@
+"""Which axis carries what: the arrangement of a machine's axes as a kinematic chain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Axes on the probe's side and on the workpiece's side, each listed from the ground outwards.
+
+    An axis on the probe's side carries all axes listed after it and the probe; one on the workpiece's side
+    carries those listed after it and the workpiece. Every axis stands on exactly one side.
+    """
+
+    probe_side: tuple[str, ...]
+    workpiece_side: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if sorted(self.probe_side + self.workpiece_side) != list(AXES):
+            raise ValueError("an arrangement names each of the axes x, y, z exactly once")
+
+
+ARRANGEMENTS: dict[str, Arrangement] = {
+    "MB1": Arrangement(("y", "x", "z")),
+    "MB2": Arrangement(("x", "y", "z")),
+    "FB1": Arrangement(("x", "z"), ("y",)),
+    "FB2": Arrangement(("y", "z"), ("x",)),
+    "FH1": Arrangement(("y", "z"), ("x",)),
+    "FH2": Arrangement(("x", "z"), ("y",)),
+    "MH1": Arrangement(("y", "z", "x")),
+    "MH2": Arrangement(("x", "z", "y")),
+    "CX1": Arrangement(("z",), ("x", "y")),
+    "CY1": Arrangement(("z",), ("y", "x")),
+}
+"""The ten machines of Park, Burdekin and Peggs; MB2 is the kinematic model of NPL Report CISE 15/98."""

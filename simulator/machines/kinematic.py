@@ -1,0 +1,304 @@
+"""The kinematic error model: 18 functions of one variable on a chain of axes.
+
+Sources: NPL Report CISE 15/98, section 2.2; Park, Burdekin and Peggs, Appendix A. Rotations are right-handed
+about the machine's axes (ISO 230-1: EAX, EBX, ECX about X, Y, Z as the X axis moves), of opposite sign to
+those of the NPL report.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .arrangement import AXES, Arrangement
+from .polynomial import Polynomial
+from .protocol import Array, Parameter, Reported, Unit
+
+# Translations along x, y, z and rotations about them, by the letters of ISO 230-1.
+TRANSLATIONS = ("X", "Y", "Z")
+ROTATIONS = ("A", "B", "C")
+
+# Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x axis
+# gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section 2.4.1).
+HELD_AT_FAR_END = ("EYX", "EZX", "EZY")
+
+
+def describe(function: str) -> str:
+    """Words for an ISO 230-1 name.
+
+    >>> describe("EXX"), describe("EYX"), describe("ECZ")
+    ('positioning error of X', 'straightness of X in Y', 'yaw of Z about Z')
+    """
+    kind, axis = function[1], function[2]
+    if kind in TRANSLATIONS:
+        return f"positioning error of {axis}" if kind == axis else f"straightness of {axis} in {kind}"
+    about = TRANSLATIONS[ROTATIONS.index(kind)]
+    if about == axis:
+        word = "roll" if axis != "Z" else "yaw"
+    elif axis == "Z":
+        word = "tilt"
+    else:
+        word = "yaw" if about == "Z" else "pitch"
+    return f"{word} of {axis} about {about}"
+
+
+@dataclass(frozen=True)
+class ErrorFunction:
+    """One of the 18 functions: `axis` moves, `component` (0 to 2) is displaced or turned about."""
+
+    name: str
+    axis: int
+    component: int
+    rotation: bool
+    basis: Polynomial
+
+
+@dataclass(frozen=True)
+class KinematicModel:
+    """e(x, a, p) of a chain of axes; `full_rotations` multiplies rotation matrices out.
+
+    `lower` and `upper` (3,) bound the volume in metres: the error functions depend on the position along
+    their axis scaled to [0, 1], and the chain starts from the lower corner.
+    """
+
+    arrangement: Arrangement
+    functions: tuple[ErrorFunction, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    full_rotations: bool = False
+
+    @property
+    def dimension(self) -> int:
+        return 3
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        span = np.subtract(self.upper, self.lower)
+        found = []
+        for function in self.functions:
+            grid = np.linspace(0.0, 1.0, 65)
+            peaks = np.abs(function.basis.values(grid)).max(axis=0, initial=0.0)
+            arm = float(span.max()) if function.rotation else 1.0
+            unit: Unit = "rad" if function.rotation else "m"
+            for k, peak in enumerate(peaks):
+                found.append(
+                    Parameter(f"{function.name}[{k + 1}]", unit, function.name, describe(function.name), arm * peak)
+                )
+        return tuple(found)
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each function's coefficients stand in a."""
+        found, start = {}, 0
+        for function in self.functions:
+            found[function.name] = slice(start, start + function.basis.size)
+            start += function.basis.size
+        return found
+
+    def scaled(self, x: Array) -> Array:
+        """Positions x (m, 3) scaled to [0, 1] over the volume."""
+        lower = np.asarray(self.lower)
+        return np.asarray((x - lower) / (np.asarray(self.upper) - lower))
+
+    def _bases(self, x: Array) -> dict[tuple[int, Polynomial], Array]:
+        t = self.scaled(x)
+        return {(f.axis, f.basis): f.basis.values(t[:, f.axis]) for f in self.functions}
+
+    def _motions(self, bases: dict[tuple[int, Polynomial], Array], a: Array, m: int) -> tuple[Array, Array]:
+        """Displacement and rotation of every axis, each (m, 3 axes, 3 components)."""
+        translation, rotation = np.zeros((m, 3, 3), a.dtype), np.zeros((m, 3, 3), a.dtype)
+        for f in self.functions:
+            target = rotation if f.rotation else translation
+            target[:, f.axis, f.component] = bases[f.axis, f.basis] @ a[self.slices[f.name]]
+        return translation, rotation
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        translation, rotation = self._motions(self._bases(x), a, len(x))
+        from_corner = x - np.asarray(self.lower)
+        if self.full_rotations:
+            return _Chain(self.arrangement, from_corner, translation, rotation, p).error()
+        carried = carried_vectors(self.arrangement, from_corner, p)
+        moved = translation.sum(axis=1) + p
+        for axis, (sign, vector) in enumerate(carried):
+            moved = moved + sign * np.cross(rotation[:, axis], vector)
+        return np.asarray(moved)
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        bases = self._bases(x)
+        from_corner = x - np.asarray(self.lower)
+        if self.full_rotations:
+            translation, rotation = self._motions(bases, a, len(x))
+            by_translation, by_rotation = _Chain(
+                self.arrangement, from_corner, translation, rotation, p
+            ).sensitivities()
+        else:
+            by_translation, by_rotation = None, _cross_matrices(carried_vectors(self.arrangement, from_corner, p))
+        result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
+        for f in self.functions:
+            values, columns = bases[f.axis, f.basis], self.slices[f.name]
+            if f.rotation or by_translation is not None:
+                source = by_rotation if f.rotation else by_translation
+                assert source is not None
+                for row in range(3):
+                    direction = source[f.axis][:, row, f.component]
+                    if direction.any():
+                        np.multiply(values, direction[:, None], out=result[:, row, columns])
+            else:
+                result[:, f.component, columns] = values
+        return result
+
+    def reported(self) -> Reported:
+        """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3."""
+        names: list[str] = []
+        units: list[Unit] = []
+        matrix = np.zeros((sum(f.basis.monomials.shape[0] for f in self.functions), len(self.parameters)))
+        for f in self.functions:
+            block = f.basis.monomials
+            matrix[len(names) : len(names) + block.shape[0], self.slices[f.name]] = block
+            names += [f"{f.name} t^{k + 1}" for k in range(block.shape[0])]
+            units += ["rad" if f.rotation else "m"] * block.shape[0]
+        return Reported(tuple(names), tuple(units), matrix)
+
+
+def kinematic_model(
+    arrangement: Arrangement,
+    position_coefficients: int,
+    rotation_coefficients: int,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+    full_rotations: bool = False,
+) -> KinematicModel:
+    """The model with polynomials of the stated numbers of coefficients, constants included.
+
+    These are NDEL and NEPS of NPL Report CISE 15/98; all 18 functions vanish at the lower corner, and
+    the three straightness functions EYX, EZX and EZY at the far end too.
+
+    >>> from .arrangement import ARRANGEMENTS
+    >>> len(kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1)).parameters)
+    69
+    """
+    functions = []
+    for letters, count, rotation in (
+        (TRANSLATIONS, position_coefficients, False),
+        (ROTATIONS, rotation_coefficients, True),
+    ):
+        for axis, axis_name in enumerate(AXES):
+            for component, letter in enumerate(letters):
+                name = f"E{letter}{axis_name.upper()}"
+                basis = Polynomial(count, zero_at_one=name in HELD_AT_FAR_END)
+                functions.append(ErrorFunction(name, axis, component, rotation, basis))
+    return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
+
+
+def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[float, Array]]:
+    """For each axis the sign of its rotation's effect and the vector (m, 3) it carries.
+
+    On the probe's side: what follows in the chain, and the probe offset. On the workpiece's side: the whole
+    of x + p less the displacements of the axes between this one and the workpiece.
+    """
+    found: dict[str, tuple[float, Array]] = {}
+    for side, sign in ((arrangement.probe_side, 1.0), (arrangement.workpiece_side, -1.0)):
+        for place, axis in enumerate(side):
+            beyond = np.array([name in side[place + 1 :] for name in AXES])
+            vector = x * beyond + p if sign > 0 else x * ~beyond + p
+            found[axis] = (sign, vector)
+    return [found[axis] for axis in AXES]
+
+
+def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
+    """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector, signed."""
+    found = []
+    for sign, v in carried:
+        matrix = np.zeros((len(v), 3, 3), v.dtype)
+        matrix[:, 0, 1], matrix[:, 0, 2] = sign * v[:, 2], -sign * v[:, 1]
+        matrix[:, 1, 0], matrix[:, 1, 2] = -sign * v[:, 2], sign * v[:, 0]
+        matrix[:, 2, 0], matrix[:, 2, 1] = sign * v[:, 1], -sign * v[:, 0]
+        found.append(matrix)
+    return found
+
+
+def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    matrix = np.zeros((len(angle), 3, 3), angle.dtype)
+    i, j = (about + 1) % 3, (about + 2) % 3
+    if derivative:
+        c, s = -s, c
+    else:
+        matrix[:, about, about] = 1.0
+    matrix[:, i, i], matrix[:, i, j], matrix[:, j, i], matrix[:, j, j] = c, -s, s, c
+    return matrix
+
+
+def _rotation(angles: Array) -> tuple[Array, list[Array]]:
+    """Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
+    plain = [_plane_rotation(angles[:, k], k) for k in range(3)]
+    derivatives = []
+    for k in range(3):
+        factors = list(plain)
+        factors[k] = _plane_rotation(angles[:, k], k, derivative=True)
+        derivatives.append(factors[2] @ factors[1] @ factors[0])
+    return plain[2] @ plain[1] @ plain[0], derivatives
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """Rigid-body product of all axes: where the probe's tip lies in the frame of the workpiece table."""
+
+    arrangement: Arrangement
+    x: Array
+    translation: Array
+    rotation: Array
+    p: Array
+
+    def _walk(self) -> tuple[Array, list[Array], list[Array]]:
+        m = len(self.x)
+        dtype = np.result_type(self.x, self.translation, self.p)
+        by_translation: list[Array] = [np.zeros((0,))] * 3
+        by_rotation: list[Array] = [np.zeros((0,))] * 3
+
+        def step(axis: int) -> Array:
+            displaced = self.translation[:, axis].astype(dtype, copy=True)
+            displaced[:, axis] += self.x[:, axis]
+            return displaced
+
+        def turned(matrix: Array, vector: Array) -> Array:
+            return np.asarray(np.einsum("mij,mj->mi", matrix, vector))
+
+        tip = self.p.astype(dtype, copy=True)
+        on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]
+        for axis in reversed(on_probe_side):
+            matrix, derivatives = _rotation(self.rotation[:, axis])
+            by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
+            tip = step(axis) + turned(matrix, tip)
+        prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
+        for axis in on_probe_side:
+            by_translation[axis] = prefix
+            by_rotation[axis] = prefix @ by_rotation[axis]
+            prefix = prefix @ _rotation(self.rotation[:, axis])[0]
+
+        # The table moves the other way: going outwards, undo each axis's displacement, then its rotation.
+        passed = list(on_probe_side)
+        for name in self.arrangement.workpiece_side:
+            axis = AXES.index(name)
+            matrix, derivatives = _rotation(self.rotation[:, axis])
+            back = matrix.transpose(0, 2, 1)
+            outside = tip + step(axis)
+            by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
+            by_rotation[axis] = np.zeros((m, 3, 3), dtype)
+            for earlier in [*passed, axis]:
+                by_translation[earlier] = back @ by_translation[earlier]
+                by_rotation[earlier] = back @ by_rotation[earlier]
+            by_rotation[axis] = np.stack([turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2)
+            tip = turned(back, outside)
+            passed.append(axis)
+        return tip, by_translation, by_rotation
+
+    def error(self) -> Array:
+        return self._walk()[0] - self.x
+
+    def sensitivities(self) -> tuple[list[Array], list[Array]]:
+        """Derivatives of the tip by each axis's translation and rotation, lists by axis of (m, 3, 3)."""
+        _, by_translation, by_rotation = self._walk()
+        return by_translation, by_rotation

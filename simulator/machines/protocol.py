@@ -1,0 +1,69 @@
+"""What every error model offers, whatever its parametrisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Unit = Literal["m", "rad", "1"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named parameter of an error model.
+
+    `unit` is the unit of its value: metres, radians, or 1 for a ratio. `function` is the error it
+    belongs to, by its ISO 230-1 name where it has one, and `meaning` says in words what that error is.
+    `effect` is the displacement of a corrected point, in metres per `unit`, that the parameter causes where
+    in the volume it causes most: it makes parameters of different kinds comparable.
+    """
+
+    name: str
+    unit: Unit
+    function: str
+    meaning: str
+    effect: float = 1.0
+
+
+@dataclass(frozen=True)
+class Reported:
+    """The same model in another basis: `values = matrix @ a`, with `names` and `units` per row."""
+
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    matrix: Array
+
+
+@runtime_checkable
+class ErrorModel(Protocol):
+    """An error correction e(x, a, p) with e(x, 0, p) = p.
+
+    A corrected point is x + e(x, a, p) for scale readings x, parameters a and probe offset p; the
+    model holds no state, so that one instance serves any number of estimates at once.
+    """
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3, the number of machine axes."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The free parameters in the order of a, frame constraints already taken out."""
+        ...
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        """Correction in metres, (m, d), at scale readings x (m, d) with offsets p (m, d)."""
+        ...
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        """Derivative of the correction by a, (m, d, n)."""
+        ...
+
+    def reported(self) -> Reported:
+        """The parameters as the field quotes them: monomial coefficients, angles, ratios."""
+        ...

@@ -1,0 +1,95 @@
+"""The parameters of the machine that synthetic readings come from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
+from ..settings import Settings, hint
+from .protocol import Array, ErrorModel
+from .settings import CoefficientSettings, RandomSettings, ZeroSettings
+
+_PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
+
+
+class TruthError(ValueError):
+    """A stated true machine is not one of the error model; `problems` are (parameter name, text) pairs."""
+
+    def __init__(self, problems: list[tuple[str, str]]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("; ".join(f"{name}: {text}" for name, text in problems))
+
+
+def true_parameters(settings: Settings, model: ErrorModel) -> Array:
+    """Parameters a (n,) of the true machine.
+
+    :raises TruthError: an unknown parameter, a wrong unit, or values that break a frame constraint.
+    """
+    if isinstance(settings, ZeroSettings):
+        return np.zeros(len(model.parameters))
+    if isinstance(settings, CoefficientSettings):
+        return _stated(settings.values, model)
+    if isinstance(settings, RandomSettings):
+        return _random(settings, model)
+    raise TypeError(f"no true machine is made from {type(settings).__name__}")
+
+
+def _stated(values: dict[str, str], model: ErrorModel) -> Array:
+    own = {p.name: (p.unit, np.eye(len(model.parameters))[i]) for i, p in enumerate(model.parameters)}
+    reported = model.reported()
+    quoted = {
+        name: (unit, row) for name, unit, row in zip(reported.names, reported.units, reported.matrix, strict=True)
+    }
+    problems: list[tuple[str, str]] = []
+    targets: dict[str, float] = {}
+    for name, text in values.items():
+        entry = own.get(name) or quoted.get(name)
+        if entry is None:
+            problems.append((name, f'the error model has no parameter "{name}"; {hint(name, [*own, *quoted])}'))
+            continue
+        try:
+            targets[name] = _PARSERS[entry[0]](text)
+        except QuantityError as error:
+            problems.append((name, str(error)))
+    if problems:
+        raise TruthError(problems)
+    given_own = {name: value for name, value in targets.items() if name in own}
+    given_quoted = {name: value for name, value in targets.items() if name not in own}
+    a = np.zeros(len(model.parameters))
+    for name, value in given_own.items():
+        a += value * own[name][1]
+    if given_quoted:
+        wanted = np.array([given_quoted.get(name, 0.0) for name in reported.names])
+        solution = np.linalg.lstsq(reported.matrix, wanted, rcond=None)[0]
+        left = reported.matrix @ solution - wanted
+        for name, value in given_quoted.items():
+            off = left[reported.names.index(name)]
+            if abs(off) > 1e-9 * max(abs(value), np.abs(wanted).max()):
+                function = name.split()[0]
+                problems.append(
+                    (name, f"{function} must be zero at both ends of its axis; let its coefficients add up to zero")
+                )
+        if problems:
+            raise TruthError(problems)
+        a += solution
+    return a
+
+
+def _random(settings: RandomSettings, model: ErrorModel) -> Array:
+    """Each error function gets a random shape, scaled to the stated root mean square over its axis."""
+    sizes = {"m": settings.position or 0.0, "rad": settings.rotation or 0.0, "1": settings.rotation or 0.0}
+    generator = np.random.default_rng(np.random.SeedSequence(settings.seed))
+    drawn = generator.standard_normal(len(model.parameters))
+    shapes = getattr(model, "functions", None)
+    if shapes is None:
+        return np.asarray(drawn * [sizes[p.unit] for p in model.parameters])
+    # Gauss's rule integrates squared polynomials exactly.
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    t = 0.5 * (nodes + 1.0)
+    for function in shapes:
+        columns = model.slices[function.name]  # type: ignore[attr-defined]
+        values = function.basis.values(t) @ drawn[columns]
+        size = sizes["rad" if function.rotation else "m"]
+        rms = float(np.sqrt(0.5 * weights @ values**2))
+        drawn[columns] *= size / rms if rms else 0.0
+    return drawn

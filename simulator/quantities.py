@@ -1,0 +1,253 @@
+"""Quantities of an experiment file: a number with its unit, read exactly and kept in metres and radians.
+
+A factor is held as a fraction and multiplied before rounding, so "0.2 um" is the float nearest to 2e-7.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, WithJsonSchema
+from pydantic_core import CoreSchema, core_schema
+
+from .settings import describe, hint, shorten
+
+PI = Fraction("3.14159265358979323846264338327950288419716939937510582")
+
+LENGTH_UNITS: Mapping[str, Fraction] = {
+    "m": Fraction(1),
+    "dm": Fraction(1, 10),
+    "cm": Fraction(1, 100),
+    "mm": Fraction(1, 10**3),
+    "um": Fraction(1, 10**6),
+    "nm": Fraction(1, 10**9),
+    "pm": Fraction(1, 10**12),
+    "in": Fraction(254, 10**4),
+}
+ANGLE_UNITS: Mapping[str, Fraction] = {
+    "rad": Fraction(1),
+    "mrad": Fraction(1, 10**3),
+    "urad": Fraction(1, 10**6),
+    "nrad": Fraction(1, 10**9),
+    "deg": PI / 180,
+    "arcmin": PI / (180 * 60),
+    "arcsec": PI / (180 * 3600),
+}
+RATIO_UNITS: Mapping[str, Fraction] = {
+    "ppm": Fraction(1, 10**6),
+    "ppb": Fraction(1, 10**9),
+    "%": Fraction(1, 100),
+    "m/m": Fraction(1),
+    "mm/m": Fraction(1, 10**3),
+    "um/m": Fraction(1, 10**6),
+    "nm/m": Fraction(1, 10**9),
+}
+# Kind of quantity → its units and an example for the messages.
+UNITS: Mapping[str, Mapping[str, Fraction]] = {
+    "length": LENGTH_UNITS,
+    "angle": ANGLE_UNITS,
+    "ratio": RATIO_UNITS,
+}
+EXAMPLES: Mapping[str, str] = {"length": "750 mm", "angle": "2 arcsec", "ratio": "5 ppm"}
+LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
+
+NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
+QUANTITY = re.compile(rf"({NUMBER})\s*([^\s0-9.+-].*)?")
+CONSTANT_AND_SLOPE = re.compile(rf"([^+]*(?:[eE]\+[^+]*)?)\+\s*L\s*/\s*({NUMBER})\s*")
+
+
+class QuantityError(ValueError):
+    """A text is not the quantity it should be; the message says what would be right."""
+
+
+def exact_number(text: str) -> Fraction:
+    """Read a decimal number exactly.
+
+    :raises QuantityError: not a finite decimal number, or one beyond 1e-300 … 1e300.
+
+    >>> exact_number("1e-6")
+    Fraction(1, 1000000)
+    """
+    if len(text) > 200 or re.fullmatch(NUMBER, text) is None:
+        raise QuantityError(f'"{shorten(text)}" is not a number; write for example "500.0003"')
+    decimal = Decimal(text)
+    if decimal and not -300 <= decimal.adjusted() <= 300:
+        raise QuantityError(f'"{text}" is beyond what can be computed with; write a number of usual size')
+    return Fraction(decimal)
+
+
+def parse_length(value: object) -> float:
+    """Read a length and return it in metres.
+
+    :raises QuantityError: not a number with a unit of length.
+
+    >>> parse_length("750 mm"), parse_length("0.2 µm")
+    (0.75, 2e-07)
+    """
+    return _parse(value, "length")
+
+
+def parse_positive_length(value: object) -> float:
+    """Read a length above zero and return it in metres.
+
+    :raises QuantityError: not a number with a unit of length, or not above zero.
+
+    >>> parse_positive_length("0 mm")
+    Traceback (most recent call last):
+    ...
+    simulator.quantities.QuantityError: "0 mm" must be above zero; give a small one, such as 1 nm
+    """
+    return _positive(value, parse_length(value))
+
+
+def parse_angle(value: object) -> float:
+    """Read an angle and return it in radians.
+
+    :raises QuantityError: not a number with a unit of angle.
+
+    >>> parse_angle("90 deg") == np.pi / 2
+    True
+    """
+    return _parse(value, "angle")
+
+
+def parse_ratio(value: object) -> float:
+    """Read a dimensionless ratio.
+
+    :raises QuantityError: not a number with ppm, %, m/m or the like.
+
+    >>> parse_ratio("5 ppm")
+    5e-06
+    """
+    return _parse(value, "ratio")
+
+
+def format_length(length: float) -> str:
+    """Write a length in metres with a unit that reads well.
+
+    >>> format_length(0.75), format_length(2e-7), format_length(-0.0)
+    ('750 mm', '0.2 um', '0 mm')
+    """
+    unit = "mm" if length == 0 or abs(length) >= 1e-4 else "um" if abs(length) >= 1e-8 else "nm"
+    return f"{length / float(LENGTH_UNITS[unit]) + 0.0:.9g} {unit}"
+
+
+@dataclass(frozen=True)
+class LengthFunction:
+    """An uncertainty that grows with length: ``constant`` (m) + ``slope`` (m/m) × length."""
+
+    constant: float
+    slope: float = 0.0
+
+    def at(self, length: ArrayLike) -> NDArray[np.float64]:
+        """Return the values (m, any shape) at lengths (m, the same shape).
+
+        >>> LengthFunction(0.25, 0.5).at([0.0, 1.0])
+        array([0.25, 0.75])
+        """
+        return np.asarray(self.constant + self.slope * np.asarray(length, dtype=float))
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(parse_length_function)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        pattern = f"{_pattern('length')[:-1]}( *\\+ *L */ *{NUMBER})?$"
+        return {"type": "string", "pattern": pattern, "examples": ["0.2 um", LENGTH_FUNCTION_EXAMPLE]}
+
+
+def parse_length_function(value: object) -> LengthFunction:
+    """Read a length that may depend on the measured length: ``A`` or ``A + L/K``, with L in metres.
+
+    :raises QuantityError: written otherwise, negative, or zero at every length.
+
+    >>> parse_length_function("0.5 um + L/1000000")
+    LengthFunction(constant=5e-07, slope=1e-06)
+    """
+    if not isinstance(value, str) or "L" not in value:
+        constant = parse_length(value)
+        if constant <= 0:
+            _positive(value, constant)
+        return LengthFunction(constant)
+    match = CONSTANT_AND_SLOPE.fullmatch(value)
+    if match is None:
+        raise QuantityError(
+            f'"{shorten(value)}" is not a length that grows with L; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
+        )
+    constant = parse_length(match[1].strip())
+    divisor = exact_number(match[2])
+    if constant < 0 or divisor <= 0:
+        raise QuantityError(
+            f'"{shorten(value)}" has a negative part or divides by zero; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
+        )
+    return LengthFunction(constant, float(1 / divisor))
+
+
+def _parse(value: object, kind: str) -> float:
+    units, example = UNITS[kind], EXAMPLES[kind]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        if value != value or value in (float("inf"), float("-inf")):
+            raise QuantityError(f'{value} is not a finite {kind}; write for example "{example}"')
+        raise QuantityError(f'"{value}" has no unit; {_with_unit(str(value), kind)}')
+    if not isinstance(value, str):
+        raise QuantityError(f'expected {_article(kind)}, found {describe(value)}; write for example "{example}"')
+    text = shorten(value)
+    if re.match(r"[+-]?[0-9]+,[0-9]", value.strip()):
+        example = shorten(value.replace(",", "."))
+        raise QuantityError(f'"{text}" has a decimal comma; write a decimal point, for example "{example}"')
+    match = QUANTITY.fullmatch(value.strip())
+    if match is None:
+        raise QuantityError(f'"{text}" is not {_article(kind)}; write for example "{example}"')
+    number, unit = match.groups()
+    if unit is None:
+        raise QuantityError(f'"{text}" has no unit; {_with_unit(text, kind)}')
+    # Both the micro sign and the Greek letter are in use on keyboards.
+    plain = unit.replace("µ", "u").replace("μ", "u")
+    if plain not in units:
+        for other, other_units in UNITS.items():
+            if plain in other_units:
+                raise QuantityError(
+                    f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example "{example}"'
+                )
+        raise QuantityError(f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}')
+    return float(exact_number(number) * units[plain])
+
+
+def _positive(value: object, length: float) -> float:
+    if length > 0:
+        return length
+    remedy = "give a small one, such as 1 nm" if length == 0 else 'write for example "0.2 um"'
+    raise QuantityError(f'"{value}" must be above zero; {remedy}')
+
+
+def _article(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
+
+
+def _with_unit(number: str, kind: str) -> str:
+    unit = EXAMPLES[kind].split()[1]
+    return f'write for example "{number} {unit}"'
+
+
+def _pattern(kind: str) -> str:
+    names = [re.escape(unit) for unit in UNITS[kind]]
+    names += ["[µμ]" + name[1:] for name in names if name.startswith("u")]
+    return f"^ *{NUMBER} *({'|'.join(names)})$"
+
+
+def _schema(kind: str, *examples: str) -> WithJsonSchema:
+    return WithJsonSchema({"type": "string", "pattern": _pattern(kind), "examples": list(examples)})
+
+
+Length = Annotated[float, PlainValidator(parse_length), _schema("length", "750 mm", "0.2 um", "12.5 in")]
+PositiveLength = Annotated[float, PlainValidator(parse_positive_length), _schema("length", "750 mm", "0.2 um")]
+Angle = Annotated[float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")]
+Ratio = Annotated[float, PlainValidator(parse_ratio), _schema("ratio", "5 ppm", "0.1 %", "1.2 um/m")]

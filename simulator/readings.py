@@ -1,0 +1,159 @@
+"""Readings as a CSV file: one row for each reading, lengths with their unit in the column's name."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from .design import Design, Integers, Readings
+from .experiment.messages import ExperimentError, Message
+from .experiment.tables import Row, read_table
+from .experiment.yamltree import read_text
+from .machines.protocol import Array
+from .settings import hint, listing
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class ObservedReadings:
+    """A design whose readings are those of a file, with their scale readings x (readings, d) in metres.
+
+    `missing` names planned readings that the file lacks, `unplanned` those in the file that the design did not foresee.
+    """
+
+    design: Design
+    x: Array
+    missing: tuple[str, ...]
+    unplanned: tuple[str, ...]
+
+
+def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
+    """Write readings in millimetres with all digits: position, ball, probe, x_mm, y_mm and z_mm."""
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])])
+    positions, balls, probes = design.position_names, design.ball_names, design.probe_names
+    for ball, position, probe, row in zip(
+        readings.ball, readings.position, readings.probe, (1e3 * x).tolist(), strict=True
+    ):
+        writer.writerow([positions[position], balls[ball], probes[probe], *map(repr, row)])
+
+
+def read_readings(path: Path, design: Design) -> ObservedReadings:
+    """Readings of a file as observations of a design.
+
+    The probe's column may be left out where there is one probe only. A reading that stands in the file several
+    times counts as often.
+
+    :raises ExperimentError: a wrong table, or names that the design does not know; all of them at once.
+    """
+    texts = ["position", "ball", "probe"]
+    if len(design.probe_names) == 1 and "probe" not in read_text(path).partition("\n")[0]:
+        texts.remove("probe")
+    rows = read_table(path, texts, AXES[: design.dimension])
+    index, messages = _indices(rows, design)
+    if messages:
+        raise ExperimentError(messages)
+    x = np.array([row.lengths for row in rows])
+    readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
+    missing, unplanned = _compare(design, readings)
+    unread = np.setdiff1d(design.plate_balls, readings.ball)
+    if len(unread):
+        names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "", f"no reading of the balls {names}; read each at least once")]
+        )
+    return _combine_standards(design, readings, x, missing, unplanned)
+
+
+def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Message]]:
+    """Indices (rows, 3) of ball, position and probe, and the messages about names unknown."""
+    positions = {name: k for k, name in enumerate(design.position_names)}
+    probes = {name: k for k, name in enumerate(design.probe_names)}
+    balls = [
+        {design.ball_names[b]: int(b) for b in np.flatnonzero(design.ball_artefact == artefact)}
+        for artefact in range(len(design.artefact_names))
+    ]
+    index = np.zeros((len(rows), 3), np.int64)
+    messages: list[Message] = []
+    for i, row in enumerate(rows):
+        position, ball, probe = (*row.texts, design.probe_names[0])[:3]
+        if position not in positions:
+            messages.append(row.mark.message("", f'unknown position "{position}"; {hint(position, positions)}'))
+            continue
+        own = balls[design.position_artefact[positions[position]]]
+        if ball not in own:
+            messages.append(row.mark.message("", f'unknown ball "{ball}"; {hint(ball, own)}'))
+        if probe not in probes:
+            messages.append(row.mark.message("", f'unknown probe "{probe}"; {hint(probe, probes)}'))
+        index[i] = own.get(ball, 0), positions[position], probes.get(probe, 0)
+    return index, messages
+
+
+def _key(readings: Readings) -> list[tuple[int, int, int]]:
+    table = np.stack([readings.position, readings.ball, readings.probe], axis=1)
+    return [(row[0], row[1], row[2]) for row in table.tolist()]
+
+
+def _compare(design: Design, readings: Readings) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    planned, found = _key(design.readings.expanded()), _key(readings)
+
+    def name(key: tuple[int, int, int]) -> str:
+        position, ball, probe = key
+        return f"{design.position_names[position]}: ball {design.ball_label(ball)} with {design.probe_names[probe]}"
+
+    def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> tuple[str, ...]:
+        left = Counter(others)
+        names = []
+        for key in these:
+            if left[key]:
+                left[key] -= 1
+            else:
+                names.append(name(key))
+        return tuple(names)
+
+    return without(planned, found), without(found, planned)
+
+
+def _combine_standards(
+    design: Design, readings: Readings, x: Array, missing: tuple[str, ...], unplanned: tuple[str, ...]
+) -> ObservedReadings:
+    """Take the mean of what a length standard's repeats read, and let its lengths point to it.
+
+    A length of which an end was not read drops out.
+    """
+    on_plate = design.is_plate[design.ball_artefact[readings.ball]]
+    groups: dict[tuple[int, int, int], list[int]] = {}
+    keys = _key(readings)
+    for i in np.flatnonzero(~on_plate):
+        groups.setdefault(keys[i], []).append(int(i))
+    plate = np.flatnonzero(on_plate)
+    means = np.array([x[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
+    first = np.array([members[0] for members in groups.values()], np.int64)
+    repeats = np.array([len(members) for members in groups.values()], np.int64)
+    place = {key: len(plate) + i for i, key in enumerate(groups)}
+    planned = _key(design.readings)
+
+    def moved(old: Integers) -> Integers:
+        return np.array([place.get(planned[i], -1) for i in old], np.int64)
+
+    ends = moved(design.lengths.first), moved(design.lengths.second)
+    present = (ends[0] >= 0) & (ends[1] >= 0)
+    lengths = replace(
+        design.lengths,
+        first=ends[0][present],
+        second=ends[1][present],
+        **{
+            name: getattr(design.lengths, name)[present]
+            for name in ("value", "uncertainty", "projected", "direction", "with_repeatability")
+        },
+    )
+    chosen = np.concatenate([plate, first])
+    combined = replace(readings.select(chosen), repeats=np.concatenate([np.ones(len(plate), np.int64), repeats]))
+    observed = replace(design, readings=combined, lengths=lengths)
+    return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned)

@@ -1,0 +1,76 @@
+"""What all sections of an experiment file share: the base class of settings, the words of refusals."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+
+class Settings(BaseModel):
+    """A section of an experiment file: immutable, without unknown keys, without silent conversions.
+
+    Lists of a file arrive as tuples, so fields holding several values are declared as tuples.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+
+def listing(words: Iterable[str], limit: int = 8) -> str:
+    """Write words as a comma-separated text, abbreviated beyond ``limit``.
+
+    >>> listing(["a", "b"])
+    'a, b'
+    >>> listing("abcde", limit=3)
+    'a, b, c and 2 more'
+    """
+    words = list(words)
+    if len(words) > limit:
+        return f"{', '.join(words[:limit])} and {len(words) - limit} more"
+    return ", ".join(words)
+
+
+def hint(word: str, known: Iterable[str]) -> str:
+    """Say which known word was probably meant, or which there are.
+
+    >>> hint("plat", ["plate", "bar"])
+    'did you mean "plate"?'
+    >>> hint("x", ["plate", "bar"])
+    'known: plate, bar'
+    """
+    known = list(known)
+    folded = {candidate.casefold(): candidate for candidate in reversed(known)}
+    # Beyond this length a word is no slip of the pen, and comparing it would take long.
+    nearest = difflib.get_close_matches(word.casefold(), folded, n=1) if len(word) <= 100 else []
+    if nearest:
+        return f'did you mean "{folded[nearest[0]]}"?'
+    return f"known: {listing(known)}" if known else "there is none"
+
+
+def describe(value: Any) -> str:
+    """Name a value of an experiment file in a sentence, as in "found …".
+
+    >>> describe("a"), describe(750), describe((1, 2)), describe({}), describe(None)
+    ('the text "a"', 'the number 750', 'a list', 'a mapping', 'nothing')
+    """
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return f"the number {value}"
+    if isinstance(value, str):
+        return f'the text "{shorten(value)}"'
+    return "a mapping" if isinstance(value, dict) else "a list"
+
+
+def shorten(text: str, limit: int = 60) -> str:
+    """Cut a text to fit in a one-line message.
+
+    >>> shorten("a" * 70, limit=5)
+    'aaaa…'
+    """
+    text = " ".join(text.split())
+    return text if len(text) <= limit else text[: limit - 1] + "…"

@@ -1,0 +1,203 @@
+"""What must hold of uncertainties whatever the design: frames, order, scale, more readings, and repeated estimates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.uncertainty import Quantity, uncertainties
+from simulator.design import Design, State, nominal_state
+from simulator.estimation.covariance import Covariance, covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.gauss_newton import gauss_newton
+from simulator.estimation.initial import initial_state
+from simulator.estimation.parameters import SharedLayout, shared_layout
+from simulator.generate import noisy_certificate, noisy_readings
+from simulator.geometry.motions import rotation_from_vector
+from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
+
+seeds = st.integers(0, 2**31)
+
+
+def small_design(seed: int = 0, calibration: str = "sides") -> Design:
+    """A 4 x 4 plate in six positions, with evaluation points drawn from `seed`."""
+    balls = grid(4)
+    pairs = corner_sides(balls) if calibration == "sides" else neighbours(balls)
+    design = plate_design(
+        balls,
+        six_positions(),
+        pairs if calibration != "coordinates" else (),
+        range(16) if calibration == "coordinates" else (),
+        position_coefficients=4,
+        rotation_coefficients=4,
+    )
+    return replace(design, points=np.random.default_rng(seed).random((12, 3)))
+
+
+def judged(design: Design, sigma: float = 1.0) -> tuple[dict[str, Quantity], Covariance, SharedLayout]:
+    layout, state = shared_layout(design), nominal_state(design)
+    factor = eliminate(design, layout, state)
+    spread = covariance(design, factor, spectrum(factor))
+    return uncertainties(design, layout, state, spread, sigma), spread, layout
+
+
+def assert_same(found: Quantity, expected: Quantity, relative: float = 1e-9) -> None:
+    assert found.count == expected.count
+    assert found.maximum == pytest.approx(expected.maximum, rel=relative)
+    assert found.average == pytest.approx(expected.average, rel=relative)
+
+
+@given(seeds)
+@settings(max_examples=15, deadline=None)
+def test_u5_and_u6_do_not_depend_on_the_frame(seed: int) -> None:
+    """Another artefact frame and another pose held change U1 to U4, but no distance."""
+    generator = np.random.default_rng(seed)
+    design = small_design(seed)
+    expected, _, _ = judged(design)
+    turn = rotation_from_vector(generator.uniform(-2, 2, (1, 3)))[0]
+    shift = generator.uniform(-1, 1, 3)
+    held = np.zeros_like(design.held)
+    held[generator.integers(len(held))] = True
+    moved = replace(
+        design,
+        balls=design.balls @ turn.T + shift,
+        rotations=design.rotations @ turn.T,
+        origins=design.origins - (design.rotations @ turn.T) @ shift,
+        held=held,
+    )
+    found, _, _ = judged(moved)
+    assert_same(found["U5"], expected["U5"])
+    assert_same(found["U6"], expected["U6"])
+
+
+@given(seeds)
+@settings(max_examples=15, deadline=None)
+def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    design = small_design(seed)
+    expected, _, _ = judged(design)
+    ball_order = generator.permutation(len(design.balls))
+    new_ball = np.argsort(ball_order)
+    position_order = generator.permutation(len(design.rotations))
+    new_position = np.argsort(position_order)
+    mixed = generator.permutation(len(design.readings))
+    readings = design.readings.select(mixed)
+    found, _, _ = judged(
+        replace(
+            design,
+            balls=design.balls[ball_order],
+            ball_names=tuple(design.ball_names[i] for i in ball_order),
+            rotations=design.rotations[position_order],
+            origins=design.origins[position_order],
+            held=design.held[position_order],
+            position_names=tuple(design.position_names[i] for i in position_order),
+            readings=replace(readings, ball=new_ball[readings.ball], position=new_position[readings.position]),
+            distances=replace(
+                design.distances,
+                first=new_ball[design.distances.second],
+                second=new_ball[design.distances.first],
+            ),
+        )
+    )
+    for symbol, quantity in expected.items():
+        assert_same(found[symbol], quantity)
+
+
+@given(st.floats(1e-3, 1e3), st.sampled_from(["sides", "neighbours", "coordinates"]))
+@settings(max_examples=15, deadline=None)
+def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
+    design = small_design(1, calibration)
+    expected, _, _ = judged(design)
+    scaled = replace(
+        design,
+        repeatability=factor * design.repeatability,
+        distances=replace(design.distances, uncertainty=factor * design.distances.uncertainty),
+        coordinates=replace(design.coordinates, uncertainty=factor * design.coordinates.uncertainty),
+    )
+    by_statement, _, _ = judged(scaled)
+    by_estimate, _, _ = judged(design, factor)
+    for symbol, quantity in expected.items():
+        assert by_statement[symbol].average == pytest.approx(factor * quantity.average, rel=1e-9)
+        assert by_estimate[symbol].maximum == pytest.approx(factor * quantity.maximum, rel=1e-12)
+
+
+@given(seeds, st.sampled_from(["sides", "neighbours", "coordinates"]))
+@settings(max_examples=20, deadline=None)
+def test_an_added_reading_never_raises_a_variance(seed: int, calibration: str) -> None:
+    generator = np.random.default_rng(seed)
+    design = small_design(seed, calibration)
+    before, spread_before, layout = judged(design)
+    readings = design.readings
+    extra = replace(
+        readings,
+        ball=np.append(readings.ball, generator.integers(len(design.balls))),
+        position=np.append(readings.position, generator.integers(len(design.rotations))),
+        probe=np.append(readings.probe, generator.integers(len(design.probes))),
+        repeats=np.append(readings.repeats, generator.integers(1, 4)),
+    )
+    after, spread_after, _ = judged(replace(design, readings=extra))
+    slack = 1 + 1e-9
+    assert np.all(spread_after.of_balls() <= spread_before.of_balls() * slack)
+    everything = np.eye(len(layout))
+    assert np.all(spread_after.of_shared(everything) <= spread_before.of_shared(everything) * slack)
+    for symbol in ("U4", "U5", "U6"):
+        assert after[symbol].maximum <= before[symbol].maximum * slack
+        assert after[symbol].average <= before[symbol].average * slack
+
+
+@pytest.mark.parametrize("calibration", ["sides", "coordinates"])
+def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration: str) -> None:
+    """Sixty complete non-linear estimates of a machine with errors; chi-squared of all parameters together."""
+    design = small_design(2, calibration)
+    generator = np.random.default_rng(11)
+    drawn = nominal_state(design)
+    truth = State(
+        drawn.balls, drawn.rotations, drawn.origins, 1e-5 * generator.standard_normal(len(design.model.parameters))
+    )
+    _, spread, layout = judged(design)
+    trials = 60
+    balls, model, ratio = [], [], []
+    for _ in range(trials):
+        certified = noisy_certificate(design, truth, generator)
+        readings, x = noisy_readings(certified, truth, generator)
+        observed = replace(certified, readings=readings)
+        solution = gauss_newton(observed, x, initial_state(observed, x))
+        assert solution.status == "converged"
+        balls.append(solution.state.balls - truth.balls)
+        model.append(solution.state.a - truth.a)
+        freedom = observed.observations - observed.parameter_count
+        ratio.append(solution.factor.sum_of_squares / freedom)
+    # Mean square over all trials, relative to the variance; its spread for normal variables is sqrt(2 / trials).
+    of_model = spread.of_shared(np.eye(len(layout))[layout.model])
+    for found, stated in ((np.array(model), of_model), (np.array(balls), spread.of_balls())):
+        squared = (found**2).mean(axis=0) / stated**2
+        assert np.all(np.abs(squared - 1) < 5 * np.sqrt(2 / trials))
+        # Parameters are correlated, so that their mean cannot be expected to be closer than a single one's error.
+        assert abs(squared.mean() - 1) < 3 * np.sqrt(2 / trials)
+        bias = found.mean(axis=0) / stated * np.sqrt(trials)
+        assert np.abs(bias).max() < 5
+    freedom = design.observations - design.parameter_count
+    assert abs(np.mean(ratio) - 1) < 4 * np.sqrt(2 / (freedom * trials))
+
+
+@pytest.mark.parametrize("size", [1, 3, 5])
+def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    expected, _, _ = judged(small_design(4))
+    monkeypatch.setattr("analysis.uncertainty.TILE", size)
+    found, _, _ = judged(small_design(4))
+    for symbol in ("U5", "U6"):
+        assert_same(found[symbol], expected[symbol])
+        assert found[symbol].largest == expected[symbol].largest
+
+
+@pytest.mark.parametrize("rows", [10, 64, 100_000])
+def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
+    expected, _, _ = judged(small_design(4, "neighbours"))
+    monkeypatch.setattr("simulator.estimation.elimination.ROWS_AT_ONCE", rows)
+    found, _, _ = judged(small_design(4, "neighbours"))
+    for symbol, quantity in expected.items():
+        assert_same(found[symbol], quantity)

@@ -1,0 +1,261 @@
+"""The commands as a user meets them: output, exit status, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from simulator.experiment.load import load
+from simulator.layout import lay_out
+from simulator.machines.truth import true_parameters
+
+QUICKSTART = "designs/quickstart.yaml"
+SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
+
+
+def run(*arguments: str | Path) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+def test_check_as_expected(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", QUICKSTART) == 0
+    out, err = capsys.readouterr()
+    assert "full rank, as expected; 174 parameters, 754 observations" in out
+    assert err == ""
+
+
+def test_check_not_as_expected(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    text = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").replace("deficiency: 2", "deficiency: 0")
+    (tmp_path / "plate.yaml").write_text(text, encoding="utf-8")
+    assert run("check", tmp_path / "plate.yaml", "--variant", "B") == 1
+    out, _ = capsys.readouterr()
+    assert "rank deficiency 2, expected full rank" in out
+    assert "undetermined 2: " in out and "EXX (positioning error of X, quadratic)" in out
+
+
+def test_check_json_of_several(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", "--json", "designs/npl/6.1.1.yaml") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["rank_deficiency"] for one in found] == [0, 2, 0, 2]
+    assert [len(one["undetermined"]) for one in found] == [0, 2, 0, 2]
+    assert all(one["as_expected"] for one in found)
+
+
+def test_run_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", "--json", QUICKSTART) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["experiment"] == "quickstart"
+    assert (found["parameters"], found["observations"], found["rank_deficiency"], found["sigma"]) == (174, 754, 0, 1)
+    for symbol in SYMBOLS:
+        quantity = found["quantities"][symbol]
+        assert 0 < quantity["average"] <= quantity["maximum"]
+    assert found["quantities"]["U2 angles"]["unit"] == "rad"
+    lengths, angles = found["quantities"]["U2 lengths"], found["quantities"]["U2 angles"]
+    mixed = (lengths["average"] * lengths["count"] + angles["average"] * angles["count"]) / 30
+    assert found["quantities"]["U2"]["average"] == pytest.approx(mixed)
+
+
+def test_run_of_a_deficient_design_tells_what_is_left(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", "--json", "designs/npl/6.2.1.yaml", "--variant", "n=4 NDEL=7") == 0
+    quantities = json.loads(capsys.readouterr().out)["quantities"]
+    # Section 6.2.1: the plate is still accurately calibrated, the machine is not.
+    assert quantities["U5"]["undetermined"] == 0
+    assert 1e-7 < quantities["U5"]["average"] < 2e-7
+    assert quantities["U6"]["average"] is None and quantities["U6"]["undetermined"] == quantities["U6"]["count"]
+    assert quantities["U3 angles"]["undetermined"] == 0 and quantities["U3 lengths"]["undetermined"] > 0
+
+
+def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", QUICKSTART) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines if line[:1] == "U"] == list(SYMBOLS)
+    assert max(map(len, lines)) <= 120
+
+
+def test_simulate_and_fit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    assert run("simulate", QUICKSTART, "-o", readings) == 0
+    first = readings.read_bytes()
+    assert run("simulate", QUICKSTART, "-o", readings) == 0
+    assert readings.read_bytes() == first
+    assert run("simulate", QUICKSTART, "-o", readings, "--seed", "2") == 0
+    assert readings.read_bytes() != first
+    out, err = capsys.readouterr()
+    assert out == "" and "250 readings written" in err
+
+    assert run("fit", "--json", QUICKSTART, readings) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"] == "converged" and len(found["iterations"]) <= 6
+    assert 0.8 < found["sigma"] < 1.2
+    experiment = load(QUICKSTART)[0]
+    design = lay_out(experiment)
+    truth = true_parameters(experiment.true_machine, design.model)
+    names = [parameter.name for parameter in design.model.parameters]
+    errors = [
+        (found["estimates"][name]["value"] - value) / found["estimates"][name]["standard_uncertainty"]
+        for name, value in zip(names, truth, strict=True)
+    ]
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
+    assert {entry["unit"] for entry in found["estimates"].values()} == {"m", "rad"}
+    assert len(found["estimates"]) == found["parameters"]
+
+
+def test_exact_readings_fit_exactly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    assert run("simulate", QUICKSTART, "-o", readings, "--exact") == 0
+    assert run("fit", "--json", QUICKSTART, readings, "--sigma", "given", "--monomials") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["sigma"] == 1.0 and not found["sigma_is_estimated"]
+    assert found["sum_of_squares"] < 1e-12
+    experiment = load(QUICKSTART)[0]
+    model = lay_out(experiment).model
+    values = model.reported().matrix @ true_parameters(experiment.true_machine, model)
+    for name, value in zip(model.reported().names, values, strict=True):
+        assert found["estimates"][name]["value"] == pytest.approx(value, abs=2e-12)
+
+
+def test_fit_names_missing_and_unplanned_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    run("simulate", QUICKSTART, "-o", readings)
+    header, first, second, *rest = readings.read_text(encoding="utf-8").splitlines()
+    readings.write_text("\n".join([header, second, second, *rest]) + "\n", encoding="utf-8")
+    capsys.readouterr()
+    assert run("fit", QUICKSTART, readings) == 0
+    _, err = capsys.readouterr()
+    assert "planned but not read (1): z low: ball r1c1 with down" in err
+    assert "read but not planned (1): z low: ball r1c2 with down" in err
+
+
+def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    readings.write_text(
+        "position,ball,probe,x_mm,y_mm,z_mm\nz lo,r1c1,down,1,2,3\nz low,r9c9,downn,1,2,x\n", encoding="utf-8"
+    )
+    assert run("fit", QUICKSTART, readings) == 3
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f'{readings}:3:22: "x" is not a number' in err
+    readings.write_text(readings.read_text(encoding="utf-8").replace("2,x", "2,3"), encoding="utf-8")
+    assert run("fit", QUICKSTART, readings) == 3
+    err = capsys.readouterr().err
+    assert 'unknown position "z lo"; did you mean "z low"?' in err
+    assert 'unknown ball "r9c9"' in err and 'unknown probe "downn"; did you mean "down"?' in err
+
+
+def test_fit_needs_every_ball(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    readings.write_text("position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,1,2,3\n", encoding="utf-8")
+    assert run("fit", QUICKSTART, readings) == 3
+    assert 'no reading of the balls "r1c2", "r1c3"' in capsys.readouterr().err
+
+
+def test_bad_files_give_messages_and_nothing_else(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    text = Path(QUICKSTART).read_text(encoding="utf-8")
+    broken = tmp_path / "broken.yaml"
+    broken.write_text(
+        text.replace("0.2 um            #", "0.2              #")
+        .replace("probes: [down]}", "probes: [dwn]}")
+        .replace("kind: random", "kind: random\n  positoin: 3 um"),
+        encoding="utf-8",
+    )
+    for command in ("check", "run"):
+        assert run(command, broken, tmp_path / "missing.yaml") == 3
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert 'machine.repeatability: "0.2" has no unit; write for example "0.2 um"' in err or "has no unit" in err
+        assert 'did you mean "down"?' in err and 'did you mean "position"?' in err
+        assert "missing.yaml" in err and "Traceback" not in err
+        assert all(line.startswith(str(tmp_path)) for line in err.splitlines())
+
+
+def test_true_machine_that_the_model_cannot_be(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    head, tail = Path(QUICKSTART).read_text(encoding="utf-8").split("true_machine:")
+    tail = tail.partition("\n\n")[2]
+    broken = tmp_path / "broken.yaml"
+    broken.write_text(
+        f"{head}true_machine:\n  kind: coefficients\n  values:\n    EXX t^9: 3 um\n    EAX t^1: 3 um\n\n{tail}",
+        encoding="utf-8",
+    )
+    assert run("check", broken) == 3
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert "true_machine.values[EXX t^9]: the error model has no parameter" in lines[0]
+    assert "an angle is expected" in lines[1]
+
+
+def test_a_file_with_variants_needs_a_choice_to_fit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run("simulate", "designs/npl/6.1.1.yaml", "-o", tmp_path / "r.csv") == 3
+    assert "choose one with --variant: A, B, C, D" in capsys.readouterr().err
+    assert run("check", "designs/npl/6.1.1.yaml", "--variant", "E") == 3
+    assert 'no variant "E"' in capsys.readouterr().err
+
+
+def test_init_writes_the_quickstart(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    assert run("init", path) == 0
+    assert path.read_text(encoding="utf-8") == Path(QUICKSTART).read_text(encoding="utf-8")
+    assert run("check", path) == 0
+    assert run("init", path) == 3
+    assert run("init", tmp_path / "no" / "folder.yaml") == 3
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_schema_is_the_shipped_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("schema") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == json.loads(Path("designs/schema.json").read_text(encoding="utf-8"))
+    for path in Path("designs").rglob("*.yaml"):
+        first = path.read_text(encoding="utf-8").splitlines()[0]
+        named = first.partition("$schema=")[2]
+        assert (path.parent / named).resolve() == Path("designs/schema.json").resolve(), path
+
+
+@pytest.mark.parametrize("arguments", [[], ["chekc"], ["check"], ["run", "--what"], ["simulate", QUICKSTART]])
+def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == "" and "usage: ballplate" in err
+
+
+def test_all_shipped_designs_are_as_expected() -> None:
+    paths = sorted(Path("designs").rglob("*.yaml"))
+    assert len(paths) >= 11
+    assert run("check", *paths) == 0
+
+
+def test_closed_pipe_is_no_error() -> None:
+    """As in `ballplate check ... | head -1`."""
+    code = "import sys; from analysis.cli import main; sys.exit(main(sys.argv[1:]))"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "check", *sorted(map(str, Path("designs/npl").glob("*.yaml")))],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+    )
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    assert process.wait() == 0
+
+
+def test_checking_loads_nothing_slow() -> None:
+    """A check must start fast: no pandas, plotting or SciPy."""
+    code = (
+        "import sys; from analysis.cli import main; main(['check', 'designs/quickstart.yaml']);"
+        "print([m for m in ('pandas', 'scipy', 'joblib', 'matplotlib') if m in sys.modules], file=sys.stderr)"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": os.getcwd()}
+    )
+    assert found.stderr.strip() == "[]"

@@ -1,0 +1,369 @@
+"""Every standard uncertainty behind U1 to U6, and the rank, against a dense computation of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.uncertainty import all_pairs, point_pairs, uncertainties
+from simulator.design import Design, Lengths, Readings, State, nominal_state
+from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.gauss_newton import newton_step
+from simulator.estimation.observations import expected_readings
+from simulator.estimation.parameters import SharedLayout, shared_layout
+from simulator.geometry.motions import rotation_from_vector
+from tests.reference import dense
+from tests.reference.designs import (
+    SIGMA,
+    corner_sides,
+    four_positions,
+    grid,
+    neighbours,
+    placed,
+    plate_design,
+    six_positions,
+    square,
+)
+
+Real = NDArray[np.float64]
+RELATIVE = 1e-9
+
+
+def with_points(design: Design, count: int = 15) -> Design:
+    """The design with random evaluation points in its volume, read with a tip on the side."""
+    unit = np.random.default_rng(7).random((count, 3))
+    return replace(design, points=design.lower + unit * (design.upper - design.lower), point_probe=1)
+
+
+def grid_of_four() -> Design:
+    balls = grid(4)
+    return plate_design(balls, six_positions(), corner_sides(balls))
+
+
+def grid_of_five() -> Design:
+    balls = grid(5)
+    return plate_design(balls, six_positions(), corner_sides(balls))
+
+
+def square_of_five() -> Design:
+    balls = square(5)
+    return plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=7)
+
+
+def certified_coordinates() -> Design:
+    """Experiment 6.1.1 C: all co-ordinates calibrated, all poses free."""
+    balls = grid(5)
+    return plate_design(balls, four_positions(), coordinates=range(len(balls)))
+
+
+def neighbour_distances() -> Design:
+    """Experiment 6.1.1 A."""
+    balls = grid(5)
+    return plate_design(balls, four_positions(), neighbours(balls))
+
+
+def unequal_axes() -> Design:
+    """A repeatability of its own for each axis, and a volume that is no unit cube."""
+    balls = grid(4)
+    sigmas, lower, upper = (1e-7, 3e-7, 7e-7), (-0.1, 0.0, -0.2), (1.2, 1.05, 1.0)
+    return plate_design(balls, six_positions(), corner_sides(balls), repeatability=sigmas, lower=lower, upper=upper)
+
+
+def repeats() -> Design:
+    """Each reading taken once to four times."""
+    design = grid_of_four()
+    readings = design.readings
+    return replace(design, readings=replace(readings, repeats=1 + (np.arange(len(readings)) * 5) % 4))
+
+
+def some_balls_only() -> Design:
+    """The second and the last position read but a part of the balls, one ball there with one tip only."""
+    design = grid_of_five()
+    readings = design.readings
+    missing = (readings.position == 1) & (readings.ball % 3 == 0)
+    missing |= (readings.position == 5) & (readings.ball > 14)
+    missing |= (readings.position == 5) & (readings.ball == 3) & (readings.probe == 3)
+    return replace(design, readings=readings.select(~missing))
+
+
+def planar_distances() -> Design:
+    """Distances of which only the first two co-ordinates count, with a few certified co-ordinates."""
+    balls = grid(4) + np.array([0.0, 0.0, 0.02]) * (np.arange(16) % 3)[:, None]
+    design = plate_design(balls, six_positions(), neighbours(grid(4)), coordinates=(0, 3, 12))
+    flat = np.full(len(design.distances), 2)
+    flat[::3] = 3
+    first, second = design.distances.first, design.distances.second
+    between = (balls[first] - balls[second]) * (np.arange(3) < flat[:, None])
+    value = np.sqrt((between**2).sum(axis=1))
+    return replace(design, distances=replace(design.distances, dimensions=flat, value=value))
+
+
+def with_length_standard(design: Design, projected: bool) -> Design:
+    """A bar of two balls is added, read three times over in three places; its length is known."""
+    half = 0.3
+    places = np.array([[0.5, 0.5, 0.4], [0.5, 0.4, 0.5], [0.4, 0.6, 0.6]])
+    directions = np.array([[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.6, -0.48, 0.64]])
+    rotations = []
+    for direction in directions:
+        full, _ = np.linalg.qr(np.column_stack([direction, np.roll(np.eye(3), 1, 0)[:, :2]]))
+        full[:, 0] = direction
+        full[:, 2] *= np.sign(np.linalg.det(full))
+        rotations.append(full)
+    ball, position = len(design.balls), len(design.position_names)
+    readings, start = design.readings, len(design.readings)
+    count = len(places)
+    joined = Readings(
+        np.concatenate([readings.ball, np.tile([ball, ball + 1], count)]),
+        np.concatenate([readings.position, position + np.repeat(np.arange(count), 2)]),
+        np.concatenate([readings.probe, np.repeat(np.arange(count) % 2, 2)]),
+        np.concatenate([readings.repeats, np.array([1, 3, 2, 2, 5, 1])]),
+    )
+    index = start + 2 * np.arange(count)
+    # The stated direction is a little off the bar's, so that projections differ from distances.
+    stated = directions + 0.1 * np.roll(directions, 1, axis=1)
+    stated /= np.sqrt((stated**2).sum(axis=1))[:, None]
+    return replace(
+        design,
+        artefact_names=(*design.artefact_names, "bar"),
+        is_plate=np.append(design.is_plate, False),
+        ball_names=(*design.ball_names, "left", "right"),
+        ball_artefact=np.append(design.ball_artefact, [len(design.is_plate)] * 2),
+        balls=np.concatenate([design.balls, [[half, 0.0, 0.0], [-half, 0.0, 0.0]]]),
+        position_names=(*design.position_names, *(f"bar {k}" for k in range(count))),
+        position_artefact=np.append(design.position_artefact, [len(design.is_plate)] * count),
+        rotations=np.concatenate([design.rotations, rotations]),
+        origins=np.concatenate([design.origins, places]),
+        held=np.concatenate([design.held, np.zeros((count, 6), bool)]),
+        readings=joined,
+        lengths=Lengths(
+            first=index,
+            second=index + 1,
+            value=np.full(count, 2 * half),
+            uncertainty=np.array([1e-7, 2e-7, 3e-7]),
+            projected=np.full(count, projected),
+            direction=stated,
+            with_repeatability=np.array([True, False, True]),
+        ),
+    )
+
+
+def length_standard_by_distance() -> Design:
+    """No distance of the plate is known: the bar alone gives the scale."""
+    return with_length_standard(
+        plate_design(grid(4), six_positions(), repeatability=(1e-7, 3e-7, 5e-7)), projected=False
+    )
+
+
+def length_standard_by_projection() -> Design:
+    return with_length_standard(
+        plate_design(grid(4), six_positions(), repeatability=(1e-7, 3e-7, 5e-7)), projected=True
+    )
+
+
+def two_artefacts() -> Design:
+    """A grid with calibrated sides and a smaller one, certified, whose poses are all free."""
+    large, small = grid_of_four(), grid(3, 0.4)
+    extra = plate_design(
+        small,
+        [placed("z", 0.5, (0.3, 0.1), 1, 0.4), placed("x", 0.4, (0.2, 0.4), 3, 0.4)],
+        coordinates=(0, 2, 6, 8),
+    )
+    balls, positions = len(large.balls), len(large.position_names)
+    first, second = large.readings, extra.readings
+    return replace(
+        large,
+        artefact_names=("large", "small"),
+        is_plate=np.array([True, True]),
+        ball_names=large.ball_names + extra.ball_names,
+        ball_artefact=np.repeat([0, 1], [balls, len(small)]),
+        balls=np.concatenate([large.balls, small]),
+        position_names=(*large.position_names, "s0", "s1"),
+        position_artefact=np.repeat([0, 1], [positions, 2]),
+        rotations=np.concatenate([large.rotations, extra.rotations]),
+        origins=np.concatenate([large.origins, extra.origins]),
+        held=np.concatenate([large.held, extra.held]),
+        readings=Readings(
+            np.concatenate([first.ball, second.ball + balls]),
+            np.concatenate([first.position, second.position + positions]),
+            np.concatenate([first.probe, second.probe]),
+            np.concatenate([first.repeats, second.repeats]),
+        ),
+        coordinates=replace(extra.coordinates, ball=extra.coordinates.ball + balls),
+    )
+
+
+def deficient_grid_of_four() -> Design:
+    balls = grid(4)
+    return plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=7)
+
+
+def deficient_grid_of_seven() -> Design:
+    balls = grid(7)
+    return plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=10)
+
+
+def solved(design: Design, state: State, x: Real | None = None) -> tuple[SharedLayout, Spectrum, Covariance]:
+    layout = shared_layout(design)
+    factor = eliminate(design, layout, state, x)
+    found = spectrum(factor)
+    return layout, found, covariance(design, factor, found)
+
+
+def pair_values(places: Real, common: Real, own: Real, null: Real) -> Real:
+    """The uncertainty of every single pair, NaN where open, each from a call with two places."""
+    values = []
+    for i, j in zip(*np.triu_indices(len(places), 1), strict=True):
+        two = [i, j]
+        summary = all_pairs(places[two], common[two], own[two], null[two], np.array(two))
+        values.append(np.nan if summary.undetermined else summary.maximum)
+    return np.array(values)
+
+
+def individual(design: Design, layout: SharedLayout, state: State, found: Covariance) -> dict[str, Real]:
+    """All that stands behind U1 to U6, in the order of the dense reference."""
+    reported = np.zeros((len(design.model.reported().names), len(layout)))
+    reported[:, layout.model] = design.model.reported().matrix
+    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+    by_model = np.zeros((len(design.points), 3, len(layout)))
+    by_model[:, :, layout.model] = design.model.jacobian(design.points, state.a, offsets)
+    corrected = design.points + design.model.error(design.points, state.a, offsets)
+    own = np.zeros((len(design.points), 3, 3))
+    return {
+        "U1": found.of_balls()[design.plate_balls].ravel(),
+        "U2": found.of_shared(np.eye(len(layout))[layout.poses]),
+        "U3": found.of_shared(reported),
+        "U4": point_pairs(design, layout, state, found)[0].ravel(),
+        "U5": np.concatenate(
+            [
+                pair_values(state.balls[chosen], found.ball[chosen], found.ball_own[chosen], found.ball_null[chosen])
+                for chosen in (
+                    np.flatnonzero(design.ball_artefact == plate) for plate in np.flatnonzero(design.is_plate)
+                )
+            ]
+        ),
+        "U6": pair_values(corrected, by_model @ found.shared, own, by_model @ found.shared_null),
+    }
+
+
+def compare(design: Design, state: State, problem: dense.Problem, x: Real | None = None) -> int:
+    """Check all uncertainties; returns the rank deficiency that both found."""
+    layout, found, spread = solved(design, state, x)
+    reference = dense.linearised(problem)
+    assert found.deficiency == reference.deficiency
+    assert len(layout) + 3 * len(design.plate_balls) == problem.parameters
+    assert list(design.model.reported().names) == dense.monomial_names(problem)
+    expected = dense.standard_uncertainties(problem, reference)
+    summary = uncertainties(design, layout, state, spread)
+    for symbol, values in individual(design, layout, state, spread).items():
+        np.testing.assert_array_equal(np.isnan(values), np.isnan(expected[symbol]), err_msg=symbol)
+        np.testing.assert_allclose(values, expected[symbol], rtol=RELATIVE, atol=0, err_msg=symbol)
+        quantity, open_ = summary[symbol], np.isnan(expected[symbol])
+        assert (quantity.count, quantity.undetermined) == (len(open_), open_.sum()), symbol
+        if not open_.all():
+            assert quantity.maximum == pytest.approx(np.nanmax(expected[symbol]), rel=RELATIVE), symbol
+            assert quantity.average == pytest.approx(np.nanmean(expected[symbol]), rel=RELATIVE), symbol
+    return found.deficiency
+
+
+FULL_RANK = [
+    (grid_of_four, 5),
+    (grid_of_five, 5),
+    (square_of_five, 7),
+    (certified_coordinates, 5),
+    (neighbour_distances, 5),
+    (unequal_axes, 5),
+    (repeats, 5),
+    (some_balls_only, 5),
+    (planar_distances, 5),
+    (length_standard_by_distance, 5),
+    (length_standard_by_projection, 5),
+    (two_artefacts, 5),
+]
+
+
+@pytest.mark.parametrize(("make", "coefficients"), FULL_RANK, ids=lambda v: getattr(v, "__name__", f"NDEL{v}"))
+def test_every_uncertainty_of_a_design_of_full_rank(make: Callable[[], Design], coefficients: int) -> None:
+    design = with_points(make())
+    assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "coefficients", "deficiency"), [(deficient_grid_of_four, 7, 6), (deficient_grid_of_seven, 10, 3)]
+)
+def test_rank_and_what_is_left_determined_of_a_deficient_design(
+    make: Callable[[], Design], coefficients: int, deficiency: int
+) -> None:
+    design = with_points(make(), 8)
+    assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+
+
+@pytest.mark.parametrize(
+    "make", [unequal_axes, length_standard_by_distance, length_standard_by_projection, two_artefacts]
+)
+def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], Design]) -> None:
+    """Balls, poses, machine errors and readings off nominal: uncertainties, S^2 and the Newton step."""
+    design = with_points(make(), 8)
+    random = np.random.default_rng(3)
+    nominal = nominal_state(design)
+    # What is held stays where it is; the plates stand free.
+    turn = 0.02 * random.standard_normal((len(design.origins), 3)) * ~design.held[:, 3:]
+    shift = 1e-3 * random.standard_normal(design.origins.shape) * ~design.held[:, :3]
+    # What the first pose shows of the balls counts as their frame: small errors only.
+    state = State(
+        nominal.balls + 1e-5 * random.standard_normal(nominal.balls.shape),
+        rotation_from_vector(turn) @ nominal.rotations,
+        nominal.origins + shift,
+        1e-4 * random.standard_normal(nominal.a.shape),
+    )
+    scatter = random.standard_normal((len(design.readings), 3))
+    x = expected_readings(design, nominal, design.readings) + 1e-4 * scatter
+    problem = dense.planned(design, 5, 5)
+    problem = replace(
+        problem,
+        scales=x,
+        rotations=state.rotations,
+        origins=state.origins,
+        balls=state.balls,
+        a=in_reference_basis(problem, design, state.a),
+    )
+    assert compare(design, state, problem, x) == 0
+
+    layout = shared_layout(design)
+    factor = eliminate(design, layout, state, x)
+    shared, balls = newton_step(design, factor, spectrum(factor))
+    expected, squares = dense.least_squares_step(problem)
+    n, poses = 3 * len(design.plate_balls), len(problem.free_poses)
+    expected_a = in_reference_basis(problem, design, shared[layout.model])
+    ours = np.concatenate([balls[design.plate_balls].ravel(), shared[layout.poses], expected_a])
+    assert factor.sum_of_squares == pytest.approx(squares, rel=RELATIVE)
+    for part in (slice(0, n), slice(n, n + poses), slice(n + poses, None)):
+        assert np.abs(ours[part] - expected[part]).max() < 1e-8 * np.abs(expected[part]).max()
+
+
+def in_reference_basis(problem: dense.Problem, design: Design, a: Real) -> Real:
+    """The same error functions in the reference's coefficients, by way of the monomials both can report."""
+    monomials = design.model.reported().matrix @ a
+    found, start = [], 0
+    for function in problem.functions:
+        size = function.coefficients - 1
+        matrix = dense.monomial_matrix(function)
+        found.append(np.linalg.lstsq(matrix, monomials[start : start + size], rcond=None)[0])
+        start += size
+    return np.concatenate(found)
+
+
+def test_the_reference_does_not_depend_on_its_step() -> None:
+    """Complex steps against central differences of the whole residual vector."""
+    design = two_artefacts()
+    problem = dense.planned(design, 5, 5)
+    whole = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters) * SIGMA
+    for k in range(0, problem.parameters, 7):
+        step = np.zeros(problem.parameters)
+        step[k] = 1e-4
+        difference = dense.residuals(problem, step) - dense.residuals(problem, -step)
+        np.testing.assert_allclose(difference * SIGMA / 2e-4, whole[:, k], atol=1e-7)

@@ -1,0 +1,171 @@
+"""The non-linear estimate: exact data come back, in few iterations, from starting values of the readings alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simulator.design import Design, State
+from simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
+from simulator.estimation.initial import initial_state
+from simulator.generate import exact_readings, noisy_certificate, noisy_readings, scale_readings
+from simulator.geometry.motions import rotation_from_vector
+from simulator.machines.arrangement import ARRANGEMENTS
+from simulator.machines.kinematic import kinematic_model
+from tests.reference.designs import corner_sides, grid, plate_design, six_positions
+
+
+def truth_of(design: Design, seed: int = 3, errors: float = 1e-5) -> State:
+    """A machine with errors, a plate that is not as drawn, in poses that are not as drawn."""
+    generator = np.random.default_rng(seed)
+    poses = len(design.position_names)
+    turn = rotation_from_vector(1e-2 * generator.standard_normal((poses, 3)))
+    shift = 1e-3 * generator.standard_normal((poses, 3))
+    turn[design.held.all(axis=1)], shift[design.held.all(axis=1)] = np.eye(3), 0.0
+    return State(
+        design.balls + 1e-5 * generator.standard_normal(design.balls.shape),
+        turn @ design.rotations,
+        design.origins + shift,
+        errors * generator.standard_normal(len(design.model.parameters)),
+    )
+
+
+def exactly_calibrated(design: Design, truth: State) -> Design:
+    """The design with the certificate of the true plate."""
+    none = np.random.default_rng(0)
+    certified = noisy_certificate(
+        replace(
+            design,
+            distances=replace(design.distances, uncertainty=0 * design.distances.uncertainty),
+            coordinates=replace(design.coordinates, uncertainty=0 * design.coordinates.uncertainty),
+        ),
+        truth,
+        none,
+    )
+    return replace(
+        design,
+        distances=replace(design.distances, value=certified.distances.value),
+        coordinates=replace(design.coordinates, value=certified.coordinates.value),
+    )
+
+
+def design_with(calibration: str, full: bool = False) -> Design:
+    balls = grid(5)
+    built = plate_design(
+        balls,
+        six_positions(),
+        corner_sides(balls) if calibration == "distances" else (),
+        range(25) if calibration == "coordinates" else (),
+    )
+    return replace(built, model=kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1), full))
+
+
+@pytest.mark.parametrize("calibration", ["distances", "coordinates"])
+@pytest.mark.parametrize("full", [False, True])
+def test_exact_readings_give_the_truth_back(calibration: str, full: bool) -> None:
+    design = design_with(calibration, full)
+    truth = truth_of(design)
+    design = exactly_calibrated(design, truth)
+    readings, x = exact_readings(design, truth)
+    # No position reads all balls.
+    seen = readings.ball % 6 != readings.position
+    design, x = replace(design, readings=readings.select(seen)), x[seen]
+    solution = gauss_newton(design, x, initial_state(design, x))
+    assert solution.status == "converged"
+    assert len(solution.iterations) <= 5
+    steps = [iteration.step for iteration in solution.iterations[1:]]
+    assert steps[0] > 1e-5 and steps[1] < 1e-3 * steps[0] and steps[2] < 1e-3 * steps[1]
+    np.testing.assert_allclose(solution.state.a, truth.a, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(solution.state.balls, truth.balls, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(solution.state.rotations, truth.rotations, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(solution.state.origins, truth.origins, rtol=0, atol=1e-14)
+
+
+def test_starting_values_do_not_need_the_nominal_poses() -> None:
+    """Plates put down far from where they were meant to lie, and read in part only."""
+    design = design_with("distances")
+    truth = truth_of(design)
+    readings, x = exact_readings(design, replace(truth, a=0 * truth.a))
+    seen = readings.ball % 6 != readings.position
+    wrong = rotation_from_vector(np.tile([[0.3, -0.9, 1.1]], (6, 1))) @ design.rotations
+    wrong[0] = design.rotations[0]
+    design = replace(
+        design,
+        readings=readings.select(seen),
+        rotations=wrong,
+        origins=design.origins + [[0]] + 0.2 * (wrong[:, 0] != wrong[0, 0]),
+    )
+    start = initial_state(design, x[seen])
+    np.testing.assert_allclose(start.rotations, truth.rotations, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(start.balls, truth.balls, rtol=0, atol=1e-10)
+
+
+def test_positions_that_share_too_few_balls_are_joined_by_the_nominal_plate() -> None:
+    design = design_with("coordinates")
+    truth = replace(truth_of(design), balls=design.balls)
+    readings, x = exact_readings(design, replace(truth, a=0 * truth.a))
+    # Even balls in the first three positions, odd ones in the others: the two groups share none.
+    seen = readings.ball % 2 == readings.position // 3
+    design = replace(design, readings=readings.select(seen))
+    start = initial_state(design, x[seen])
+    np.testing.assert_allclose(start.rotations, truth.rotations, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(start.balls, truth.balls, rtol=0, atol=1e-10)
+
+
+def test_deficient_designs_leave_what_is_open_where_it_was() -> None:
+    balls = grid(4)
+    design = plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=7)
+    truth = truth_of(design)
+    design = exactly_calibrated(design, truth)
+    readings, x = exact_readings(design, truth)
+    solution = gauss_newton(replace(design, readings=readings), x, initial_state(design, x))
+    # Away from zero error the six directions are no longer open exactly, so that they may only be weak.
+    assert solution.factor.sum_of_squares < 1e-12 * solution.iterations[0].sum_of_squares
+    assert np.abs(solution.state.a).max() < 1e-2
+
+
+def test_too_few_iterations_are_a_status() -> None:
+    design = design_with("distances")
+    readings, x = exact_readings(design, truth_of(design))
+    design = replace(design, readings=readings)
+    solution = gauss_newton(design, x, initial_state(design, x), GaussNewtonSettings(iterations=1))
+    assert solution.status == "not converged"
+    assert len(solution.iterations) == 2
+
+
+def test_readings_are_exact_to_rounding() -> None:
+    design = design_with("distances", full=True)
+    truth = truth_of(design, errors=1e-3)
+    readings, x = exact_readings(design, truth)
+    p = design.probes[readings.probe]
+    back = x + design.model.error(x, truth.a, p)
+    true = np.einsum("mij,mj->mi", truth.rotations[readings.position], truth.balls[readings.ball])
+    np.testing.assert_allclose(back, true + truth.origins[readings.position], rtol=0, atol=5e-16)
+
+
+def test_noise_has_the_stated_size_and_seed() -> None:
+    design = replace(design_with("distances"), repeatability=np.array([1e-7, 2e-7, 4e-7]))
+    truth = truth_of(design)
+    _, exact = exact_readings(design, truth)
+    _, x = noisy_readings(design, truth, np.random.default_rng(8))
+    _, again = noisy_readings(design, truth, np.random.default_rng(8))
+    np.testing.assert_array_equal(x, again)
+    spread = (x - exact).std(axis=0) / design.repeatability
+    assert np.all(np.abs(spread - 1) < 4 / np.sqrt(2 * len(x)))
+
+
+def test_repeats_give_a_row_each() -> None:
+    design = design_with("distances")
+    design = replace(design, readings=replace(design.readings, repeats=np.full(len(design.readings), 3)))
+    readings, x = exact_readings(design, truth_of(design))
+    assert len(x) == len(readings) == 750 and set(readings.repeats) == {1}
+
+
+def test_impossible_errors_have_no_reading() -> None:
+    from simulator.generate import NoReadingError
+
+    model = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
+    with pytest.raises(NoReadingError):
+        scale_readings(model, np.full((1, 3), 0.7), np.full(69, 5.0), np.zeros((1, 3)))

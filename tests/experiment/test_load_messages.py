@@ -1,0 +1,395 @@
+"""Broken files, each a good one with something replaced, and exactly what is said about them."""
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from simulator.experiment import ExperimentError, Message, load
+
+GOOD = """\
+title: good
+machine:
+  volume: {x: [0 mm, 1 m], y: [0 mm, 1 m], z: [0 mm, 1 m]}
+  repeatability: 0.2 um
+error_model: {kind: kinematic}
+probes: {down: [0 mm, 0 mm, -50 mm]}
+artefacts:
+  plate: {kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}
+  bar: {kind: two_spheres, length: 500 mm, role: length_standard}
+positions:
+  - {name: low, artefact: plate, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}
+  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}
+calibration:
+  - {kind: distances, artefact: plate, pairs: corner sides, standard_uncertainty: 0.2 um}
+  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.2 um}
+evaluation: {points: [[0 mm, 0 mm, 0 mm]]}
+"""
+PLANE = """\
+title: plane
+machine: {volume: [1 m, 1 m], repeatability: 0.2 um}
+error_model: {kind: metric}
+artefacts: {plate: {kind: square, balls: 3, size: 500 mm}}
+positions: [{name: low, corner: {x: 0 mm, y: 0 mm}}]
+"""
+LOW = "plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\n  - {name: bar"
+SIDES = "pairs: corner sides, standard_uncertainty: 0.2 um"
+
+# What is replaced, by what, and the lines of the messages without the name of the file.
+SECTIONS = [
+    ("title: good", "titel: good", [
+        '1:1: titel: unknown key; did you mean "title"?',
+        '1:1: title: missing; add "title" (what the experiment is, in a line)',
+    ]),
+    ("title: good", "title: 2024", [
+        "1:8: title: expected a text, found the number 2024; put it in quotes (what the experiment "
+        "is, in a line)"]),
+    ("title: good", "title:", ["1:7: title: empty; give a value, or leave it out"]),
+    ("title: good", 'title: ""', ["1:8: title: empty; give a text"]),
+    ("title: good", "title: a\ndescription:", ["2:13: description: empty; give a value, or leave it out"]),
+    ("title: good", "title: a\nsigma: guessed", [
+        '2:8: sigma: unknown value "guessed"; allowed: estimated, given']),
+    ("title: good", "title: a\nsigma: estimate", [
+        '2:8: sigma: unknown value "estimate"; did you mean "estimated"? allowed: estimated, given']),
+    ("title: good", "title: a\nexpected_rank_deficiency: -1", [
+        "2:27: expected_rank_deficiency: the number -1 is out of range; give one at least 0"]),
+    ("title: good", "title: a\nseed: 1.5", [
+        "2:7: seed: expected a whole number, found the number 1.5 (seed of simulated readings; default 1)"]),
+    ("title: good", "title: a\ntarget_accuracy: L/5", [
+        '2:18: target_accuracy: "L/5" is not a length that grows with L; write for example "0.5 um + '
+        'L/1000000"']),
+    ("title: good", "title: a\ntitle: b", [
+        '2:1: the key "title" stands already in line 1; remove one of the two']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinetic}", [
+        '5:21: error_model.kind: unknown kind "kinetic"; did you mean "kinematic"?']),
+    ("error_model: {kind: kinematic}", "error_model: {}", [
+        '5:14: error_model.kind: missing; add "kind", one of: kinematic, metric']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: metric}", [
+        '5:21: error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; change '
+        'one of the two']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, arrangement: MB9}", [
+        '5:45: error_model.arrangement: unknown value "MB9"; did you mean "MB2"? '
+        "allowed: MB1, MB2, FB1, FB2, FH1, FH2, MH1, MH2, CX1, CY1"]),
+    ("error_model: {kind: kinematic}",
+     "error_model: {kind: kinematic, arrangement: {probe_side: [x, w], workpiece_side: []}}", [
+        '5:62: error_model.arrangement.probe_side[1]: unknown value "w"; allowed: x, y, z']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: zero", [
+        "6:15: true_machine: expected a mapping, key: value, found the text \"zero\" "
+        "(the errors that simulated readings have; default zero)"]),
+]  # fmt: skip
+MACHINE = [
+    ("z: [0 mm, 1 m]}", "w: [0 mm, 1 m]}", ['3:44: machine.volume.w: unknown key; known: z']),
+    ("z: [0 mm, 1 m]}", "z: [0 mm, 1000]}", [
+        '3:54: machine.volume.z[1]: "1000" has no unit; write for example "1000 mm"']),
+    ("z: [0 mm, 1 m]}", "z: [1 m]}", [
+        "3:47: machine.volume.z: has 1 entry; 2 are needed (lower and upper end of the z axis; "
+        "omitted in 2-D)"]),
+    ("z: [0 mm, 1 m]}", "z: [1 m, 0 mm]}", [
+        "3:47: machine.volume.z: ends at 0 mm, not above its beginning, 1000 mm; exchange or correct them"]),
+    ("repeatability: 0.2 um", "repeatability: 0 um", [
+        '4:18: machine.repeatability: "0 um" must be above zero; give a small one, such as 1 nm']),
+    ("repeatability: 0.2 um", "repeatability: [1 um, 1 um]", [
+        "4:18: machine.repeatability: has 2 axes, but machine.volume has 3; give one length for all, or 3"]),
+    ("repeatability: 0.2 um", "colour: red", [
+        '2:1: machine.repeatability: missing; add "repeatability" '
+        "(standard uncertainty of a reading: for every co-ordinate, or one per axis)",
+        '4:3: machine.colour: unknown key; known: repeatability',
+    ]),
+    ("probes: {down: [0 mm, 0 mm, -50 mm]}\n", "", [
+        '1:1: probes: missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: '
+        "offsets from the reference point"]),
+    ("[0 mm, 0 mm, -50 mm]", "[0 mm, 0 mm]", [
+        "6:16: probes.down: has 2 co-ordinates, but the experiment has 3 dimensions; give 3"]),
+    ("{points: [[0 mm, 0 mm, 0 mm]]}", "{points: [[0 mm, 0 mm, 0 mm], [0 mm, 1.5 m, 0 mm]]}", [
+        "16:43: evaluation.points[1]: y = 1500 mm is 500 mm above the measuring volume; move the "
+        "point inside"]),
+    ("{points: [[0 mm, 0 mm, 0 mm]]}", "{points: [[0 mm, 0 mm]], probe: up}", [
+        "16:23: evaluation.points[0]: has 2 co-ordinates, but the experiment has 3 dimensions; give 3",
+        '16:45: evaluation.probe: unknown probe "up"; known: down',
+    ]),
+    ("{points: [[0 mm, 0 mm, 0 mm]]}", "{points: {seed: 1}}", [
+        '16:22: evaluation.points: needs either "random" or "file"; write for example '
+        '{random: 200, seed: 1}']),
+]  # fmt: skip
+ARTEFACTS = [
+    ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
+    ("kind: grid, ", "", [
+        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres']),
+    ("balls: [3, 3]", "balls: [3]", [
+        "8:30: artefacts.plate.balls: has 1 entry; 2 are needed (number of columns, number of rows)"]),
+    ("balls: [3, 3]", "balls: [3, 1]", [
+        "8:34: artefacts.plate.balls[1]: the number 1 is out of range; give one at least 2"]),
+    ("balls: [3, 3]", "balls: [300, 300]", [
+        "8:10: artefacts.plate: 90000 balls are too many; at most 40000 are possible"]),
+    ("role: length_standard", "rol: length_standard", [
+        '9:44: artefacts.bar.rol: unknown key; did you mean "role"?']),
+    ("role: length_standard", "role: standard", [
+        '9:50: artefacts.bar.role: unknown value "standard"; did you mean "length_standard"? '
+        "allowed: plate, length_standard"]),
+    ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls", [
+        '8:10: artefacts.plate: needs either "coordinates" or "file"; give exactly one of them']),
+    ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls, coordinates: [[1 mm], 5]", [
+        "8:38: artefacts.plate.coordinates[0]: has 1 entry; 2 or 3 are needed",
+        "8:46: artefacts.plate.coordinates[1]: expected a list in brackets, found the number 5",
+    ]),
+    ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]",
+     "kind: balls, coordinates: {a: [1 mm, 1 mm], b: [1 mm, 1 mm]}", [
+        '8:37: artefacts.plate.coordinates: balls "a" and "b" are at the same place; correct one of them']),
+    ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls, file: none.csv", [
+        "8:30: artefacts.plate.file: none.csv: there is no such file; check the name and the folder"]),
+    ("positions:", "  idle: {kind: two_spheres, length: 500 mm}\npositions:", [
+        "10:3: artefacts.idle: is never placed; add a position of it, or remove it"]),
+    ("  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.2 um}\n", "", [
+        "9:3: artefacts.bar: is a length standard without calibrated distances; "
+        "add a calibration of kind: distances"]),
+]  # fmt: skip
+POSITIONS = [
+    ("artefact: plate, plane", "artefact: plat, plane", [
+        '11:27: positions[0].artefact: unknown artefact "plat"; did you mean "plate"?']),
+    ("artefact: plate, plane", "plane", [
+        '11:5: positions[0].artefact: missing; add "artefact", one of: plate, bar']),
+    ("name: bar", "name: low", [
+        '12:12: positions[1].name: "low" is the name of positions[0] already; names of positions '
+        'must differ']),
+    (LOW, LOW.replace("plane: z", "plane: w"), [
+        '11:41: positions[0].plane: unknown value "w"; allowed: x, y, z']),
+    (LOW, LOW.replace("plane: z", "plane: x"), [
+        '11:65: positions[0].corner.z: missing; add "z"',
+        "11:66: positions[0].corner.x: is not an axis of the plane; give y and z",
+    ]),
+    (LOW, LOW.replace("plane: z, ", ""), ['11:5: positions[0].plane: missing; add "plane", x, y or z']),
+    (LOW, LOW.replace("level: 0 mm, ", ""), [
+        '11:5: positions[0].level: missing; add "level", the co-ordinate of the plane']),
+    (LOW, LOW.replace("corner: {x: 0 mm, y: 0 mm}", "quarter_turns: 1"), [
+        '11:5: positions[0].corner: missing; add "corner" or "centre"']),
+    (LOW, LOW.replace("corner:", "centre: {x: 1 m, y: 1 m}, corner:"), [
+        '11:57: positions[0].centre: does not go with "corner"; remove one of the two']),
+    (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}", "repeats: 2"), [
+        "11:5: positions[0]: says nothing of where the artefact is; "
+        "add plane, level and corner or centre, or pose"]),
+    (LOW, LOW.replace("plane: z, level: 0 mm, corner:", "pose: {origin: [0 m, 0 m, 0 m]}, corner:"), [
+        '11:67: positions[0].corner: does not go with "pose"; remove one of the two']),
+    (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}",
+                      "pose: {origin: [0 m, 0 m], rotation: 90 deg}"), [
+        "11:49: positions[0].pose.origin: has 2 co-ordinates, but the experiment has 3 dimensions; give 3",
+        "11:71: positions[0].pose.rotation: a three-dimensional experiment has three angles; "
+        "write for example [0 deg, 0 deg, 90 deg]",
+    ]),
+    (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, probes: [up, down, down]}", 1), [
+        '11:94: positions[0].probes[0]: unknown probe "up"; known: down',
+        '11:104: positions[0].probes[2]: probe "down" is listed twice; remove one of the two',
+    ]),
+    (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, balls: [r1c1, r1c9]}", 1), [
+        '11:99: positions[0].balls[1]: unknown ball "r1c9"; did you mean "r1c3"?']),
+    (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, balls: [r1c1]}", 1), [
+        "8:3: artefacts.plate: no position reads balls r1c2, r1c3, r2c1, r2c2, r2c3, r3c1, r3c2, r3c3; "
+        "read them, or leave them out of the artefact"]),
+    (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, repeats: 2, readings: [{balls: [r1c7]}]}", 1), [
+        '11:85: positions[0].repeats: does not go with "readings"; move it there, or remove "readings"',
+        '11:117: positions[0].readings[0].balls[0]: unknown ball "r1c7"; did you mean "r1c3"?',
+    ]),
+    (LOW, LOW.replace("x: 0 mm", "x: 600 mm"), [
+        '11:5: positions[0]: ball "r1c3" is at x = 1100 mm, 100 mm above the measuring volume, '
+        "and 2 more balls; move the artefact, or read fewer balls"]),
+    (LOW, LOW.replace("level: 0 mm", "level: -2 nm"), [
+        '11:5: positions[0]: ball "r1c1" is at z = -2 nm, 2 nm below the measuring volume, '
+        "and 8 more balls; move the artefact, or read fewer balls"]),
+    ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
+        '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',
+        '12:16: positions[1].artefact: unknown artefact "baar"; did you mean "bar"?',
+        '12:39: positions[1].level: "0" has no unit; write for example "0 mm"',
+    ]),
+    ("artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}",
+     "artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}, balls: [1]}", [
+        "15:45: calibration[1].pairs: no position reads ball 2; read them, or leave them out"]),
+]  # fmt: skip
+CALIBRATION = [
+    (SIDES, "pairs: corner, standard_uncertainty: 0 um", [
+        '14:47: calibration[0].pairs: unknown value "corner"; did you mean "corners"? '
+        "allowed: corner sides, corner diagonals, corners, neighbours, all",
+        '14:77: calibration[0].standard_uncertainty: "0 um" must be above zero; give a small one, '
+        'such as 1 nm',
+    ]),
+    (SIDES, SIDES.replace("corner sides", "[[r1c1, r1c9], [r1c1, r1c1], [r1c1, r1c2], [r1c2, r1c1]]"), [
+        '14:55: calibration[0].pairs[0][1]: unknown ball "r1c9"; did you mean "r1c3"?',
+        '14:62: calibration[0].pairs[1]: a ball has no distance from itself; name two balls, not '
+        '"r1c1" twice',
+        "14:90: calibration[0].pairs[3]: stands already in entry [2]; remove one of the two",
+    ]),
+    (SIDES, f"{SIDES}, form: projection, dimensions: 4", [
+        "14:121: calibration[0].dimensions: expected one of: 2, 3; found the number 4"]),
+    (SIDES, f"{SIDES}, form: projection", [
+        "14:91: calibration[0].form: is only for artefacts with role: length_standard; "
+        'remove it, or give "plate" that role']),
+    (SIDES, f"{SIDES}, values: [{{balls: [r1c1, r1c3], distance: 500 mm}}]", [
+        "14:99: calibration[0].values: no distance for r3c1–r3c3, r1c1–r3c1, r1c3–r3c3; "
+        "add it, or leave it out of pairs"]),
+    ("pairs: all", "pairs: corner diagonals", [
+        '15:45: calibration[1].pairs: "corner diagonals" is not defined for this artefact; '
+        "choose from: corner sides, neighbours, all, or list pairs of balls"]),
+    ("kind: distances, artefact: bar, pairs: all", "kind: coordinates, artefact: bar", [
+        "15:12: calibration[1].kind: a length standard carries distances only; use kind: distances, "
+        "or remove its role: length_standard"]),
+    ("kind: distances, artefact: plate, pairs: corner sides", "kind: distance", [
+        '14:12: calibration[0].kind: unknown kind "distance"; did you mean "distances"?']),
+    ("kind: distances, artefact: plate, " + SIDES,
+     "kind: coordinates, artefact: plate, standard_uncertainty: {}", [
+        "14:64: calibration[0].standard_uncertainty: calibrates no axis; give at least one, such as "
+        "{x: 0.2 um}"]),
+    ("kind: distances, artefact: plate, pairs: corner sides",
+     "kind: coordinates, artefact: plate, balls: [r1c1, r9c9], dimensions: 3", [
+        "14:63: calibration[0].dimensions: unknown key; known: values"]),
+]  # fmt: skip
+PLANE_CASES = [
+    ("corner: {x: 0 mm, y: 0 mm}", "plane: z, corner: {x: 0 mm, y: 0 mm}", [
+        "5:25: positions[0].plane: has no meaning in two dimensions; remove it"]),
+    ("corner: {x: 0 mm, y: 0 mm}", "pose: {origin: [0 m, 0 m], rotation: [0 deg, 0 deg, 0 deg]}", [
+        "5:62: positions[0].pose.rotation: a two-dimensional experiment has one angle; write for "
+        "example 90 deg"]),
+    ("kind: square, balls: 3, size: 500 mm", "kind: balls, coordinates: [[0 m, 0 m, 1 mm]]", [
+        '4:47: artefacts.plate.coordinates: ball "1" has the third co-ordinate 1 mm, but the experiment is '
+        "two-dimensional; give two co-ordinates, or machine.volume a z axis"]),
+    ("positions:", "calibration: [{kind: coordinates, standard_uncertainty: {z: 1 um}}]\npositions:", [
+        "5:61: calibration[0].standard_uncertainty.z: has no meaning in two dimensions; remove it"]),
+    ("positions:",
+     "calibration: [{kind: distances, pairs: all, standard_uncertainty: 1 um, dimensions: 3}]\npositions:", [
+        "5:85: calibration[0].dimensions: a two-dimensional experiment has distances in 2 "
+        "dimensions; remove it"]),
+]  # fmt: skip
+
+
+def refusals(folder: Path, text: str) -> list[str]:
+    path = folder / "e.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ExperimentError) as caught:
+        load(path)
+    return str(caught.value).replace(f"{folder}/", "").split("\n")
+
+
+def test_the_good_files_are_good(tmp_path: Path) -> None:
+    for text in (GOOD, PLANE):
+        (tmp_path / "e.yaml").write_text(text)
+        assert len(load(tmp_path / "e.yaml")) == 1
+
+
+@pytest.mark.parametrize(("old", "new", "lines"), SECTIONS + MACHINE + ARTEFACTS + POSITIONS + CALIBRATION)
+def test_broken_files(tmp_path: Path, old: str, new: str, lines: list[str]) -> None:
+    assert GOOD.count(old) >= 1
+    assert refusals(tmp_path, GOOD.replace(old, new, 1)) == [f"e.yaml:{line}" for line in lines]
+
+
+@pytest.mark.parametrize(("old", "new", "lines"), PLANE_CASES)
+def test_broken_plane_files(tmp_path: Path, old: str, new: str, lines: list[str]) -> None:
+    assert refusals(tmp_path, PLANE.replace(old, new, 1)) == [f"e.yaml:{line}" for line in lines]
+
+
+def test_errors_of_all_sections_at_once_by_line(tmp_path: Path) -> None:
+    text = GOOD.replace("0.2 um", "0.2", 1).replace("kind: grid", "kind: gird").replace("plane: z", "plane: w", 1)
+    text = text.replace("pairs: all", "pairs: al").replace("artefact: bar, plane", "artefact: baz, plane")
+    lines = refusals(tmp_path, text)
+    assert [line.split(": ")[1] for line in lines] == [
+        "machine.repeatability",
+        "artefacts.plate.kind",
+        "positions[0].plane",
+        "positions[1].artefact",
+        "calibration[1].pairs",
+    ]
+
+
+def test_tables_are_reported_at_their_own_lines(tmp_path: Path) -> None:
+    (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,five\nr1c1,r9c9,-1\n")
+    text = GOOD.replace(SIDES, f"{SIDES}, values: d.csv").replace("title: good", "title: 1")
+    assert refusals(tmp_path, text) == [
+        "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (what the experiment is, in a line)",
+        'd.csv:2:11: "five" is not a number; write for example "500.0003"',
+    ]
+    (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,5\nr1c1,r9c9,-1\nr1c3,r1c1,5\n")
+    assert refusals(tmp_path, text)[1:] == [
+        "d.csv:3:1: calibration[0].values: a distance must be above zero; correct it",
+        'd.csv:3:1: calibration[0].values: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, '
+        "r3c1, r3c2 and 1 more",
+        'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice; remove one of the two',
+    ]
+
+
+def test_a_certificate_lacks_balls(tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("ball,x_mm,y_mm,z_mm\nr1c1,0,0,0\nr1c3,500,0,0\n")
+    old = "kind: distances, artefact: plate, " + SIDES
+    new = "kind: coordinates, artefact: plate, balls: corners, standard_uncertainty: 1 um, values: c.csv"
+    assert refusals(tmp_path, GOOD.replace(old, new)) == [
+        "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or leave them out of balls"
+    ]
+
+
+def test_points_of_a_table_outside_the_volume(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("x_mm,y_mm,z_mm\n1,1,1\n1,-1,1\n1,1,2000\n")
+    assert refusals(tmp_path, GOOD.replace("[[0 mm, 0 mm, 0 mm]]", "{file: p.csv}")) == [
+        "p.csv:3:1: evaluation.points.file: y = -1 mm is 1 mm below the measuring volume, "
+        "as 1 further points are; move the point inside"
+    ]
+
+
+@pytest.mark.parametrize("text", ["5", "- a\n- b\n", "text"])
+def test_files_that_are_no_mapping(tmp_path: Path, text: str) -> None:
+    (line,) = refusals(tmp_path, text)
+    assert line.startswith("e.yaml:1:1: expected a mapping that begins with title: …, found ")
+
+
+def test_messages_are_data() -> None:
+    message = Message("e.yaml", 3, 5, "machine", "wrong; do right")
+    error = ExperimentError([message, Message("e.yaml", 0, 0, "", "gone; look for it")])
+    assert str(error) == "e.yaml:3:5: machine: wrong; do right\ne.yaml: gone; look for it"
+    assert error.messages[0] == message
+
+
+FRAGMENTS = ["5", "x", "[]", "{}", "[[1 mm]]", "{x: 1 mm}", "~", "true", "-1 mm", ".nan", "[a, {b: 1}]",
+             "{kind: grid}",
+             "{kind: balls}", "{kind: [1]}", "0 mm"]  # fmt: skip
+WORDS = sorted({word for word in GOOD.replace("{", " ").replace("}", " ").split() if word.endswith(",")})
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
+@given(st.data())
+def test_no_mistake_breaks_the_loader(tmp_path: Path, data: st.DataObject) -> None:
+    text = GOOD
+    for _ in range(data.draw(st.integers(1, 3))):
+        word = data.draw(st.sampled_from(WORDS))
+        text = text.replace(word, data.draw(st.sampled_from(FRAGMENTS)) + ",", 1)
+    (tmp_path / "e.yaml").write_text(text)
+    try:
+        load(tmp_path / "e.yaml")
+    except ExperimentError as error:
+        assert all(message.line >= 1 and message.text for message in error.messages)
+        assert "<one>" not in str(error) and "<list>" not in str(error)
+
+
+SECTION_VALUES = st.recursive(
+    st.one_of(
+        st.none(),
+        st.booleans(),
+        st.integers(-3, 9),
+        st.sampled_from(["all", "1 mm", "r1c1", "plate", "grid"]),
+    ),
+    lambda below: st.one_of(
+        st.lists(below, max_size=3),
+        st.dictionaries(st.sampled_from(["kind", "x", "balls", "name", "artefact", "pairs"]), below, max_size=3),
+    ),
+    max_leaves=8,
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
+@given(st.sampled_from([line.split(":")[0] for line in GOOD.split("\n") if line[:1].isalpha()]), SECTION_VALUES)
+def test_no_section_breaks_the_loader(tmp_path: Path, section: str, value: object) -> None:
+    lines, kept = GOOD.split("\n"), []
+    inside = False
+    for line in lines:
+        inside = line.startswith(f"{section}:") or (inside and line.startswith(" "))
+        kept += [] if inside else [line]
+    (tmp_path / "e.yaml").write_text("\n".join([*kept, f"{section}: {json.dumps(value)}", ""]))
+    try:
+        load(tmp_path / "e.yaml")
+    except ExperimentError as error:
+        assert error.messages

@@ -1,0 +1,118 @@
+"""Variants: overrides by path, and messages at the variant's own line."""
+
+from pathlib import Path
+
+import pytest
+
+from simulator.experiment import Experiment, ExperimentError, load
+
+BASE = """\
+title: base
+machine: {volume: [1 m, 1 m, 1 m], repeatability: 1 um}
+error_model: {kind: kinematic}
+probes: {down: [0 mm, 0 mm, 0 mm]}
+artefacts: {plate: {kind: grid, balls: [2, 2], size: [500 mm, 500 mm]}}
+positions:
+  - {name: low, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}
+  - {name: high one, plane: z, level: 1 m, corner: {x: 0 mm, y: 0 mm}}
+"""
+
+
+def loaded(folder: Path, text: str) -> tuple[Experiment, ...]:
+    path = folder / "e.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load(path)
+
+
+def refusals(folder: Path, text: str) -> list[str]:
+    with pytest.raises(ExperimentError) as caught:
+        loaded(folder, text)
+    return str(caught.value).replace(f"{folder}/", "").split("\n")
+
+
+def test_one_experiment_per_variant(tmp_path: Path) -> None:
+    first, second, third = loaded(
+        tmp_path,
+        BASE
+        + """\
+variants:
+  A: {}
+  B:
+    title: other
+    calibration: [{kind: distances, pairs: all, standard_uncertainty: 1 um}]
+    positions[1].quarter_turns: 1
+    positions[high one].level: 900 mm
+  3:
+    error_model.position_coefficients: 3
+    artefacts.plate.size: [600 mm, 600 mm]
+    positions[0]: {name: new, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}
+""",
+    )
+    assert [one.label for one in (first, second, third)] == ["e[A]", "e[B]", "e[3]"]
+    assert [one.name for one in (first, second, third)] == ["A", "B", "3"]
+    assert (first.title, second.title) == ("base", "other")
+    assert (len(first.calibration), len(second.calibration)) == (0, 1)
+    assert second.positions[1].pose.origin[2] == 0.9
+    assert second.positions[1].pose.rotation[0, 0] == 0.0
+    assert first.positions[1].pose.rotation[0, 0] == 1.0
+    assert third.error_model.position_coefficients == 3
+    assert third.layouts["plate"].coordinates[-1, 0] == 0.6
+    assert third.positions[0].name == "new"
+
+
+def test_the_base_need_not_be_complete(tmp_path: Path) -> None:
+    text = BASE.replace("error_model: {kind: kinematic}\n", "")
+    (only,) = loaded(tmp_path, text + "variants: {A: {error_model: {kind: kinematic}}}\n")
+    assert only.error_model.kind == "kinematic"
+    lines = refusals(tmp_path, text + "variants: {A: {error_model: {kind: kinematic}}, B: {}}\n")
+    about = "the errors of the machine that are estimated"
+    assert lines == [f'e.yaml:1:1: error_model: missing; add "error_model" ({about}) (in variant B)']
+
+
+def test_messages_stand_at_the_line_of_the_variant(tmp_path: Path) -> None:
+    text = BASE + "variants:\n  A: {}\n  B:\n    positions[low].level: 5\n    seed: x\n"
+    assert refusals(tmp_path, text) == [
+        'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" (in variant B)',
+        'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
+        "readings; default 1) "
+        "(in variant B)",
+    ]
+
+
+def test_a_message_about_the_base_comes_once(tmp_path: Path) -> None:
+    text = BASE.replace("1 um", "1 mu") + "variants: {A: {}, B: {}}\n"
+    (line,) = refusals(tmp_path, text)
+    assert line.startswith('e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"')
+    assert "variant" not in line
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("positions[q].level", 'there is no "q" in positions; known: low, high one'),
+        ("positions[hihg one].level", 'there is no "hihg one" in positions; did you mean "high one"?'),
+        ("positions[2]", "there is no positions[2]; the indices are 0 to 1"),
+        ("artefacts.plat.size", 'there is no artefacts.plat; did you mean "plate"?'),
+        ("calibration[0].pairs", 'there is no calibration; known: title, machine, error_model, '
+        'probes, artefacts, '
+         "positions"),
+        ("tilte", '"tilte" cannot be replaced in a variant; did you mean "title"?'),
+        ("title.x", 'title is the text "base" and has nothing below it; replace it as a whole'),
+        ("machine..volume", '"machine..volume" is not a path; write for example positions[1].level or '
+         "artefacts.plate.size"),
+        ("positions[0", '"positions[0" is not a path; write for example positions[1].level or '
+         "artefacts.plate.size"),
+    ],
+)  # fmt: skip
+def test_paths_that_lead_nowhere(tmp_path: Path, path: str, text: str) -> None:
+    (line,) = refusals(tmp_path, BASE + f"variants:\n  A:\n    {path}: 1\n")
+    assert line.startswith("e.yaml:11:5: variants.A") and line.endswith(f": {text}")
+
+
+def test_variants_that_are_none(tmp_path: Path) -> None:
+    assert refusals(tmp_path, BASE + "variants: 5\n") == [
+        "e.yaml:9:11: variants: expected a mapping, name: {path: new value}, found the number 5"
+    ]
+    assert refusals(tmp_path, BASE + "variants: {A: 5}\n") == [
+        "e.yaml:9:15: variants.A: expected a mapping, path: new value, found the number 5"
+    ]

@@ -1,0 +1,174 @@
+"""Quantities: exact values, messages, round trips."""
+
+import json
+import math
+import re
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
+
+from simulator.quantities import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    RATIO_UNITS,
+    Length,
+    LengthFunction,
+    QuantityError,
+    Ratio,
+    exact_number,
+    format_length,
+    parse_angle,
+    parse_length,
+    parse_length_function,
+    parse_positive_length,
+    parse_ratio,
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "metres"),
+    [
+        ("750 mm", 0.75),
+        ("0.2 um", 2e-7),
+        ("0.2 µm", 2e-7),
+        ("0.2 μm", 2e-7),
+        ("1 m", 1.0),
+        ("12.5 in", 0.3175),
+        ("3 nm", 3e-9),
+        ("-.5e1mm", -0.005),
+        (" 7.  cm ", 0.07),
+    ],
+)
+def test_lengths_are_the_nearest_floats(text: str, metres: float) -> None:
+    assert parse_length(text) == metres
+
+
+def test_angles_and_ratios() -> None:
+    assert parse_angle("90 deg") == math.pi / 2
+    assert parse_angle("180 deg") == math.pi
+    assert parse_angle("5 urad") == 5e-6
+    assert parse_angle("1e-6 rad") == 1e-6
+    assert parse_angle("2 arcsec") == pytest.approx(2 * math.pi / 648000, rel=1e-15)
+    assert parse_angle("60 arcmin") == parse_angle("1 deg")
+    assert parse_ratio("5 ppm") == 5e-6
+    assert parse_ratio("0.1 %") == 1e-3
+    assert parse_ratio("1.2 um/m") == 1.2e-6
+
+
+@given(
+    st.decimals(allow_nan=False, allow_infinity=False, min_value=-(10**9), max_value=10**9),
+    st.sampled_from(sorted(LENGTH_UNITS)),
+)
+def test_any_length_is_rounded_once(number: object, unit: str) -> None:
+    if re.search(r"[eE][+-]?\d{4,}", str(number)):
+        return
+    assert parse_length(f"{number} {unit}") == float(Fraction(str(number)) * LENGTH_UNITS[unit])
+
+
+@given(st.floats(-1e3, 1e3).filter(lambda length: length == 0 or abs(length) > 1e-200))
+def test_formatted_lengths_are_read_again(length: float) -> None:
+    assert parse_length(format_length(length)) == pytest.approx(length, rel=1e-8, abs=1e-18)
+
+
+@given(st.floats(1e-9, 1e-3), st.floats(1e-3, 1e9))
+def test_length_functions_are_read_again(constant: float, divisor: float) -> None:
+    function = parse_length_function(f"{constant!r} m + L/{divisor!r}")
+    assert function == LengthFunction(constant, float(1 / Fraction(repr(divisor))))
+
+
+@given(st.text(max_size=30))
+def test_no_text_breaks_the_parsers(text: str) -> None:
+    for parse in (parse_length, parse_angle, parse_ratio, parse_positive_length, parse_length_function):
+        try:
+            parse(text)
+        except QuantityError as error:
+            assert str(error)
+
+
+def test_length_function_at_lengths() -> None:
+    function = parse_length_function("0.5 um + L/1e+6")
+    np.testing.assert_allclose(function.at([[0.0], [2.0]]), [[0.5e-6], [2.5e-6]], rtol=1e-15)
+    assert parse_length_function("1e+1 um + L / 1000000").constant == 1e-5
+    assert parse_length_function("0.3 um") == LengthFunction(3e-7, 0.0)
+    assert parse_length_function("0 um + L/1000").at(1.0) == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("750", '"750" has no unit; write for example "750 mm"'),
+        (750, '"750" has no unit; write for example "750 mm"'),
+        (1e-6, '"1e-06" has no unit; write for example "1e-06 mm"'),
+        ("750 mn", '"750 mn" has the unknown unit "mn"; did you mean "m'),
+        ("1 MM", '"1 MM" has the unknown unit "MM"; did you mean "mm"?'),
+        ("1 parsecs", '"1 parsecs" has the unknown unit "parsecs"; known: m, dm, cm, mm, um, nm, pm, in'),
+        ("5 deg", '"5 deg" is an angle; a length is expected, for example "750 mm"'),
+        ("0,2 mm", '"0,2 mm" has a decimal comma; write a decimal point, for example "0.2 mm"'),
+        ("long", '"long" is not a length; write for example "750 mm"'),
+        ("nan mm", '"nan mm" is not a length; write for example "750 mm"'),
+        (float("nan"), 'nan is not a finite length; write for example "750 mm"'),
+        (float("-inf"), '-inf is not a finite length; write for example "750 mm"'),
+        ("1e999 mm", '"1e999" is beyond what can be computed with; write a number of usual size'),
+        (True, 'expected a length, found true; write for example "750 mm"'),
+        (None, 'expected a length, found nothing; write for example "750 mm"'),
+    ],
+)
+def test_messages_of_lengths(value: object, message: str) -> None:
+    with pytest.raises(QuantityError) as caught:
+        parse_length(value)
+    assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("0 um", '"0 um" must be above zero; give a small one, such as 1 nm'),
+        ("-1 um", '"-1 um" must be above zero; write for example "0.2 um"'),
+        ("L/1000", '"L/1000" is not a length that grows with L; write for example "0.5 um + L/1000000"'),
+        (
+            "-1 um + L/1000",
+            '"-1 um + L/1000" has a negative part or divides by zero; write for example "0.5 um + L/1000000"',
+        ),
+        (
+            "1 um + L/0",
+            '"1 um + L/0" has a negative part or divides by zero; write for example "0.5 um + L/1000000"',
+        ),
+        ("0.5 + L/1000", '"0.5" has no unit; write for example "0.5 mm"'),
+    ],
+)
+def test_messages_of_length_functions(value: object, message: str) -> None:
+    with pytest.raises(QuantityError) as caught:
+        parse_length_function(value)
+    assert str(caught.value) == message
+
+
+def test_ratio_needs_a_unit() -> None:
+    with pytest.raises(QuantityError, match='"5e-6" has no unit; write for example "5e-6 ppm"'):
+        parse_ratio("5e-6")
+
+
+def test_exact_number_refuses_other_texts() -> None:
+    assert exact_number("500.0003") == Fraction(5000003, 10000)
+    for text in ("", "1_000", "0x10", "inf", "1 2", "9" * 1000):
+        with pytest.raises(QuantityError):
+            exact_number(text)
+
+
+@pytest.mark.parametrize("quantity", [Length, Ratio, LengthFunction])
+def test_json_schema_agrees_with_the_parser(quantity: Any) -> None:
+    schema = TypeAdapter(quantity).json_schema()
+    assert json.dumps(schema) and schema["type"] == "string"
+    for example in schema["examples"]:
+        assert re.search(schema["pattern"], example)
+        TypeAdapter(quantity).validate_python(example)
+    assert not re.search(schema["pattern"], "750")
+
+
+def test_units_do_not_overlap() -> None:
+    names = [*LENGTH_UNITS, *ANGLE_UNITS, *RATIO_UNITS]
+    assert len(names) == len(set(names))

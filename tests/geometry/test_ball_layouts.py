@@ -1,0 +1,99 @@
+"""Artefacts: ball names, co-ordinates, pair sets, corners."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
+
+from simulator.geometry.artefacts import (
+    ARTEFACTS,
+    AnyArtefactSettings,
+    BallLayout,
+    coincident_balls,
+    corners,
+    pairs,
+)
+
+adapter: TypeAdapter[AnyArtefactSettings] = TypeAdapter(AnyArtefactSettings)
+
+
+def layout(**settings: object) -> BallLayout:
+    return adapter.validate_python(settings).layout()
+
+
+def named(balls: BallLayout, set_name: str) -> set[tuple[str, str]]:
+    return {(balls.names[i], balls.names[j]) for i, j in pairs(balls, set_name)}
+
+
+GRID = layout(kind="grid", balls=(3, 2), size=("750 mm", "100 mm"))
+
+
+def test_grid_row_by_row_from_the_lower_corner() -> None:
+    assert GRID.names == ("r1c1", "r1c2", "r1c3", "r2c1", "r2c2", "r2c3")
+    np.testing.assert_array_equal(GRID.coordinates[4], [0.375, 0.1, 0.0])
+    np.testing.assert_array_equal(GRID.coordinates[-1], [0.75, 0.1, 0.0])
+    assert not GRID.coordinates.flags.writeable
+
+
+def test_pair_sets_of_a_grid() -> None:
+    sides = {("r1c1", "r1c3"), ("r2c1", "r2c3"), ("r1c1", "r2c1"), ("r1c3", "r2c3")}
+    diagonals = {("r1c1", "r2c3"), ("r1c3", "r2c1")}
+    assert named(GRID, "corner sides") == sides
+    assert named(GRID, "corner diagonals") == diagonals
+    assert named(GRID, "corners") == sides | diagonals
+    assert len(pairs(GRID, "neighbours")) == 7
+    assert ("r1c2", "r2c2") in named(GRID, "neighbours")
+    assert len(pairs(GRID, "all")) == 15
+    assert [GRID.names[i] for i in corners(GRID)] == ["r1c1", "r1c3", "r2c1", "r2c3"]
+
+
+def test_neighbours_of_seven_by_seven() -> None:
+    assert len(pairs(layout(kind="grid", balls=(7, 7), size=("1 m", "1 m")), "neighbours")) == 84
+
+
+@given(st.integers(2, 30))
+def test_square_has_only_its_outline(per_side: int) -> None:
+    square = layout(kind="square", balls=per_side, size="500 mm")
+    assert len(square.names) == 4 * (per_side - 1) == len(set(square.names))
+    on_edge = np.isin(square.coordinates[:, :2], [0.0, 0.5]).any(axis=1)
+    assert on_edge.all()
+    steps = square.coordinates[pairs(square, "neighbours")]
+    assert len(steps) == 4 * (per_side - 1)
+    np.testing.assert_allclose(np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1), 0.5 / (per_side - 1))
+    assert len(corners(square)) == 4
+
+
+def test_two_spheres() -> None:
+    bar = layout(kind="two_spheres", length="500 mm", role="length_standard")
+    assert bar.names == ("1", "2")
+    np.testing.assert_array_equal(bar.coordinates, [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    for name in ("corner sides", "neighbours", "all"):
+        np.testing.assert_array_equal(pairs(bar, name), [[0, 1]])
+
+
+def test_listed_balls() -> None:
+    numbered = layout(kind="balls", coordinates=(("1 mm", "2 mm"), ("3 mm", "4 mm", "5 mm")))
+    assert numbered.names == ("1", "2")
+    np.testing.assert_array_equal(numbered.coordinates, [[0.001, 0.002, 0.0], [0.003, 0.004, 0.005]])
+    by_name = layout(kind="balls", coordinates={"a": ("1 mm", "2 mm")})
+    assert by_name.names == ("a",)
+    assert len(pairs(by_name, "all")) == 0
+
+
+def test_sets_that_are_not_defined() -> None:
+    balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm")))
+    with pytest.raises(ValueError, match='"neighbours" is not defined .* choose from: all, or list pairs'):
+        pairs(balls, "neighbours")
+    with pytest.raises(ValueError, match='"corners" is not defined .* list the balls'):
+        corners(balls)
+
+
+def test_coincident_balls() -> None:
+    balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm"), ("0 mm", "0.1 nm")))
+    assert coincident_balls(balls) == [(0, 2)]
+
+
+def test_every_registered_kind_has_its_own_name() -> None:
+    for kind, settings in ARTEFACTS.items():
+        assert settings.model_json_schema()["properties"]["kind"]["const"] == kind

@@ -1,0 +1,111 @@
+"""Jacobians of all error models, and what every error model promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simulator.machines.arrangement import ARRANGEMENTS, Arrangement
+from simulator.machines.kinematic import carried_vectors, kinematic_model
+from simulator.machines.metric import MetricModel
+from simulator.machines.protocol import ErrorModel
+from tests.reference.derivatives import assert_derivative, complex_step
+
+LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
+
+MODELS: dict[str, ErrorModel] = {
+    **{
+        f"{name} {'full' if full else 'linearised'}": kinematic_model(arrangement, 5, 4, LOWER, UPPER, full)
+        for name, arrangement in ARRANGEMENTS.items()
+        for full in (False, True)
+    },
+    "few coefficients": kinematic_model(ARRANGEMENTS["MB2"], 2, 1, LOWER, UPPER),
+    **{f"metric {scale}": MetricModel(scale) for scale in ("none", "x", "y", "split")},
+}
+
+models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+
+
+def draw(model: ErrorModel, seed: int, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    generator = np.random.default_rng(seed)
+    d = model.dimension
+    x = generator.uniform(LOWER[:d], UPPER[:d], (6, d))
+    return x, size * generator.standard_normal(len(model.parameters)), 0.1 * generator.standard_normal((6, d))
+
+
+@models
+@pytest.mark.parametrize("size", [0.0, 1e-5, 1e-2])
+def test_jacobian_is_the_derivative_of_the_error(model: ErrorModel, size: float) -> None:
+    x, a, p = draw(model, 1, size)
+    assert_derivative(model.jacobian(x, a, p), complex_step(lambda b: model.error(x, b, p), a), 1e-13)
+
+
+@models
+def test_without_errors_the_correction_is_the_probe_offset(model: ErrorModel) -> None:
+    x, a, p = draw(model, 2, 0.0)
+    np.testing.assert_allclose(model.error(x, a, p), p, rtol=0, atol=1e-15)
+
+
+@models
+def test_reported_values_are_the_same_number_of_degrees_of_freedom(model: ErrorModel) -> None:
+    reported = model.reported()
+    assert reported.matrix.shape == (len(reported.names), len(model.parameters))
+    assert len(set(reported.names)) == len(reported.names) == len(reported.units)
+    assert np.linalg.matrix_rank(reported.matrix) == len(model.parameters)
+
+
+@given(st.sampled_from(sorted(ARRANGEMENTS)), st.integers(0, 10_000))
+def test_full_and_linearised_rotations_differ_to_second_order(name: str, seed: int) -> None:
+    linearised = kinematic_model(ARRANGEMENTS[name], 4, 4, LOWER, UPPER)
+    full = kinematic_model(ARRANGEMENTS[name], 4, 4, LOWER, UPPER, True)
+    x, a, p = draw(full, seed, 1e-3)
+    large = np.abs(full.error(x, a, p) - linearised.error(x, a, p)).max()
+    small = np.abs(full.error(x, a / 10, p) - linearised.error(x, a / 10, p)).max()
+    assert 90 < large / small < 111
+
+
+def test_kinematic_model_keeps_the_frame() -> None:
+    model = kinematic_model(ARRANGEMENTS["MB2"], 6, 5, LOWER, UPPER)
+    _, a, p = draw(model, 3, 1e-5)
+    corner = np.array([LOWER])
+    np.testing.assert_allclose(model.error(corner, a, p[:1]), p[:1], atol=1e-18)
+    along_x = np.array([[UPPER[0], LOWER[1], LOWER[2]]])
+    np.testing.assert_allclose(model.error(along_x, a, 0 * p[:1])[0, 1:], 0.0, atol=1e-18)
+    along_y = np.array([[LOWER[0], UPPER[1], LOWER[2]]])
+    assert abs(model.error(along_y, a, 0 * p[:1])[0, 2]) < 1e-18
+    assert abs(model.error(along_y, a, 0 * p[:1])[0, 0]) > 1e-7
+
+
+def test_reported_monomials_give_the_same_curve() -> None:
+    model = kinematic_model(ARRANGEMENTS["MB2"], 7, 5, LOWER, UPPER)
+    _, a, _ = draw(model, 4, 1.0)
+    values = model.reported().matrix @ a
+    t = np.linspace(0, 1, 11)
+    for function in model.functions:
+        own = [k for k, n in enumerate(model.reported().names) if n.startswith(function.name)]
+        curve = sum(values[k] * t ** (power + 1) for power, k in enumerate(own))
+        np.testing.assert_allclose(curve, function.basis.values(t) @ a[model.slices[function.name]], atol=1e-11)
+
+
+def test_carried_vectors_of_a_moving_table() -> None:
+    x, p = np.array([[1.0, 10.0, 100.0]]), np.array([[0.5, 0.25, 0.125]])
+    carried = carried_vectors(ARRANGEMENTS["CX1"], x, p)
+    assert [sign for sign, _ in carried] == [-1.0, -1.0, 1.0]
+    # The x slide of CX1 stands below the y slide, which lies between it and the workpiece.
+    np.testing.assert_array_equal(carried[0][1], [[1.5, 0.25, 100.125]])
+    np.testing.assert_array_equal(carried[1][1], [[1.5, 10.25, 100.125]])
+    np.testing.assert_array_equal(carried[2][1], p)
+
+
+def test_an_arrangement_has_each_axis_once() -> None:
+    with pytest.raises(ValueError, match="exactly once"):
+        Arrangement(("x", "y"), ("x",))
+
+
+def test_metric_scales_share_the_difference() -> None:
+    point, p = np.array([[2.0, 3.0]]), np.zeros((1, 2))
+    for scale, expected in (("x", (-2e-5, 0.0)), ("y", (0.0, 3e-5)), ("split", (-1e-5, 1.5e-5))):
+        model = MetricModel(scale)  # type: ignore[arg-type]
+        np.testing.assert_allclose(model.error(point, np.array([0.0, 1e-5]), p)[0], expected, atol=1e-9)

@@ -1,0 +1,63 @@
+"""True machines: stated by coefficients in either form, or drawn at random with a stated size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from simulator.machines.arrangement import ARRANGEMENTS
+from simulator.machines.kinematic import kinematic_model
+from simulator.machines.metric import MetricModel
+from simulator.machines.settings import CoefficientSettings, RandomSettings, ZeroSettings
+from simulator.machines.truth import TruthError, true_parameters
+
+MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
+ORIGIN = np.zeros((1, 3))
+
+
+def test_zero() -> None:
+    assert not true_parameters(ZeroSettings(), MODEL).any()
+
+
+def test_monomial_coefficients() -> None:
+    settings = CoefficientSettings(
+        kind="coefficients",
+        values={"EXX t^2": "3 um", "EYX t^1": "1 um", "EYX t^2": "-1 um", "EAX t^1": "2 urad"},
+    )
+    a = true_parameters(settings, MODEL)
+    x = np.array([[0.5, 0.0, 0.0]])
+    np.testing.assert_allclose(MODEL.error(x, a, ORIGIN), [[0.75e-6, 0.25e-6, 0.0]], atol=1e-18)
+    np.testing.assert_allclose(MODEL.error(x, a, np.array([[0, 0, 0.1]])), [[0.75e-6, 0.15e-6, 0.1]], atol=1e-18)
+
+
+def test_own_coefficients() -> None:
+    a = true_parameters(CoefficientSettings(kind="coefficients", values={"EXX[2]": "3 um"}), MODEL)
+    assert a[1] == 3e-6 and np.count_nonzero(a) == 1
+    metric = CoefficientSettings(kind="coefficients", values={"alpha": "5 urad", "gamma": "13.7 ppm"})
+    np.testing.assert_allclose(true_parameters(metric, MetricModel("x")), [5e-6, 13.7e-6], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("EXQ t^1", "1 um", 'no parameter "EXQ t^1"; did you mean'),
+        ("EXX t^2", "1 urad", "is an angle; a length is expected"),
+        ("EYX t^2", "1 um", "EYX must be zero at both ends"),
+    ],
+)
+def test_wrong_coefficients_are_named(name: str, value: str, words: str) -> None:
+    with pytest.raises(TruthError) as caught:
+        true_parameters(CoefficientSettings(kind="coefficients", values={name: value}), MODEL)
+    assert [problem[0] for problem in caught.value.problems] == [name]
+    assert words in caught.value.problems[0][1]
+
+
+def test_random_errors_have_the_stated_size_and_seed() -> None:
+    settings = RandomSettings.model_validate({"kind": "random", "position": "2 um", "rotation": "3 urad", "seed": 5})
+    a = true_parameters(settings, MODEL)
+    np.testing.assert_array_equal(a, true_parameters(settings, MODEL))
+    t = np.linspace(0, 1, 2001)
+    for function in MODEL.functions:
+        curve = function.basis.values(t) @ a[MODEL.slices[function.name]]
+        size = 3e-6 if function.rotation else 2e-6
+        assert np.sqrt(np.trapezoid(curve**2, t)) == pytest.approx(size, rel=1e-4)

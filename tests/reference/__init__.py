@@ -1,0 +1,1 @@
+"""Independent computations that the tests of the estimator are compared with."""
