@@ -76,7 +76,8 @@ class Lengths:
 
     `first` and `second` index the readings that a length takes part in. `projected` says whether the
     difference of the corrected points is projected on the standard's nominal direction (m, d) instead of its
-    norm being taken; `with_repeatability` whether the readings' own scatter adds to `uncertainty`.
+    norm being taken; `with_repeatability` whether the readings' own scatter along that direction adds to
+    `uncertainty`.
     """
 
     first: Integers

@@ -216,7 +216,7 @@ def residuals(problem: Problem, step: Values) -> Values:
     for i in range(len(given.first)):
         first, second = given.first[i], given.second[i]
         between = points[first] - points[second]
-        along = given.direction[i] if given.projected[i] else between.real / length(between.real)
+        along = given.direction[i]
         variance = given.uncertainty[i] ** 2
         if given.with_repeatability[i]:
             for end in (first, second):
