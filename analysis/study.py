@@ -81,7 +81,9 @@ def _plan(experiment: Experiment, with_quantities: bool) -> Plan:
     found = spectrum(factor)
     spread = covariance(design, factor, found) if with_quantities or found.deficiency else _nothing_open(design, found)
     judged = verdict(design, layout, found, spread, experiment.expected_rank_deficiency, experiment.target_accuracy)
-    quantities = uncertainties(design, layout, state, spread) if with_quantities else {}
+    quantities: dict[str, Quantity] = {}
+    if with_quantities:
+        quantities = uncertainties(design, layout, state, spread, target=experiment.target_accuracy)
     return Plan(experiment.label, experiment.title, design, judged, quantities)
 
 
@@ -122,7 +124,7 @@ def fit(
         scale,
         estimated,
         freedom,
-        uncertainties(design, layout, solution.state, spread, scale),
+        uncertainties(design, layout, solution.state, spread, scale, experiment.target_accuracy),
         _estimates(design, layout, solution, spread, scale, monomials),
     )
 

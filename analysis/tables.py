@@ -73,7 +73,12 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
                 quantity.largest,
             ]
         )
-    return aligned(rows, [False, False, True, True, False, False, False])
+    lines = aligned(rows, [False, False, True, True, False, False, False])
+    for quantity in quantities.values():
+        if quantity.within_target is not None:
+            share = number(100 * quantity.within_target)
+            lines.append(f"within the target accuracy (one standard uncertainty): {share} % of {quantity.symbol}")
+    return lines
 
 
 def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
@@ -183,6 +188,7 @@ def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
             "count": q.count,
             "undetermined": q.undetermined,
             "largest_at": q.largest,
+            **({} if q.within_target is None else {"within_target": q.within_target}),
             "description": q.description,
         }
         for symbol, q in quantities.items()

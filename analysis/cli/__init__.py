@@ -28,9 +28,10 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
+    options = parser().parse_args(arguments)
+    # Loaded only now, so that --help and wrong usage answer at once.
     from simulator.experiment.messages import ExperimentError
 
-    options = parser().parse_args(arguments)
     try:
         status = int(options.run(options))
         sys.stdout.flush()

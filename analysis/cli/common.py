@@ -6,12 +6,10 @@ import json
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.settings import hint
+if TYPE_CHECKING:
+    from simulator.experiment.model import Experiment
 
 
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
@@ -36,6 +34,10 @@ def experiments(options: Namespace) -> list[Experiment]:
 
     :raises ExperimentError: the errors of all files together.
     """
+    from simulator.experiment.load import load
+    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.settings import hint
+
     found: list[Experiment] = []
     messages: list[Message] = []
     for path in options.files:
@@ -62,6 +64,8 @@ def single(options: Namespace) -> Experiment:
 
     :raises ExperimentError: the file has several variants and none was chosen.
     """
+    from simulator.experiment.messages import ExperimentError, Message
+
     found = experiments(options)
     if len(found) > 1:
         names = [str(experiment.name) for experiment in found]

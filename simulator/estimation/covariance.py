@@ -12,6 +12,7 @@ import numpy as np
 
 from ..design import Design
 from ..machines.protocol import Array
+from ..threads import single_threaded
 from .elimination import Factor
 
 # Below this fraction of the largest singular value a direction is undetermined: rounding leaves about 1e-14,
@@ -62,6 +63,7 @@ class Spectrum:
         return np.asarray(self.directions[:, : self.rank] / self.values[: self.rank])
 
 
+@single_threaded
 def spectrum(factor: Factor, exact: float = EXACT) -> Spectrum:
     """Singular value decomposition of the shared parameters' factor."""
     scale = factor.layout.scale * MICROMETRE
@@ -106,6 +108,7 @@ def blank(values: Array, change: Array, size: Array) -> Array:
     return np.where(open_, np.nan, values)
 
 
+@single_threaded
 def covariance(design: Design, factor: Factor, found: Spectrum) -> Covariance:
     """Square root of the covariance of all parameters."""
     n, d = len(design.ball_names), design.dimension

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..design import Design, Integers, State
 from ..machines.protocol import Array
+from ..threads import single_threaded
 from .observations import coordinate_rows, distance_rows, length_rows, reading_blocks
 from .parameters import SharedLayout
 
@@ -50,6 +51,7 @@ class Factor:
     remainder: float
 
 
+@single_threaded
 def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | None = None) -> Factor:
     """Factor the observations of a design at `state`.
 

@@ -17,6 +17,9 @@ from .yamltree import Mark, mark_of
 
 AXES = ("x", "y", "z")
 
+# Balls tied to one another by distances are estimated together, with memory that grows as the square of their number.
+MOST_TIED_BALLS = 3000
+
 
 def resolve_calibration(
     settings: DistancesSettings | CoordinatesSettings, steps: Steps, references: References
@@ -49,6 +52,14 @@ def _distances(
         dimensions = 2
     indices = _pairs(settings.pairs, layout, (*steps, "pairs"), references)
     if indices is None or references.dimension is None:
+        return None
+    tied = len(np.unique(indices))
+    if tied > MOST_TIED_BALLS:
+        text = (
+            f"distances tie {tied} balls together, at most {MOST_TIED_BALLS} are possible; "
+            "calibrate fewer distances, such as corner sides, or co-ordinates"
+        )
+        references.problems.add((*steps, "pairs"), text)
         return None
     difference = (layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]])[:, :dimensions]
     nominal = np.linalg.norm(difference, axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from simulator.estimation.initial import initial_state
 from simulator.estimation.parameters import SharedLayout, shared_layout
 from simulator.generate import noisy_certificate, noisy_readings
 from simulator.geometry.motions import rotation_from_vector
+from simulator.quantities import LengthFunction
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
 seeds = st.integers(0, 2**31)
@@ -187,7 +189,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
 @pytest.mark.parametrize("size", [1, 3, 5])
 def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     expected, _, _ = judged(small_design(4))
-    monkeypatch.setattr("analysis.uncertainty.TILE", size)
+    monkeypatch.setattr("analysis.pairs.TILE", size)
     found, _, _ = judged(small_design(4))
     for symbol in ("U5", "U6"):
         assert_same(found[symbol], expected[symbol])
@@ -201,3 +203,21 @@ def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> No
     found, _, _ = judged(small_design(4, "neighbours"))
     for symbol, quantity in expected.items():
         assert_same(found[symbol], quantity)
+
+
+def test_share_of_distances_within_the_target() -> None:
+    """Against a count over single pairs."""
+    design = small_design(7)
+    layout, state = shared_layout(design), nominal_state(design)
+    factor = eliminate(design, layout, state)
+    spread = covariance(design, factor, spectrum(factor))
+    values = []
+    for i, j in itertools.combinations(range(len(design.points)), 2):
+        pair = replace(design, points=design.points[[i, j]])
+        length = float(np.linalg.norm(design.points[i] - design.points[j]))
+        values.append((uncertainties(pair, layout, state, spread)["U6"].maximum, length))
+    for constant, slope, sigma in ((2e-7, 0.0, 1.0), (1e-7, 2e-7, 1.0), (1e-7, 2e-7, 1.7)):
+        target = LengthFunction(constant, slope)
+        found = uncertainties(design, layout, state, spread, sigma, target)["U6"].within_target
+        assert found == np.mean([sigma * u <= constant + slope * length for u, length in values])
+        assert found is not None and 0 < found < 1

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.uncertainty import all_pairs, point_pairs, uncertainties
+from analysis.pairs import all_pairs
+from analysis.uncertainty import point_pairs, uncertainties
 from simulator.design import Design, Lengths, Readings, State, nominal_state
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import eliminate

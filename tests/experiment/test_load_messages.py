@@ -393,3 +393,13 @@ def test_no_section_breaks_the_loader(tmp_path: Path, section: str, value: objec
         load(tmp_path / "e.yaml")
     except ExperimentError as error:
         assert error.messages
+
+
+def test_too_many_balls_tied_by_distances(tmp_path: Path) -> None:
+    path = tmp_path / "many.yaml"
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    path.write_text(text.replace("[5, 5]", "[60, 60]").replace("corner sides ", "neighbours "), encoding="utf-8")
+    with pytest.raises(ExperimentError) as caught:
+        load(path)
+    assert [message.path for message in caught.value.messages] == ["calibration[0].pairs"]
+    assert "distances tie 3600 balls together, at most 3000 are possible" in str(caught.value)

@@ -1,0 +1,120 @@
+"""Standard uncertainties of the distances between all pairs of many places, in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.design import Integers
+from simulator.geometry.motions import without_rigid_motion
+from simulator.machines.protocol import Array
+from simulator.quantities import LengthFunction
+
+# Places on a side of the tiles in which pairs are worked through: their products stay in cache.
+TILE = 256
+
+
+@dataclass(frozen=True)
+class PairSummary:
+    """Running result over pairs: how many, how many open, sum and maximum of the others and where it stands.
+
+    `within` counts those that are no larger than the limit they were compared with.
+    """
+
+    count: int = 0
+    undetermined: int = 0
+    total: float = 0.0
+    maximum: float = 0.0
+    where: tuple[int, int] = (-1, -1)
+    within: int = 0
+
+    def __add__(self, other: PairSummary) -> PairSummary:
+        top = self if self.maximum >= other.maximum else other
+        return PairSummary(
+            self.count + other.count,
+            self.undetermined + other.undetermined,
+            self.total + other.total,
+            top.maximum,
+            top.where,
+            self.within + other.within,
+        )
+
+
+def all_pairs(
+    places: Array, common: Array, own: Array, null: Array, labels: Integers, limit: LengthFunction | None = None
+) -> PairSummary:
+    """Standard uncertainty of the distances between all pairs of `places` (n, d).
+
+    The places' errors are `common` (n, d, r) times r shared standard normal variables plus `own` (n, d, d) times
+    their own; `null` (n, d, k) moves them along undetermined directions. `labels` (n,) name the places in the
+    result. Memory is that of a tile of pairs.
+    """
+    places = places - places.mean(axis=0) if len(places) else places
+    common = without_rigid_motion(places, common)
+    null = without_rigid_motion(places, null)
+    single = common @ common.transpose(0, 2, 1) + own @ own.transpose(0, 2, 1)
+    return sum(
+        (_tile(places, common, single, null, labels, rows, columns, limit) for rows, columns in _tiles(len(places))),
+        PairSummary(),
+    )
+
+
+def _tiles(n: int) -> Iterator[tuple[slice, slice]]:
+    edges = [slice(start, min(start + TILE, n)) for start in range(0, n, TILE)]
+    for i, rows in enumerate(edges):
+        for columns in edges[i:]:
+            yield rows, columns
+
+
+def _tile(
+    places: Array,
+    common: Array,
+    single: Array,
+    null: Array,
+    labels: Integers,
+    rows: slice,
+    columns: slice,
+    limit: LengthFunction | None,
+) -> PairSummary:
+    diagonal = rows.start == columns.start
+    n, m, d = rows.stop - rows.start, columns.stop - columns.start, places.shape[1]
+    difference = [places[rows, None, axis] - places[None, columns, axis] for axis in range(d)]
+    # A plate lies in a plane of its own frame, so that one component of all its distances is zero.
+    used = [axis for axis in range(d) if difference[axis].any()]
+    squared = sum((difference[axis] ** 2 for axis in used), np.zeros((n, m)))
+    chosen: NDArray[np.bool_] = np.triu(squared > 0, 1) if diagonal else squared > 0
+    weighted = np.zeros((n, m))
+    for i in used:
+        for j in used[used.index(i) :]:
+            product = common[rows, i] @ common[columns, j].T
+            product += product if i == j else common[rows, j] @ common[columns, i].T
+            np.subtract(single[rows, None, i, j] + single[None, columns, i, j], product, out=product)
+            product *= difference[i]
+            product *= difference[j]
+            weighted += product if i == j else 2.0 * product
+    squared[~chosen] = 1.0
+    values = np.sqrt(np.maximum(weighted / squared, 0.0))[chosen]
+    open_ = np.zeros(len(values), bool)
+    if null.shape[2]:
+        change = sum(difference[i][:, :, None] * (null[rows, None, i, :] - null[None, columns, i, :]) for i in range(d))
+        size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / squared)
+        open_ = size[chosen] > _open_above(null)
+    count = int(chosen.sum())
+    if not (~open_).any():
+        return PairSummary(count, int(open_.sum()))
+    determined = np.where(open_, -1.0, values)
+    top = int(determined.argmax())
+    row, column = (int(k[top]) for k in np.nonzero(chosen))
+    where = (int(labels[rows.start + row]), int(labels[columns.start + column]))
+    within = 0
+    if limit is not None:
+        within = int((~open_ & (values <= limit.at(np.sqrt(squared[chosen])))).sum())
+    return PairSummary(count, int(open_.sum()), float(values[~open_].sum()), float(determined[top]), where, within)
+
+
+def _open_above(null: Array) -> float:
+    """What a null direction must change a distance by to leave it open: well above rounding."""
+    return 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
