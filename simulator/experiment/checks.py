@@ -8,7 +8,7 @@ import numpy as np
 
 from ..geometry.positions import ball_coordinates
 from ..machines.settings import build_error_model, dimension_of
-from ..machines.truth import TruthError, true_parameters
+from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing
 from .messages import Steps
@@ -39,9 +39,17 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     settings, truth = sections.get("error_model"), sections.get("true_machine")
     if settings is None or truth is None or machine is None or dimension_of(settings) != machine.dimension:
         return
+    other = getattr(truth, "error_model", None)
+    if other is not None and dimension_of(other) != machine.dimension:
+        text = (
+            f'kind "{other.kind}" has {dimension_of(other)} dimensions, but machine.volume has '
+            f"{machine.dimension}; name another"
+        )
+        references.problems.add(("true_machine", "error_model", "kind"), text)
+        return
     lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
     try:
-        true_parameters(truth, build_error_model(settings, lower, upper))
+        true_machine(truth, build_error_model(settings, lower, upper), lower, upper)
     except TruthError as error:
         for name, text in error.problems:
             references.problems.add(("true_machine", "values", name), text)

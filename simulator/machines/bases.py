@@ -55,6 +55,15 @@ class Basis(Protocol):
         ...
 
 
+def whole_values(basis: Basis, t: Array) -> Array:
+    """The whole family at t (m,): 1, t and the interior functions as columns.
+
+    >>> whole_values(Polynomial(3), np.array([0.5]))
+    array([[1.  , 0.5 , 0.25]])
+    """
+    return np.column_stack([np.ones_like(t), t, basis.interior().values(t)])
+
+
 def power(variable: str, exponent: int) -> str:
     """Name of a monomial.
 

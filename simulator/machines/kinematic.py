@@ -226,14 +226,20 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
 
 def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
     """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector, signed."""
-    found = []
-    for sign, v in carried:
-        matrix = np.zeros((len(v), 3, 3), v.dtype)
-        matrix[:, 0, 1], matrix[:, 0, 2] = sign * v[:, 2], -sign * v[:, 1]
-        matrix[:, 1, 0], matrix[:, 1, 2] = -sign * v[:, 2], sign * v[:, 0]
-        matrix[:, 2, 0], matrix[:, 2, 1] = sign * v[:, 1], -sign * v[:, 0]
-        found.append(matrix)
-    return found
+    return [cross_matrices(sign * vector) for sign, vector in carried]
+
+
+def cross_matrices(v: Array) -> Array:
+    """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
+
+    >>> cross_matrices(np.array([[1.0, 2.0, 3.0]]))[0].tolist()
+    [[0.0, 3.0, -2.0], [-3.0, 0.0, 1.0], [2.0, -1.0, 0.0]]
+    """
+    matrix = np.zeros((len(v), 3, 3), v.dtype)
+    matrix[:, 0, 1], matrix[:, 0, 2] = v[:, 2], -v[:, 1]
+    matrix[:, 1, 0], matrix[:, 1, 2] = -v[:, 2], v[:, 0]
+    matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 1], -v[:, 0]
+    return matrix
 
 
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
@@ -248,7 +254,7 @@ def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array
     return matrix
 
 
-def _rotation(angles: Array) -> tuple[Array, list[Array]]:
+def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
     """Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
     plain = [_plane_rotation(angles[:, k], k) for k in range(3)]
     derivatives = []
@@ -286,20 +292,20 @@ class _Chain:
         tip = self.p.astype(dtype, copy=True)
         on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]
         for axis in reversed(on_probe_side):
-            matrix, derivatives = _rotation(self.rotation[:, axis])
+            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
             by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
             tip = step(axis) + turned(matrix, tip)
         prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
         for axis in on_probe_side:
             by_translation[axis] = prefix
             by_rotation[axis] = prefix @ by_rotation[axis]
-            prefix = prefix @ _rotation(self.rotation[:, axis])[0]
+            prefix = prefix @ rotation_and_derivatives(self.rotation[:, axis])[0]
 
         # The table moves the other way: going outwards, undo each axis's displacement, then its rotation.
         passed = list(on_probe_side)
         for name in self.arrangement.workpiece_side:
             axis = AXES.index(name)
-            matrix, derivatives = _rotation(self.rotation[:, axis])
+            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
             back = matrix.transpose(0, 2, 1)
             outside = tip + step(axis)
             by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))

@@ -8,16 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self, Union
 
-from pydantic import Field, model_validator
+from pydantic import Field, Tag, model_validator
 
 from ..quantities import Angle, PositiveLength
-from ..settings import Settings
+from ..settings import FORM, Settings
 from .arrangement import ARRANGEMENTS, AXES, Arrangement
-from .kinematic import kinematic_model
+from .bases import Basis, Monomial, Polynomial, Spline
+from .empirical import empirical_model
+from .kinematic import kinematic_model_of
 from .metric import MetricModel, Scale
 from .protocol import ErrorModel
+from .terms import Radial, quadratic, sums, tensor
 
 Corner = tuple[float, ...]
+Centres = Annotated[int, Field(ge=2, le=8)]
+MOST_INTERIOR = 6
 AxisName = Literal["x", "y", "z"]
 
 
@@ -38,8 +43,43 @@ class ArrangementSettings(Settings):
         return self
 
 
+class SplineSettings(Settings):
+    """B-splines of an order with interior knots, along every axis of the volume."""
+
+    order: int = Field(default=4, ge=2, le=12, description="Order of the splines, degree plus one: 4 for cubic ones.")
+    knots: tuple[float, ...] = Field(
+        default=(), description="Interior knots in ascending order, in fractions of the axis between 0 and 1."
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        Spline(self.order, self.knots)
+        return self
+
+
+BasisSettings = Annotated[
+    Annotated[Literal["chebyshev", "monomial"], Tag("<one>")]
+    | Annotated[SplineSettings, Tag("<mapping>")]
+    | Annotated[SplineSettings, Tag("<list>")],
+    FORM,
+]
+BASIS = "Univariate functions: chebyshev or monomial polynomials, or B-splines as {order: 4, knots: [0.5]}."
+
+
+def _basis(settings: Any, coefficients: int) -> Basis:
+    if isinstance(settings, SplineSettings):
+        return Spline(settings.order, settings.knots)
+    return Monomial(coefficients) if settings == "monomial" else Polynomial(coefficients)
+
+
+def _without(settings: Settings, keys: tuple[str, ...], instead: str) -> None:
+    stated = [key for key in keys if key in settings.model_fields_set]
+    if stated:
+        raise ValueError(f'"{stated[0]}" has no meaning with {instead}; remove it')
+
+
 class KinematicSettings(Settings):
-    """Errors of each axis as polynomials, superposed along the chain of axes."""
+    """Errors of each axis as polynomials or splines, superposed along the chain of axes."""
 
     kind: Literal["kinematic"]
     arrangement: Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"] | ArrangementSettings = (
@@ -65,6 +105,59 @@ class KinematicSettings(Settings):
         le=30,
         description="Coefficients of each rotational error's polynomial, the constant included (NEPS).",
     )
+    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
+
+    @model_validator(mode="after")
+    def _coefficients_of_polynomials(self) -> Self:
+        if isinstance(self.basis, SplineSettings):
+            _without(self, ("position_coefficients", "rotation_coefficients"), "splines, which have an order and knots")
+        return self
+
+
+class RadialSettings(Settings):
+    """Multiquadric radial basis functions on a grid of centres."""
+
+    centres: tuple[Centres, Centres, Centres] = Field(description="Number of centres along x, y and z.")
+    constant: float = Field(
+        default=0.5, gt=0, le=10, description="Constant c of sqrt(r^2 + c^2), in fractions of the volume."
+    )
+
+
+class EmpiricalSettings(Settings):
+    """Six functions of three variables: displacement and rotation of the probe."""
+
+    kind: Literal["empirical"]
+    terms: Annotated[
+        Annotated[Literal["sums", "quadratic", "tensor"], Tag("<one>")]
+        | Annotated[RadialSettings, Tag("<mapping>")]
+        | Annotated[RadialSettings, Tag("<list>")],
+        FORM,
+    ] = Field(
+        default="sums",
+        description="Functions of x, y and z: sums of tensor products with linear factors, quadratic polynomials, "
+        "full tensor products, or radial basis functions as {centres: [3, 3, 3], constant: 0.5}.",
+    )
+    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
+    coefficients: int = Field(
+        default=3, ge=2, le=12, description="Coefficients of each univariate polynomial, the constant included."
+    )
+    rotations: Literal["linearised", "full"] = Field(
+        default="linearised", description="Whether the probe offset is turned by cross products or rotation matrices."
+    )
+
+    @model_validator(mode="after")
+    def _what_belongs_together(self) -> Self:
+        if isinstance(self.terms, RadialSettings):
+            _without(self, ("basis", "coefficients"), "radial basis functions")
+        elif self.terms == "quadratic":
+            _without(self, ("basis", "coefficients"), "quadratic terms")
+        elif isinstance(self.basis, SplineSettings):
+            _without(self, ("coefficients",), "splines, which have an order and knots")
+        if self.terms == "tensor" and _basis(self.basis, self.coefficients).interior().size > MOST_INTERIOR:
+            raise ValueError(
+                f"full tensor products have at most {MOST_INTERIOR + 2} functions along an axis; give fewer, or sums"
+            )
+        return self
 
 
 class MetricSettings(Settings):
@@ -79,14 +172,24 @@ class MetricSettings(Settings):
 def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> ErrorModel:
     named = settings.arrangement
     arrangement = ARRANGEMENTS[named] if isinstance(named, str) else Arrangement(named.probe_side, named.workpiece_side)
-    return kinematic_model(
+    return kinematic_model_of(
         arrangement,
-        settings.position_coefficients,
-        settings.rotation_coefficients,
+        _basis(settings.basis, settings.position_coefficients),
+        _basis(settings.basis, settings.rotation_coefficients),
         lower,
         upper,
         settings.rotations == "full",
     )
+
+
+def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    if isinstance(settings.terms, RadialSettings):
+        return empirical_model(
+            Radial(settings.terms.centres, settings.terms.constant), lower, upper, settings.rotations == "full"
+        )
+    basis = _basis(settings.basis, settings.coefficients)
+    terms = {"sums": lambda: sums(basis), "quadratic": quadratic, "tensor": lambda: tensor(basis)}[settings.terms]()
+    return empirical_model(terms, lower, upper, settings.rotations == "full")
 
 
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
@@ -95,6 +198,7 @@ def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorMode
 
 ERROR_MODELS: dict[type[Settings], tuple[int, Callable[[Any, Corner, Corner], ErrorModel]]] = {
     KinematicSettings: (3, _kinematic),
+    EmpiricalSettings: (3, _empirical),
     MetricSettings: (2, _metric),
 }
 """Settings class of every error model, with its number of dimensions and its builder."""
@@ -108,6 +212,9 @@ class ZeroSettings(Settings):
     kind: Literal["zero"] = "zero"
 
 
+OTHER_MODEL = "Error model of the true machine, where it is another than the estimated one."
+
+
 class CoefficientSettings(Settings):
     """A machine with stated errors."""
 
@@ -116,6 +223,9 @@ class CoefficientSettings(Settings):
         description="Value with unit of each parameter that is not zero, by its name in the error model or in the "
         'monomial form, for example "EXX t^2": 3 um.'
     )
+    error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
+        default=None, description=OTHER_MODEL
+    )
 
 
 class RandomSettings(Settings):
@@ -123,12 +233,15 @@ class RandomSettings(Settings):
 
     kind: Literal["random"]
     position: PositiveLength | None = Field(
-        default=None, description="Root mean square of each positional error along its axis."
+        default=None, description="Root mean square of each positional error along its axis, or in the volume."
     )
     rotation: Angle | None = Field(
-        default=None, description="Root mean square of each rotational error along its axis."
+        default=None, description="Root mean square of each rotational error along its axis, or in the volume."
     )
     seed: int = Field(default=1, ge=0, description="Seed of the draw.")
+    error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
+        default=None, description=OTHER_MODEL
+    )
 
 
 TrueMachineSettings = Annotated[ZeroSettings | CoefficientSettings | RandomSettings, Field(discriminator="kind")]
