@@ -24,6 +24,8 @@ NEGLIGIBLE = 0.01
 # than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
 WEAK = 10.0
 
+# Curves that no polynomial of this degree describes are called irregular.
+HIGHEST = 10
 SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
@@ -225,15 +227,15 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
 
 
 def shape(t: Array, values: Array) -> str:
-    """Word for a curve's shape: the lowest degree of polynomial that describes it.
+    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it.
 
     >>> t = np.linspace(0, 1, 50)
     >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5)
     ('linear', 'quadratic', 'of degree 5')
     """
-    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, 30)
+    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, HIGHEST)
     size = float(np.abs(values).max())
-    for degree in range(1, 31):
+    for degree in range(1, HIGHEST + 1):
         part = basis[:, : degree + 1]
         left = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
         if np.abs(left).max() <= 1e-3 * size:
