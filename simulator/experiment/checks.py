@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..geometry.positions import ball_coordinates
-from ..machines.settings import build_error_model, dimension_of
+from ..machines.custom import CustomModelError
+from ..machines.settings import PythonSettings, build_error_model, dimension_of
 from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing
@@ -22,37 +24,54 @@ TOLERANCE = 1e-9
 AXES = ("x", "y", "z")
 
 
-def check_error_model(sections: Sections, references: References) -> None:
-    """Report an error model for another number of dimensions than the volume has."""
+def check_error_model(sections: Sections, machine: Machine | None, references: References) -> None:
+    """Report an error model for another number of dimensions than the volume has, or a user's own that is wrong."""
     settings = sections.get("error_model")
-    if settings is None or references.dimension is None or dimension_of(settings) == references.dimension:
-        return
-    text = (
-        f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '
-        f"{references.dimension}; change one of the two"
-    )
-    references.problems.add(("error_model", "kind"), text)
+    if settings is not None:
+        _check_model(settings, ("error_model",), machine, references)
+
+
+def _check_model(settings: Any, steps: Steps, machine: Machine | None, references: References) -> None:
+    if isinstance(settings, PythonSettings):
+        settings.beside(references.folder)
+        if machine is None:
+            return
+        try:
+            build_error_model(settings, *_corners(machine))
+        except CustomModelError as error:
+            references.problems.add((*steps, error.key), str(error))
+    elif references.dimension not in (None, dimension_of(settings)):
+        text = (
+            f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '
+            f"{references.dimension}; change one of the two"
+        )
+        references.problems.add((*steps, "kind"), text)
 
 
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
-    """Report values of the true machine that its error model cannot have."""
+    """Report a true machine whose own error model is wrong, or values that its error model cannot have."""
     settings, truth = sections.get("error_model"), sections.get("true_machine")
-    if settings is None or truth is None or machine is None or dimension_of(settings) != machine.dimension:
+    if truth is None:
         return
     other = getattr(truth, "error_model", None)
-    if other is not None and dimension_of(other) != machine.dimension:
-        text = (
-            f'kind "{other.kind}" has {dimension_of(other)} dimensions, but machine.volume has '
-            f"{machine.dimension}; name another"
-        )
-        references.problems.add(("true_machine", "error_model", "kind"), text)
+    if other is not None:
+        _check_model(other, ("true_machine", "error_model"), machine, references)
+    problems = references.problems
+    if settings is None or machine is None or problems.has_below(("error_model",)) or problems.has_below(_TRUE_MODEL):
         return
-    lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
+    corners = _corners(machine)
     try:
-        true_machine(truth, build_error_model(settings, lower, upper), lower, upper)
+        true_machine(truth, build_error_model(settings, *corners), *corners)
     except TruthError as error:
         for name, text in error.problems:
-            references.problems.add(("true_machine", "values", name), text)
+            problems.add(("true_machine", "values", name), text)
+
+
+_TRUE_MODEL = ("true_machine", "error_model")
+
+
+def _corners(machine: Machine) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(map(float, machine.volume.lower)), tuple(map(float, machine.volume.upper))
 
 
 def check_names(position_count: int, problems: Problems) -> None:

@@ -6,14 +6,16 @@ An error model is registered by its settings class and builder in `ERROR_MODELS`
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Union
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, PrivateAttr, StringConstraints, Tag, model_validator
 
 from ..quantities import Angle, PositiveLength
 from ..settings import FORM, Settings
 from .arrangement import ARRANGEMENTS, AXES, Arrangement
 from .bases import Basis, Monomial, Polynomial, Spline
+from .custom import custom_model
 from .empirical import empirical_model
 from .kinematic import kinematic_model_of
 from .metric import MetricModel, Scale
@@ -169,6 +171,24 @@ class MetricSettings(Settings):
     )
 
 
+class PythonSettings(Settings):
+    """A user's own error model, made by a Python function that is called with the volume's corners and the options."""
+
+    kind: Literal["python"]
+    object: Annotated[str, StringConstraints(min_length=1)] = Field(
+        description="module:function, the module installed or beside this file, or the name of an installed entry "
+        "point of the group ballplate.error_models."
+    )
+    options: dict[str, Any] = Field(default={}, description="Keyword arguments of the function.")
+
+    # Where the experiment file is; its modules are looked for there.
+    _folder: Path | None = PrivateAttr(default=None)
+
+    def beside(self, folder: Path) -> None:
+        """Look for modules in the folder too."""
+        self._folder = folder
+
+
 def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> ErrorModel:
     named = settings.arrangement
     arrangement = ARRANGEMENTS[named] if isinstance(named, str) else Arrangement(named.probe_side, named.workpiece_side)
@@ -196,12 +216,17 @@ def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorMode
     return MetricModel(settings.scale, max(b - a for a, b in zip(lower, upper, strict=True)))
 
 
-ERROR_MODELS: dict[type[Settings], tuple[int, Callable[[Any, Corner, Corner], ErrorModel]]] = {
+def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    return custom_model(settings.object, settings.options, settings._folder, lower, upper)
+
+
+ERROR_MODELS: dict[type[Settings], tuple[int | None, Callable[[Any, Corner, Corner], ErrorModel]]] = {
     KinematicSettings: (3, _kinematic),
     EmpiricalSettings: (3, _empirical),
     MetricSettings: (2, _metric),
+    PythonSettings: (None, _python),
 }
-"""Settings class of every error model, with its number of dimensions and its builder."""
+"""Settings class of every error model, with its number of dimensions, None for any, and its builder."""
 
 ErrorModelSettings = Annotated[Union[tuple(ERROR_MODELS)], Field(discriminator="kind")]  # type: ignore[valid-type]  # noqa: UP007
 
@@ -247,13 +272,15 @@ class RandomSettings(Settings):
 TrueMachineSettings = Annotated[ZeroSettings | CoefficientSettings | RandomSettings, Field(discriminator="kind")]
 
 
-def dimension_of(settings: Settings) -> int:
-    """Number of dimensions, 2 or 3, of the error model that the settings describe."""
+def dimension_of(settings: Settings) -> int | None:
+    """Number of dimensions, 2 or 3, of the error model that the settings describe; None if that depends."""
     return ERROR_MODELS[type(settings)][0]
 
 
 def build_error_model(settings: Settings, lower: Corner, upper: Corner) -> ErrorModel:
     """The error model that settings describe, for a volume from `lower` to `upper` in metres.
+
+    :raises CustomModelError: a user's own model that cannot be used.
 
     >>> build_error_model(MetricSettings(kind="metric"), (0.0, 0.0), (1.0, 1.0)).dimension
     2
