@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..geometry.positions import ball_coordinates
+from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.settings import PythonSettings, build_error_model, dimension_of
+from ..machines.settings import CurvesSettings, PythonSettings, build_error_model, dimension_of
 from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing
-from .messages import Steps
+from .curves import read_curves
+from .messages import ExperimentError, Steps
 from .model import Calibration, DistanceCalibration, Floats, Machine, Position, Volume
 from .problems import Problems, written_text
 from .references import References
@@ -56,6 +58,9 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     other = getattr(truth, "error_model", None)
     if other is not None:
         _check_model(other, ("true_machine", "error_model"), machine, references)
+    if isinstance(truth, CurvesSettings):
+        _read_curves(truth, machine, references)
+        return
     problems = references.problems
     if settings is None or machine is None or problems.has_below(("error_model",)) or problems.has_below(_TRUE_MODEL):
         return
@@ -65,6 +70,38 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     except TruthError as error:
         for name, text in error.problems:
             problems.add(("true_machine", "values", name), text)
+
+
+def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
+    """Let the true machine have the curves of its files, or report what is wrong with them."""
+    problems, curves = references.problems, dict[str, Points]()
+    if references.dimension == 2:
+        text = 'kind "curves" has 3 dimensions, but machine.volume has 2; change one of the two'
+        problems.add(("true_machine", "kind"), text)
+    for i, file in enumerate(truth.files):
+        steps: Steps = ("true_machine", "files", i)
+        try:
+            found = read_curves(references.folder / file)
+        except ExperimentError as error:
+            problems.take(error, steps)
+            continue
+        twice = [name for name in found if name in curves]
+        if twice:
+            problems.add(steps, f"{listing(twice)} is in an earlier file already; leave it out of one of the two")
+        curves |= found
+        if machine is None or machine.dimension != 3:
+            continue
+        name, points = next(iter(found.items()))
+        axis = "XYZ".index(name[2])
+        lower, upper = machine.volume.lower[axis], machine.volume.upper[axis]
+        covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
+        if covered < 0.5 * (upper - lower):
+            text = (
+                f"goes from {format_length(points.positions[0])} to {format_length(points.positions[-1])}, but "
+                f"machine.volume from {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most of it"
+            )
+            problems.add(steps, text)
+    truth.of(curves)
 
 
 _TRUE_MODEL = ("true_machine", "error_model")

@@ -15,6 +15,7 @@ from ..quantities import Angle, PositiveLength
 from ..settings import FORM, Settings
 from .arrangement import ARRANGEMENTS, AXES, Arrangement
 from .bases import Basis, Monomial, Polynomial, Spline
+from .curves import Interpolation, Points, curves_model
 from .custom import custom_model
 from .empirical import empirical_model
 from .kinematic import kinematic_model_of
@@ -43,6 +44,20 @@ class ArrangementSettings(Settings):
         if sorted(self.probe_side + self.workpiece_side) != list(AXES):
             raise ValueError("name each of the axes x, y and z exactly once on the two sides together")
         return self
+
+
+ArrangementName = Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"]
+ARRANGEMENT = (
+    "Which axis carries which: a named arrangement, or the axes on either side. "
+    "MB2 (x carries y carries z carries the probe) is NPL's kinematic model."
+)
+ROTATIONS = "Whether products of small errors are left out or multiplied out."
+
+
+def _arrangement(settings: str | ArrangementSettings) -> Arrangement:
+    if isinstance(settings, str):
+        return ARRANGEMENTS[settings]
+    return Arrangement(settings.probe_side, settings.workpiece_side)
 
 
 class SplineSettings(Settings):
@@ -84,16 +99,8 @@ class KinematicSettings(Settings):
     """Errors of each axis as polynomials or splines, superposed along the chain of axes."""
 
     kind: Literal["kinematic"]
-    arrangement: Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"] | ArrangementSettings = (
-        Field(
-            default="MB2",
-            description="Which axis carries which: a named arrangement, or the axes on either side. "
-            "MB2 (x carries y carries z carries the probe) is NPL's kinematic model.",
-        )
-    )
-    rotations: Literal["linearised", "full"] = Field(
-        default="linearised", description="Whether products of small errors are left out or multiplied out."
-    )
+    arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
     position_coefficients: int = Field(
         default=5,
         ge=2,
@@ -190,10 +197,8 @@ class PythonSettings(Settings):
 
 
 def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    named = settings.arrangement
-    arrangement = ARRANGEMENTS[named] if isinstance(named, str) else Arrangement(named.probe_side, named.workpiece_side)
     return kinematic_model_of(
-        arrangement,
+        _arrangement(settings.arrangement),
         _basis(settings.basis, settings.position_coefficients),
         _basis(settings.basis, settings.rotation_coefficients),
         lower,
@@ -269,7 +274,37 @@ class RandomSettings(Settings):
     )
 
 
-TrueMachineSettings = Annotated[ZeroSettings | CoefficientSettings | RandomSettings, Field(discriminator="kind")]
+class CurvesSettings(Settings):
+    """A machine with measured error curves."""
+
+    kind: Literal["curves"]
+    files: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
+        description="CSV files, each with the columns position_mm and errors of one axis such as EXX_um and EAX_urad; "
+        "errors that no file has are zero."
+    )
+    interpolation: Interpolation = Field(
+        default="linear", description="Between the points: linear, cubic splines, or monotone cubics."
+    )
+    arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
+
+    # What the files hold, by ISO 230-1 name; filled in when the experiment is loaded.
+    _curves: dict[str, Points] = PrivateAttr(default_factory=dict)
+
+    def of(self, curves: dict[str, Points]) -> None:
+        """Take the curves that the files hold."""
+        self._curves = curves
+
+    def model(self, lower: Corner, upper: Corner) -> ErrorModel:
+        """The curves as an error model, all of whose parameters are one."""
+        return curves_model(
+            self._curves, self.interpolation, _arrangement(self.arrangement), lower, upper, self.rotations == "full"
+        )
+
+
+TrueMachineSettings = Annotated[
+    ZeroSettings | CoefficientSettings | RandomSettings | CurvesSettings, Field(discriminator="kind")
+]
 
 
 def dimension_of(settings: Settings) -> int | None:

@@ -9,7 +9,7 @@ import numpy as np
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import Settings, hint
 from .protocol import Array, ErrorModel, HasLines
-from .settings import CoefficientSettings, Corner, RandomSettings, ZeroSettings, build_error_model
+from .settings import CoefficientSettings, Corner, CurvesSettings, RandomSettings, ZeroSettings, build_error_model
 
 _PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
@@ -43,6 +43,9 @@ def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: C
     >>> true_machine(ZeroSettings(), kinematic_model(ARRANGEMENTS["MB2"], 2, 1, *corners), *corners).a
     array([0., 0., 0., 0., 0., 0.])
     """
+    if isinstance(settings, CurvesSettings):
+        curves = settings.model(lower, upper)
+        return TrueMachine(curves, np.ones(len(curves.parameters)))
     other = getattr(settings, "error_model", None)
     model = fitted if other is None else build_error_model(other, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))
