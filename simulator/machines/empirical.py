@@ -130,15 +130,17 @@ class EmpiricalModel:
         own = self._chosen[list(FUNCTIONS).index(function)]
         pairs = [(one, two) for one in LEVELS for two in LEVELS]
         pairs.sort(key=lambda pair: sum(level not in (0.0, 1.0) for level in pair))
-        found = []
+        words, places = [], []
         for pair in pairs:
             for axis in range(3):
                 others = [k for k in range(3) if k != axis]
-                places = np.zeros((len(t), 3))
-                places[:, axis], places[:, others] = t, pair
                 at = " and ".join(f"{AXES[k]} {_level(level)}" for k, level in zip(others, pair, strict=True))
-                found.append(Line(f"along {AXES[axis].upper()} at {at}", self.terms.values(places)[:, own]))
-        return tuple(found)
+                words.append(f"along {AXES[axis].upper()} at {at}")
+                line = np.zeros((len(t), 3))
+                line[:, axis], line[:, others] = t, pair
+                places.append(line)
+        values = self.terms.values(np.concatenate(places))[:, own].reshape(len(words), len(t), len(own))
+        return tuple(map(Line, words, values))
 
     def reported(self) -> Reported:
         """Coefficients of monomials where the terms are polynomials, otherwise the parameters themselves."""
