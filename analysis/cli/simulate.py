@@ -39,27 +39,32 @@ def run(options: Namespace) -> int:
 
     import numpy as np
 
-    from simulator.design import State, nominal_state
     from simulator.experiment.messages import ExperimentError, Message
-    from simulator.generate import NoReadingError, exact_readings, noisy_readings, true_artefacts
+    from simulator.generate import (
+        NoReadingError,
+        exact_readings,
+        noisy_readings,
+        on_true_machine,
+        true_artefacts,
+    )
     from simulator.layout import lay_out
-    from simulator.machines.truth import true_parameters
+    from simulator.machines.truth import true_machine
     from simulator.readings import write_readings
 
     from .common import single
 
     experiment = single(options)
     design = lay_out(experiment)
-    drawn = nominal_state(design)
-    truth = State(drawn.balls, drawn.rotations, drawn.origins, true_parameters(experiment.true_machine, design.model))
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
     seed = experiment.seed if options.seed is None else options.seed
     try:
         if options.exact:
-            readings, x = exact_readings(design, truth)
+            readings, x = exact_readings(on_truth, truth)
         else:
             generator = np.random.default_rng(np.random.SeedSequence(seed))
             truth = replace(truth, balls=true_artefacts(design, generator))
-            readings, x = noisy_readings(design, truth, generator)
+            readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
         raise ExperimentError(
             [Message(str(experiment.source), 0, 0, "true_machine", f"{error}; state smaller ones")]
