@@ -11,7 +11,6 @@ from ..tables import aligned, number, shown_unit
 from .figures import BEYOND, Comparison, Figure, Outcome
 from .study import Trials
 
-
 # S^2 of readings without noise, for each degree of freedom, below which nothing is left but rounding.
 NO_MISFIT = 1e-9
 
