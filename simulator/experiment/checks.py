@@ -10,7 +10,7 @@ import numpy as np
 from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.settings import CurvesSettings, PythonSettings, build_error_model, dimension_of
+from ..machines.settings import CurvesSettings, PythonSettings, RandomSettings, build_error_model, dimension_of
 from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing
@@ -62,6 +62,9 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         _read_curves(truth, machine, references)
         return
     problems = references.problems
+    if isinstance(truth, RandomSettings) and truth.position is None and truth.rotation is None:
+        text = "without sizes it is a machine without errors; give position: 2 um, rotation: 4 urad, or both"
+        problems.add(("true_machine",), text)
     if settings is None or machine is None or problems.has_below(("error_model",)) or problems.has_below(_TRUE_MODEL):
         return
     corners = _corners(machine)

@@ -1,0 +1,234 @@
+"""Time and memory of replicates, estimated many at a time.
+
+Run with
+
+    python -m pytest tests/benchmarks/bench_montecarlo.py
+
+Experiment 6.2.1 of NPL Report CISE 15/98 on grids of n x n balls, on a machine with errors of some micrometres. SciPy's
+least_squares is given the same residuals and derivatives, and its answers must agree with ours to a millionth of what
+replicates differ by. Whole runs are timed on two processes that are there already, everything else in this one.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from joblib import Parallel, delayed
+from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
+
+from analysis.montecarlo.trials import run_trials
+from simulator.design import State, nominal_state
+from simulator.estimation.observations import distance_rows, reading_blocks
+from simulator.geometry.motions import rotation_from_vector
+from simulator.machines.protocol import Array
+from simulator.montecarlo.expansion import Expansion
+from simulator.montecarlo.reference import Reference, Truth, reference
+from simulator.montecarlo.replicates import BATCH, draw, estimate_batch
+from tests.reference.designs import grid_experiment
+
+ROOT = Path(__file__).parents[2]
+LINES: list[str] = []
+
+
+@cache
+def prepared(n: int) -> Reference:
+    design = grid_experiment(n)
+    generator = np.random.default_rng(1)
+    effect = np.array([p.effect for p in design.model.parameters])
+    state = replace(nominal_state(design), a=2e-6 * generator.standard_normal(len(effect)) / effect)
+    return reference(design, Truth(state, design.model))
+
+
+def best(work: Callable[[], Any], rounds: int) -> float:
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def several(shared: Reference, first: int, last: int) -> list[Array]:
+    return [estimate_batch(shared, 1, batch).found.a for batch in range(first, last)]
+
+
+@pytest.mark.parametrize(("n", "singles"), [(5, 4), (9, 4), (20, 1)])
+def test_thousand_replicates(n: int, singles: int) -> None:
+    shared = prepared(n)
+    batches = -(-1000 // BATCH)
+    middle = batches // 2
+    pool = Parallel(n_jobs=2)
+    jobs = [delayed(several)(shared, 0, middle), delayed(several)(shared, middle, batches)]
+    pool(jobs)
+    rounds = 7
+    both = best(lambda: pool(jobs), rounds)
+    one = best(lambda: several(shared, 0, batches), 3)
+    whole = best(lambda: run_trials(shared, 1, 1000, workers=2), 3)
+    found = estimate_batch(shared, 1, 0)
+    seconds = []
+    for k in range(singles):
+        start = time.perf_counter()
+        state = by_scipy(shared, k)
+        seconds.append(time.perf_counter() - start)
+        ours = shared.start.a + found.found.a[:, k]
+        assert np.abs(ours - state.a).max() < 1e-6 * found.found.a.std(axis=1).max()
+        balls = shared.start.balls + found.found.balls[:, :, k].T
+        assert np.abs(balls - state.balls).max() < 1e-6 * found.found.balls.std(axis=2).max()
+    times = 1000 * min(seconds) / (both * 1000 / (batches * BATCH))
+    rate = product_rate(shared)
+    LINES.append(
+        f"| {n} | {len(shared.design.readings)} | {one:.3f} | {both:.3f} | {whole:.3f} | {min(seconds):.2f} | "
+        f"{times:.0f} | {100 * rate:.0f} |"
+    )
+
+
+def by_scipy(shared: Reference, k: int) -> State:
+    """One replicate by a general-purpose optimiser with dense derivatives."""
+    design, start, layout = shared.design, shared.start, shared.factor.layout
+    drawn = draw(shared, 1, 0)
+    x = shared.exact.copy()
+    for group in shared.groups:
+        match = {
+            (int(b), int(p)): i
+            for i, (b, p) in enumerate(zip(design.readings.ball, design.readings.probe, strict=True))
+            if design.readings.position[i] == group.position
+        }
+        # Groups of a position hold its probes one after the other.
+        earlier = [g for g in shared.groups if g.position == group.position and g.rows.start < group.rows.start]
+        own = sorted({p for _, p in match})
+        turn = sum(1 for g in earlier if np.intersect1d(g.ball, group.ball).size)
+        rows = [match[int(ball), own[turn]] for ball in group.ball]
+        x[rows] += drawn.moved[:, group.rows, k].T
+    pairs = design.distances
+    real = shared.truth.state.balls
+    apart = np.sqrt(((real[pairs.first] - real[pairs.second]) ** 2).sum(axis=1))
+    observed = replace(design, distances=replace(pairs, value=apart + drawn.distances[:, k]))
+    n, d = design.balls.shape
+    columns = layout.pose_columns
+
+    def state_of(v: Array) -> State:
+        shared_part = v[n * d :]
+        poses = np.where(columns >= 0, shared_part[np.maximum(columns, 0)], 0.0)
+        return State(
+            start.balls + v[: n * d].reshape(n, d),
+            rotation_from_vector(poses[:, d:]) @ start.rotations,
+            start.origins + poses[:, :d],
+            start.a + shared_part[layout.model],
+        )
+
+    def residuals(v: Array) -> Array:
+        state = state_of(v)
+        blocks = reading_blocks(observed, state, observed.readings, x)
+        return np.concatenate([blocks.residual.ravel(), distance_rows(observed, state).residual])
+
+    def jacobian(v: Array) -> Array:
+        state, readings = state_of(v), observed.readings
+        blocks = reading_blocks(observed, state, readings, x)
+        m = len(readings)
+        rows = np.zeros((m, d, len(v)))
+        at = np.arange(m)
+        for axis in range(d):
+            rows[at, :, d * readings.ball + axis] = blocks.by_ball[:, :, axis]
+        used = columns[readings.position]
+        for j in range(columns.shape[1]):
+            free = used[:, j] >= 0
+            rows[at[free], :, n * d + used[free, j]] = blocks.by_pose[free, :, j]
+        rows[:, :, n * d + layout.model.start :] = blocks.by_model
+        tied = distance_rows(observed, state)
+        below = np.zeros((len(tied.residual), len(v)))
+        for axis in range(d):
+            below[np.arange(len(below)), d * pairs.first + axis] = tied.derivative[:, axis]
+            below[np.arange(len(below)), d * pairs.second + axis] = -tied.derivative[:, axis]
+        return np.concatenate([rows.reshape(m * d, -1), below])
+
+    solution = least_squares(
+        residuals,
+        np.zeros(n * d + len(layout)),
+        jacobian,
+        method="trf",
+        x_scale="jac",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    return state_of(solution.x)
+
+
+def product_rate(shared: Reference) -> float:
+    """Rate of the products with the derivatives by the model, as a share of dgemm's on arrays of the same shapes."""
+    from scipy.linalg.blas import dgemm
+
+    generator = np.random.default_rng(1)
+    step = generator.standard_normal((len(shared.start.a), BATCH))
+    work, plain = [], []
+    for group in shared.groups:
+        assert isinstance(group.model, Expansion)
+        pull = generator.standard_normal((3, len(group.ball), BATCH))
+        for i, columns in enumerate(group.model.columns):
+            matrix = group.model.by_parameters[i]
+            work.append((matrix, step, columns, pull[i]))
+            a, b, c = (np.asfortranarray(v) for v in (matrix, step[columns], pull[i]))
+            plain.append((a, b, c, np.asfortranarray(matrix.T)))
+
+    def ours() -> None:
+        for matrix, parameters, columns, force in work:
+            matrix @ parameters[columns]
+            matrix.T @ force
+
+    def bare() -> None:
+        for a, b, c, transposed in plain:
+            dgemm(1.0, a, b)
+            dgemm(1.0, transposed, c)
+
+    with threadpool_limits(1, user_api="blas"):
+        ours(), bare()
+        ratios = []
+        for _ in range(15):
+            start = time.perf_counter()
+            ours()
+            middle = time.perf_counter()
+            bare()
+            ratios.append((time.perf_counter() - middle) / (middle - start))
+    return float(np.median(ratios))
+
+
+def test_memory_does_not_grow_with_replicates() -> None:
+    """A run of a hundred thousand, and a million if asked for, in a process of its own."""
+    peaks = {}
+    for count in (1024, 100_000):
+        command = [sys.executable, "-m", "tests.benchmarks.bench_montecarlo", str(count)]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        peaks[count] = json.loads(done.stdout)
+        seconds, peak = peaks[count]["seconds"], peaks[count]["peak"]
+        LINES.append(f"{count} replicates at n = 5 in one process: {seconds:.1f} s, peak {peak:.0f} MiB")
+    assert peaks[100_000]["peak"] < 1.1 * peaks[1024]["peak"] + 10
+
+
+def test_table(capsys: pytest.CaptureFixture[str]) -> None:
+    with capsys.disabled():
+        print(
+            "\n\n| n | readings | 1000 in one process, s | in two, s | with statistics, s | SciPy, one, s | times faster | "
+        )
+        print("\n".join(LINES))
+
+
+if __name__ == "__main__":
+    begun = time.perf_counter()
+    run_trials(prepared(5), 1, int(sys.argv[1]))
+    result = {
+        "seconds": time.perf_counter() - begun,
+        "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    print(json.dumps(result))

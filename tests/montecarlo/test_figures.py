@@ -1,0 +1,194 @@
+"""Statistics of replicates: coverage, bias, their standard errors, and the same bits however the work is shared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
+from analysis.montecarlo.study import trials, true_experiment
+from analysis.montecarlo.tables import trials_data, trials_lines, with_error
+from analysis.montecarlo.tally import tally
+from analysis.montecarlo.targets import Target, sample_of_pairs, targets
+from analysis.montecarlo.trials import run_trials
+from analysis.study import plan
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+from simulator.montecarlo.reference import Reference, reference
+from simulator.montecarlo.replicates import BATCH, estimate_batch
+
+
+def shipped(path: str, name: str | None = None) -> Experiment:
+    return next(one for one in load(Path("designs") / path) if one.name == name)
+
+
+@cache
+def quickstart() -> Reference:
+    return reference(*true_experiment(shipped("quickstart.yaml")))
+
+
+@cache
+def two_thousand() -> Outcome:
+    """6.2.1 at n = 5, sigma 0.2 um, NDEL = NEPS = 5, on a machine with errors."""
+    return run_trials(quickstart(), 1, 2048)
+
+
+def test_intervals_cover_what_they_say() -> None:
+    """Over 2048 data sets, with sigma known and with sigma estimated."""
+    found = two_thousand()
+    assert found.trials == 2048 and not found.failed
+    for symbol in ("U1", "U2", "U3", "U4", "U5", "U6"):
+        one = found.comparisons[symbol]
+        for share in (one.known, one.estimated):
+            assert 0.0 < share.error < 0.003
+            assert abs(share.value - 0.95) < 4 * share.error, symbol
+        assert abs(one.spread.value - 1.0) < 4 * one.spread.error, symbol
+        assert one.bias.value < 0.1 and one.flags == (), symbol
+
+
+def test_residuals_are_those_of_a_right_model() -> None:
+    misfit = two_thousand().misfit
+    assert abs(misfit.mean.value - misfit.degrees_of_freedom) < 4 * misfit.mean.error
+    # The variance of chi-square is twice its degrees of freedom.
+    assert misfit.mean.error == pytest.approx(np.sqrt(2 * misfit.degrees_of_freedom / 2048), rel=0.1)
+    assert abs(misfit.rejected.value - 0.05) < 4 * misfit.rejected.error
+
+
+def test_linearised_uncertainties_are_those_of_the_plan() -> None:
+    planned = plan(shipped("quickstart.yaml")).quantities
+    found = two_thousand().comparisons
+    for symbol in ("U1", "U2", "U4", "U5"):
+        assert found[symbol].linear_average == pytest.approx(planned[symbol].average, rel=1e-3), symbol
+        assert found[symbol].linear_maximum == pytest.approx(planned[symbol].maximum, rel=1e-3), symbol
+    # A sample of the pairs of points.
+    assert found["U6"].sampled and found["U6"].linear_average == pytest.approx(planned["U6"].average, rel=0.02)
+
+
+def test_standard_errors_are_the_scatter_of_repeated_runs() -> None:
+    """Over 32 runs of 64 data sets each, every figure scatters as it says."""
+    shared = quickstart()
+    aims = targets(shared)
+    runs = [outcome(shared, aims, tally(shared, aims, estimate_batch(shared, 7, k), BATCH)) for k in range(32)]
+    for symbol in ("U1", "U4", "U6"):
+        for name in ("spread", "known", "estimated"):
+            figures: list[Figure] = [getattr(run.comparisons[symbol], name) for run in runs]
+            scatter = float(np.std([figure.value for figure in figures], ddof=1))
+            stated = float(np.sqrt(np.mean([figure.error**2 for figure in figures])))
+            # The scatter of 32 is itself known to 13 %.
+            assert 0.6 < scatter / stated < 1.5, (symbol, name)
+
+
+def test_bias_is_found_where_there_is_one_and_only_there() -> None:
+    shared = quickstart()
+    aims = targets(shared)
+    shifted = tuple(replace(aim, base=aim.base + 0.5 * aim.uncertainty) for aim in aims)
+    parts = [estimate_batch(shared, 1, k) for k in range(6)]
+
+    def found(followed: tuple[Target, ...]) -> Comparison:
+        first, *rest = (tally(shared, followed, part, BATCH) for part in parts)
+        return outcome(shared, followed, sum(rest, first)).comparisons["U5"]
+
+    with_bias, without = found(shifted), found(aims)
+    assert "bias" in with_bias.flags and abs(with_bias.bias.value - 0.5) < 4 * with_bias.bias.error
+    assert "bias" not in without.flags
+    assert with_bias.actual.value > 1.05 > with_bias.spread.value
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_same_bits_however_the_work_is_shared(workers: int) -> None:
+    """700 data sets are a whole task and a part of another."""
+    expected = run_trials(quickstart(), 3, 700)
+    assert run_trials(quickstart(), 3, 700, workers=workers) == expected
+    assert run_trials(quickstart(), 4, 700) != expected
+    assert expected.trials == 700
+
+
+def test_a_run_ends_when_it_is_accurate_enough() -> None:
+    found = run_trials(quickstart(), 1, 100_000, until=0.02)
+    worst = max(one.spread.error / one.spread.value for one in found.comparisons.values())
+    assert found.trials == 512 and worst <= 0.02
+
+
+def test_an_interruption_keeps_what_is_done() -> None:
+    def interrupt(progress: object) -> None:
+        raise KeyboardInterrupt
+
+    found = run_trials(quickstart(), 1, 5000, report=interrupt)
+    assert found.interrupted and found.trials == 512
+    assert replace(found, interrupted=False) == run_trials(quickstart(), 1, 512)
+
+
+def test_a_replicate_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    shared = quickstart()
+    aims = targets(shared)
+    found = estimate_batch(shared, 1, 2)
+    failed = replace(found, converged=found.converged & (np.arange(BATCH) != 5))
+    total = tally(shared, aims, failed, 60)
+    assert (total.count, total.failed) == (59, (2 * BATCH + 5,))
+    assert tally(shared, aims, failed, 4).failed == ()
+    none = outcome(shared, aims, tally(shared, aims, replace(found, converged=found.converged & False), 60))
+    assert none.comparisons == {} and len(none.failed) == 60
+
+
+def test_too_poor_a_model_is_too_optimistic() -> None:
+    """NPL Report CISE 15/98, section 5.3: an empirical machine, a kinematic fit."""
+    done = trials(shipped("npl/5.3.yaml", "kinematic fit"), 64)
+    assert done.outcome is not None and done.optimism is not None
+    for symbol in ("U4", "U5", "U6"):
+        one = done.outcome.comparisons[symbol]
+        assert one.actual.value > 5 and abs(one.spread.value - 1.0) < 4 * one.spread.error + 0.05
+        assert {"bias", "coverage"} <= set(one.flags)
+    assert "U3" not in done.outcome.comparisons
+    assert done.optimism.power > 0.999
+    lines = "\n".join(trials_lines(done))
+    assert "Too optimistic? The fitted model cannot follow the true machine." in lines
+    assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
+
+
+def test_a_model_that_holds_the_true_one_is_not_blamed() -> None:
+    done = trials(shipped("npl/5.2.yaml", "kinematic fit"), 64)
+    assert "the fitted one follows exactly" in "\n".join(trials_lines(done))
+    assert done.outcome is not None and done.outcome.comparisons["U6"].flags == ()
+
+
+def test_a_deficient_design_says_why_there_is_nothing() -> None:
+    done = trials(shipped("npl/6.1.1.yaml", "B"), 64)
+    assert done.outcome is None
+    assert trials_lines(done) == ["no Monte Carlo: the design is rank deficient by 2"]
+    assert trials_data(done) == {"reason": "the design is rank deficient by 2"}
+
+
+def test_power_of_a_misfit() -> None:
+    """Against a simulation of shifted normal variables."""
+    generator = np.random.default_rng(1)
+    shift = np.zeros(20)
+    shift[0] = 4.0
+    squares = ((generator.standard_normal((40_000, 20)) + shift) ** 2).sum(axis=1)
+    limit = np.quantile((generator.standard_normal((400_000, 20)) ** 2).sum(axis=1), 0.95)
+    assert power_of_misfit(20, 16.0) == pytest.approx(float((squares > limit).mean()), abs=0.01)
+
+
+def test_a_sample_of_pairs_has_each_pair_once() -> None:
+    first, second, sampled = sample_of_pairs(40, 500)
+    assert sampled and len(first) == 500
+    assert (first < second).all() and second.max() < 40 and first.min() >= 0
+    assert len({*zip(first.tolist(), second.tolist(), strict=True)}) == 500
+    whole = sample_of_pairs(40, 779)
+    assert len({*zip(whole[0].tolist(), whole[1].tolist(), strict=True)}) == 779
+
+
+@pytest.mark.parametrize(
+    ("figure", "text"),
+    [
+        (Figure(0.95, 0.0), "0.95"),
+        (Figure(1.0, 0.0996), "1.0(1)"),
+        (Figure(1234.0, 56.0), "1234(56)"),
+        (Figure(float("nan"), 1.0), "-"),
+    ],
+)
+def test_figures_with_their_error(figure: Figure, text: str) -> None:
+    assert with_error(figure) == text
