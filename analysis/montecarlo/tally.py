@@ -100,23 +100,23 @@ def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: 
     sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
     quantities = []
     for aim in aims:
-        change = aim.change(found.found)[:, used]
-        scatter = change / aim.uncertainty[:, None]
-        error = scatter + (aim.base / aim.uncertainty)[:, None]
+        change = aim.change(found.found)[used]
+        scatter = change / aim.uncertainty
+        error = scatter + aim.base / aim.uncertainty
         size = np.abs(error)
         numbers = np.stack(
             [
-                (scatter**2).mean(axis=0),
-                (error**2).mean(axis=0),
-                (size <= limits.known).mean(axis=0),
-                (size <= limits.estimated * sigma).mean(axis=0),
+                (scatter**2).mean(axis=1),
+                (error**2).mean(axis=1),
+                (size <= limits.known).mean(axis=1),
+                (size <= limits.estimated * sigma[:, None]).mean(axis=1),
             ]
         )
-        absolute = change + aim.base[:, None]
+        absolute = change + aim.base
         quantities.append(
             QuantityTally(
-                absolute.sum(axis=1),
-                (absolute**2).sum(axis=1),
+                absolute.sum(axis=0),
+                (absolute**2).sum(axis=0),
                 numbers.sum(axis=1),
                 (numbers**2).sum(axis=1),
             )

@@ -24,7 +24,7 @@ class Target:
     """A vector of q quantities.
 
     `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the linearised standard
-    uncertainties, `change` its change (q, b) in replicates, `units` (q,) metres, radians or 1. `sampled` tells that q
+    uncertainties, `change` its change (b, q) in replicates, `units` (q,) metres, radians or 1. `sampled` tells that q
     is a sample of all pairs.
     """
 
@@ -56,11 +56,11 @@ def targets(shared: Reference) -> tuple[Target, ...]:
         spread = jacobian @ found.shared[shared.factor.layout.model]
 
         def moved(replicates: Deviations) -> Array:
-            none = np.zeros((design.dimension, len(design.points), replicates.a.shape[1]))
+            none = np.zeros((len(replicates.a), design.dimension, len(design.points)))
             return shared.points.change(none, replicates.a)
 
         def errors(replicates: Deviations) -> Array:
-            return moved(replicates).transpose(1, 0, 2).reshape(design.points.size, -1)
+            return moved(replicates).swapaxes(1, 2).reshape(-1, design.points.size)
 
         base = (corrected - true).ravel()
         values = np.sqrt((spread**2).sum(axis=2)).ravel()
@@ -77,7 +77,7 @@ def _balls(shared: Reference, found: Covariance) -> Target:
     values = found.of_balls()[balls].ravel()
 
     def change(replicates: Deviations) -> Array:
-        return replicates.balls[:, balls].transpose(1, 0, 2).reshape(len(base), -1)
+        return replicates.balls[:, :, balls].swapaxes(1, 2).reshape(-1, len(base))
 
     return Target("U1", base, values, ("m",) * len(base), change)
 
@@ -90,7 +90,7 @@ def _poses(shared: Reference, found: Covariance) -> Target:
     rows = np.eye(len(layout))[layout.pose_columns[position, place]]
 
     def change(replicates: Deviations) -> Array:
-        return np.asarray(np.concatenate([replicates.origins, replicates.rotations], axis=1)[position, place])
+        return np.asarray(np.concatenate([replicates.origins, replicates.rotations], axis=2)[:, position, place])
 
     units = tuple("m" if j < d else "rad" for j in place)
     return Target("U2", base, found.of_shared(rows), units, change)
@@ -104,13 +104,13 @@ def _parameters(shared: Reference, found: Covariance) -> Target:
     rows[:, layout.model] = matrix
     base = matrix @ (shared.start.a - shared.truth.state.a)
     units = tuple(reported.units[i] for i in quoted)
-    return Target("U3", base, found.of_shared(rows), units, lambda replicates: matrix @ replicates.a)
+    return Target("U3", base, found.of_shared(rows), units, lambda replicates: replicates.a @ matrix.T)
 
 
 def _ball_distances(shared: Reference, found: Covariance, own: Integers) -> Target:
     start, real = shared.start.balls[own], shared.truth.state.balls[own]
     return _distances(
-        "U5", start, real, found.ball[own], found.ball_own[own], lambda replicates: replicates.balls[:, own]
+        "U5", start, real, found.ball[own], found.ball_own[own], lambda replicates: replicates.balls[:, :, own]
     )
 
 
@@ -134,11 +134,11 @@ def _distances(
 
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
-        difference = displaced[:, first] - displaced[:, second]
-        along = np.einsum("md,dmb->mb", between, difference)
-        total = np.sqrt(((between.T[:, :, None] + difference) ** 2).sum(axis=0))
+        difference = displaced[:, :, first] - displaced[:, :, second]
+        along = (between.T * difference).sum(axis=1)
+        total = np.sqrt(((between.T + difference) ** 2).sum(axis=1))
         # The difference of two lengths without the loss of digits that subtracting them would bring.
-        return np.asarray((2.0 * along + (difference**2).sum(axis=0)) / (total + length[:, None]))
+        return np.asarray((2.0 * along + (difference**2).sum(axis=1)) / (total + length))
 
     return Target(symbol, length - true_length, np.sqrt(variance), ("m",) * len(first), change, sampled)
 

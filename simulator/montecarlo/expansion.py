@@ -18,16 +18,16 @@ STEP = 1e-4
 class LocalModel(Protocol):
     """How the correction at m readings changes with the readings and with the model's parameters.
 
-    For b replicates `moved` (d, m, b) is what each reading differs by and `step` (n, b) what the parameters differ
-    by; without a step it is zero.
+    For b replicates `moved` (b, d, m) is what each reading differs by and `step` (b, n) what the parameters differ by;
+    without a step it is zero.
     """
 
     def change(self, moved: Array, step: Array | None) -> Array:
-        """Change of the correction (d, m, b)."""
+        """Change of the correction (b, d, m)."""
         ...
 
     def gather(self, moved: Array, step: Array | None, pull: Array) -> Array:
-        """The derivative by the parameters, transposed, times `pull` (d, m, b): (n, b)."""
+        """The derivative by the parameters, transposed, times `pull` (b, d, m): (b, n)."""
         ...
 
 
@@ -35,8 +35,8 @@ class LocalModel(Protocol):
 class Expansion:
     """A model that is linear in its parameters and smooth in the readings: matrix products serve all replicates.
 
-    For each component: `columns` the parameters that matter, `by_parameters` (m, columns), `by_reading` (axes, m),
-    and for each axis `mixed_columns` and `mixed` (m, columns), the derivative of `by_parameters` by the reading. A
+    For each component: `columns` the parameters that matter, `by_parameters` (columns, m), `by_reading` (axes, m),
+    and for each axis `mixed_columns` and `mixed` (columns, m), the derivative of `by_parameters` by the reading. A
     product of two small changes needs no more digits than single precision has.
     """
 
@@ -51,31 +51,31 @@ class Expansion:
         found = np.empty_like(moved)
         single = None if step is None else step.astype(np.float32)
         for i, by_reading in enumerate(self.by_reading):
-            total = found[i]
+            total = found[:, i]
             if step is None:
-                np.multiply(by_reading[0][:, None], moved[0], out=total)
+                np.multiply(by_reading[0], moved[:, 0], out=total)
             else:
-                np.matmul(self.by_parameters[i], step[self.columns[i]], out=total)
+                np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=total)
             for axis, along in enumerate(by_reading):
                 if step is None and axis == 0:
                     continue
-                slope: Array = along[:, None]
+                slope: Array = along
                 if single is not None and len(self.mixed_columns[i][axis]):
-                    slope = slope + self.mixed[i][axis] @ single[self.mixed_columns[i][axis]]
-                total += slope * moved[axis]
+                    slope = slope + single[:, self.mixed_columns[i][axis]] @ self.mixed[i][axis]
+                total += slope * moved[:, axis]
         return found
 
     def gather(self, moved: Array, step: Array | None, pull: Array) -> Array:
-        found = np.zeros((self.size, pull.shape[2]))
+        found = np.zeros((len(pull), self.size))
         for i, columns in enumerate(self.columns):
-            found[columns] += self.by_parameters[i].T @ pull[i]
+            found[:, columns] += pull[:, i] @ self.by_parameters[i].T
             if step is None:
                 continue
             for axis, mixed in enumerate(self.mixed[i]):
-                if mixed.shape[1]:
-                    both = np.empty(pull.shape[1:], np.float32)
-                    np.multiply(moved[axis], pull[i], out=both, casting="same_kind")
-                    found[self.mixed_columns[i][axis]] += mixed.T @ both
+                if len(mixed):
+                    both = np.empty(pull[:, i].shape, np.float32)
+                    np.multiply(moved[:, axis], pull[:, i], out=both, casting="same_kind")
+                    found[:, self.mixed_columns[i][axis]] += both @ mixed.T
         return found
 
 
@@ -90,20 +90,20 @@ class Direct:
     value: Array
 
     def _parameters(self, step: Array | None, k: int) -> Array:
-        return self.a if step is None else self.a + step[:, k]
+        return self.a if step is None else self.a + step[k]
 
     def change(self, moved: Array, step: Array | None) -> Array:
         found = np.empty_like(moved)
-        for k in range(moved.shape[2]):
-            error = self.model.error(self.x + moved[:, :, k].T, self._parameters(step, k), self.p)
-            found[:, :, k] = (error - self.value).T
+        for k in range(len(moved)):
+            error = self.model.error(self.x + moved[k].T, self._parameters(step, k), self.p)
+            found[k] = (error - self.value).T
         return found
 
     def gather(self, moved: Array, step: Array | None, pull: Array) -> Array:
-        found = np.empty((len(self.a), pull.shape[2]))
-        for k in range(pull.shape[2]):
-            jacobian = self.model.jacobian(self.x + moved[:, :, k].T, self._parameters(step, k), self.p)
-            found[:, k] = np.einsum("mdn,dm->n", jacobian, pull[:, :, k])
+        found = np.empty((len(pull), len(self.a)))
+        for k in range(len(pull)):
+            jacobian = self.model.jacobian(self.x + moved[k].T, self._parameters(step, k), self.p)
+            found[k] = np.einsum("mdn,dm->n", jacobian, pull[k])
         return found
 
 
@@ -126,10 +126,11 @@ def expand(model: ErrorModel, x: Array, a: Array, p: Array) -> Expansion:
     return Expansion(
         size=len(a),
         columns=columns,
-        by_parameters=tuple(np.ascontiguousarray(jacobian[:, i, columns[i]]) for i in range(d)),
+        by_parameters=tuple(np.ascontiguousarray(jacobian[:, i, columns[i]].T) for i in range(d)),
         by_reading=tuple(np.stack([one[:, i] for one in by_reading]) for i in range(d)),
         mixed_columns=mixed_columns,
         mixed=tuple(
-            tuple(mixed[axis][:, i, mixed_columns[i][axis]].astype(np.float32) for axis in range(d)) for i in range(d)
+            tuple(np.ascontiguousarray(mixed[axis][:, i, mixed_columns[i][axis]].T, np.float32) for axis in range(d))
+            for i in range(d)
         ),
     )

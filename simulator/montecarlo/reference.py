@@ -42,12 +42,13 @@ class Truth:
 class Group:
     """Readings `rows` of one position in which no ball occurs twice, at the reference.
 
-    `ball` (m,), `arm` (d, m) the balls turned into the machine's axes, `residual` (d, m) in metres and `weight` (d, m).
+    `ball` are their m balls, a slice where they follow one another, `arm` (d, m) the balls turned into the machine's
+    axes, `residual` (d, m) in metres and `weight` (d, m).
     """
 
     rows: slice
     position: int
-    ball: Integers
+    ball: Integers | slice
     arm: Array
     residual: Array
     weight: Array
@@ -118,7 +119,7 @@ def reference(design: Design, truth: Truth) -> Reference:
             Group(
                 slice(at, at + len(chosen)),
                 position,
-                rows.ball,
+                _as_slice(rows.ball),
                 np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
                 np.ascontiguousarray((blocks.residual / weight)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
@@ -182,6 +183,12 @@ def _groups(design: Design) -> list[Integers]:
     return found
 
 
+def _as_slice(ascending: Integers) -> Integers | slice:
+    """Indices as a slice if they follow one another: a view of an array instead of a copy."""
+    first, last = int(ascending[0]), int(ascending[-1])
+    return slice(first, last + 1) if last - first + 1 == len(ascending) else ascending
+
+
 def _local_models(
     design: Design, found: Spectrum, columns: slice, start: State, exact: Array
 ) -> Callable[[Array, Array], LocalModel]:
@@ -195,8 +202,8 @@ def _local_models(
         return expand(model, x, start.a, p)
 
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    noise = 1.0 / reading_weights(design, design.readings).T[:, :, None]
-    moved = noise * generator.standard_normal((design.dimension, len(exact), 2))
-    step = found.root[columns] @ generator.standard_normal((found.root.shape[1], 2))
+    noise = 1.0 / reading_weights(design, design.readings).T
+    moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
+    step = generator.standard_normal((2, found.root.shape[1])) @ found.root[columns].T
     difference = expanded(exact, p).change(moved, step) - direct(exact, p).change(moved, step)
     return expanded if bool((np.abs(difference) <= FAITHFUL * noise).all()) else direct

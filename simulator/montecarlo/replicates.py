@@ -37,8 +37,8 @@ SMALLEST_STEP = 1e-4
 class Deviations:
     """What b replicates differ by from the reference.
 
-    `balls` (d, n, b), `rotations` (k, pose size - d, b) as vectors about the machine's axes, `origins` (k, d, b) and
-    `a` (n, b).
+    `balls` (b, d, n), `rotations` (b, k, pose size - d) as vectors about the machine's axes, `origins` (b, k, d) and
+    `a` (b, n).
     """
 
     balls: Array
@@ -60,8 +60,8 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Draw:
-    """Noise of b replicates: of the plates' readings `moved` (d, m, b), of the certificates' distances, co-ordinates
-    and lengths (m, b), and of the readings of the lengths' two ends (d, m, b)."""
+    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the certificates' distances, co-ordinates
+    and lengths (b, m), and of the readings of the lengths' two ends (b, d, m)."""
 
     moved: Array
     distances: Array
@@ -74,11 +74,11 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     """Noise of one batch."""
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
-    moved = generator.standard_normal((*shared.noise.shape, BATCH))
-    moved *= shared.noise[:, :, None]
+    moved = generator.standard_normal((BATCH, *shared.noise.shape))
+    moved *= shared.noise
 
     def certificate(uncertainty: Array) -> Array:
-        return uncertainty[:, None] * generator.standard_normal((len(uncertainty), BATCH))
+        return uncertainty * generator.standard_normal((BATCH, len(uncertainty)))
 
     distances = certificate(design.distances.uncertainty)
     coordinates = certificate(design.coordinates.uncertainty)
@@ -90,10 +90,9 @@ def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Arra
     """Noise of the readings that lengths are formed of; a reading that serves several is drawn once."""
     both = np.stack([shared.design.lengths.first, shared.design.lengths.second])
     read, place = np.unique(both, return_inverse=True)
-    drawn = generator.standard_normal((shared.end_noise.shape[1], len(read), BATCH))
+    drawn = generator.standard_normal((BATCH, shared.end_noise.shape[1], len(read)))
     place = place.reshape(both.shape)
-    noise = shared.end_noise[:, :, :, None]
-    return drawn[:, place[0]] * noise[0], drawn[:, place[1]] * noise[1]
+    return drawn[:, :, place[0]] * shared.end_noise[0], drawn[:, :, place[1]] * shared.end_noise[1]
 
 
 @single_threaded
@@ -105,34 +104,34 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
     n, d = design.balls.shape
     k, turns = columns.shape[0], columns.shape[1] - d
     at = Deviations(
-        np.zeros((d, n, BATCH)),
-        np.zeros((k, turns, BATCH)),
-        np.zeros((k, d, BATCH)),
-        np.zeros((len(shared.start.a), BATCH)),
+        np.zeros((BATCH, d, n)),
+        np.zeros((BATCH, k, turns)),
+        np.zeros((BATCH, k, d)),
+        np.zeros((BATCH, len(shared.start.a))),
     )
     passes, converged = np.zeros(BATCH, np.int64), np.zeros(BATCH, bool)
     squares, first = np.full(BATCH, np.nan), np.zeros(BATCH)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
-            now, by_ball, by_shared = _gradient(shared, drawn, None if number == 0 else at, at)
+            now, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
             balls, common = _step(shared.factor, by_ball, by_shared)
             # A replicate that has converged is left alone, so that its end does not depend on its neighbours.
             active = ~converged
-            balls, common = balls * active, common * active
-            poses = np.where(columns[:, :, None] >= 0, common[np.maximum(columns, 0)], 0.0)
-            turn = poses[:, d:]
+            balls, common = balls * active[:, None, None], common * active[:, None]
+            poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
+            turn = poses[:, :, d:]
             at = Deviations(
                 at.balls + balls,
                 at.rotations + turn + 0.5 * _bracket(turn, at.rotations),
-                at.origins + poses[:, :d],
-                at.a + common[layout.model],
+                at.origins + poses[:, :, :d],
+                at.a + common[:, layout.model],
             )
             # S^2 after the step, which the quadratic that the factor stands for foretells to its own accuracy.
-            after = now + (by_ball * balls).sum(axis=(0, 1)) + (by_shared * common).sum(axis=0)
+            after = now + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
             squares = np.where(active, after, squares)
             size = np.maximum(
-                np.abs(common / layout.scale[:, None]).max(axis=0, initial=0.0),
-                np.abs(balls).max(axis=(0, 1), initial=0.0),
+                np.abs(common / layout.scale).max(axis=1, initial=0.0),
+                np.abs(balls).max(axis=(1, 2), initial=0.0),
             )
             passes += active
             if number == 0:
@@ -145,95 +144,87 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
     return Estimates(batch * BATCH + np.arange(BATCH), at, squares, passes, converged)
 
 
-def _gradient(shared: Reference, drawn: Draw, at: Deviations | None, shape: Deviations) -> tuple[Array, Array, Array]:
-    """S^2 (b,), its half gradient by the balls (d, n, b) and by the shared parameters (s, b).
+def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) -> tuple[Array, Array, Array]:
+    """S^2 (b,), its half gradient by the balls (b, d, n) and by the shared parameters (b, s).
 
-    `at` is None at the reference, where less is to be computed.
+    At the start all deviations are zero, and less is to be computed.
     """
-    layout = shared.factor.layout
+    layout, d = shared.factor.layout, shared.design.dimension
     squares = np.zeros(BATCH)
-    by_ball = np.zeros_like(shape.balls)
-    by_pose = np.zeros((len(shape.origins), layout.pose_columns.shape[1], BATCH))
-    by_shared = np.zeros((len(layout), BATCH))
+    by_ball = np.zeros_like(at.balls)
+    by_pose = np.zeros((BATCH, *layout.pose_columns.shape))
+    by_shared = np.zeros((BATCH, len(layout)))
+    step = None if is_start else at.a
     for group in shared.groups:
-        moved = drawn.moved[:, group.rows]
-        pull, arm = _pull(shared, group, moved, at, squares)
-        by_pose[group.position] -= np.concatenate([pull.sum(axis=1), _moment(arm, pull)])
-        back = pull if at is None else _turned(-at.rotations[group.position], pull)
-        rotation = shared.start.rotations[group.position]
-        by_ball[:, group.ball] -= (rotation.T @ back.reshape(len(rotation), -1)).reshape(back.shape)
-        by_shared[layout.model] += group.model.gather(moved, None if at is None else at.a, pull)
+        k = group.position
+        moved = drawn.moved[:, :, group.rows]
+        rotation = shared.start.rotations[k] if is_start else _turn(at.rotations[:, k]) @ shared.start.rotations[k]
+        pull, arm = _pull(shared, group, moved, at, is_start)
+        squares += np.einsum("bim,bim->b", pull, pull)
+        pull *= group.weight
+        by_pose[:, k, :d] -= pull.sum(axis=2)
+        by_pose[:, k, d:] -= _moment(pull @ arm.swapaxes(-1, -2))
+        by_ball[:, :, group.ball] -= np.swapaxes(rotation, -1, -2) @ pull
+        by_shared[:, layout.model] += group.model.gather(moved, step, pull)
     position, parameter = np.nonzero(layout.pose_columns >= 0)
-    by_shared[layout.pose_columns[position, parameter]] += by_pose[position, parameter]
-    _certificates(shared, drawn, shape.balls, squares, by_ball)
-    _lengths(shared, drawn, None if at is None else at.a, squares, by_shared)
+    by_shared[:, layout.pose_columns[position, parameter]] += by_pose[:, position, parameter]
+    _certificates(shared, drawn, at.balls, squares, by_ball)
+    _lengths(shared, drawn, step, squares, by_shared)
     return squares, by_ball, by_shared
 
 
-def _pull(shared: Reference, group: Group, moved: Array, at: Deviations | None, squares: Array) -> tuple[Array, Array]:
-    """Doubly weighted residuals (d, m, b) of a group, and its balls about their position's origin, (d, m, 1 or b)."""
-    residual = group.residual[:, :, None] + moved
-    arm = group.arm[:, :, None]
-    if at is None:
+def _pull(shared: Reference, group: Group, moved: Array, at: Deviations, is_start: bool) -> tuple[Array, Array]:
+    """Weighted residuals (b, d, m) of a group, and its balls about their position's origin, (d, m) or (b, d, m)."""
+    residual = group.residual + moved
+    arm = group.arm
+    if is_start:
         residual += group.model.change(moved, None)
     else:
         residual += group.model.change(moved, at.a)
-        balls = at.balls[:, group.ball]
-        rotation = shared.start.rotations[group.position]
-        straight = arm + (rotation @ balls.reshape(len(rotation), -1)).reshape(balls.shape)
-        turned = _turned(at.rotations[group.position], straight)
-        residual -= turned - arm
-        residual -= at.origins[group.position][:, None]
-        arm = turned
-    residual *= group.weight[:, :, None]
-    squares += np.einsum("imb,imb->b", residual, residual)
-    residual *= group.weight[:, :, None]
+        displaced = shared.start.rotations[group.position] @ at.balls[:, :, group.ball]
+        # Turned less straight, so that the small difference of two large vectors is never formed.
+        displaced += _turn_less_one(at.rotations[:, group.position]) @ (group.arm + displaced)
+        residual -= displaced
+        residual -= at.origins[:, group.position, :, None]
+        arm = group.arm + displaced
+    residual *= group.weight
     return residual, arm
 
 
-def _turned(turn: Array, vectors: Array) -> Array:
-    """Vectors (d, m, b) turned by rotation vectors (r, b), one for each replicate."""
-    angle = np.sqrt((turn**2).sum(axis=0))
+def _turn_less_one(turn: Array) -> Array:
+    """Rotation matrices (b, d, d) of rotation vectors (b, r), less the unit matrix, to full relative accuracy."""
+    b = len(turn)
+    if turn.shape[1] == 1:
+        s, half = np.sin(turn[:, 0]), np.sin(0.5 * turn[:, 0])
+        less = -2.0 * half**2
+        return np.stack([np.stack([less, -s], axis=1), np.stack([s, less], axis=1)], axis=1)
+    angle = np.sqrt((turn**2).sum(axis=1))
     # sin(t)/t and (1 - cos t)/t^2, both smooth at 0, where np.sinc is exact.
-    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    once = _cross(turn, vectors)
-    twice = _cross(turn, once)
-    once *= first
-    twice *= second
-    once += twice
-    once += vectors
-    return once
+    first, second = np.sinc(angle / np.pi)[:, None, None], (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None]
+    cross = np.zeros((b, 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2] = -turn[:, 2], turn[:, 1]
+    cross[:, 1, 0], cross[:, 1, 2] = turn[:, 2], -turn[:, 0]
+    cross[:, 2, 0], cross[:, 2, 1] = -turn[:, 1], turn[:, 0]
+    return np.asarray(first * cross + second * (cross @ cross))
 
 
-def _cross(turn: Array, vectors: Array) -> Array:
-    """turn (r, b) x vectors (d, m, b)."""
-    if len(vectors) == 2:
-        return np.stack([-turn[0] * vectors[1], turn[0] * vectors[0]])
-    found = np.empty_like(vectors)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        np.multiply(turn[j], vectors[k], out=found[i])
-        found[i] -= turn[k] * vectors[j]
-    return found
+def _turn(turn: Array) -> Array:
+    """Rotation matrices (b, d, d) of rotation vectors (b, r)."""
+    less = _turn_less_one(turn)
+    return np.asarray(less + np.eye(less.shape[1]))
 
 
-def _moment(arm: Array, pull: Array) -> Array:
-    """Sum over m of arm x pull: (3, b) in space, (1, b) in the plane; `arm` is (d, m, b) or (d, m, 1)."""
-
-    def product(i: int, j: int) -> Array:
-        if arm.shape[2] == 1:
-            return np.asarray(arm[i, :, 0] @ pull[j])
-        return np.asarray(np.einsum("mb,mb->b", arm[i], pull[j]))
-
-    planes = [(0, 1)] if len(arm) == 2 else [(1, 2), (2, 0), (0, 1)]
-    return np.stack([product(i, j) - product(j, i) for i, j in planes])
+def _moment(products: Array) -> Array:
+    """Sum of arm x pull from sums of pull_i arm_j, (b, d, d): (b, 3) in space, (b, 1) in the plane."""
+    planes = [(0, 1)] if products.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
+    return np.stack([products[:, j, i] - products[:, i, j] for i, j in planes], axis=1)
 
 
 def _bracket(turn: Array, before: Array) -> Array:
-    """turn x before, both (k, r, b): what two small rotations one after the other add to their sum, twice over."""
-    if turn.shape[1] == 1:
+    """turn x before, both (b, k, r): what two small rotations one after the other add to their sum, twice over."""
+    if turn.shape[2] == 1:
         return np.zeros_like(turn)
-    return np.cross(turn, before, axis=1)
+    return np.cross(turn, before)
 
 
 def _certificates(shared: Reference, drawn: Draw, balls: Array, squares: Array, by_ball: Array) -> None:
@@ -245,22 +236,26 @@ def _certificates(shared: Reference, drawn: Draw, balls: Array, squares: Array, 
         counts = np.arange(design.dimension)[:, None] < given.dimensions
         base = (start.balls[given.first] - start.balls[given.second]).T * counts
         exact = (true[given.first] - true[given.second]).T * counts
-        difference = base[:, :, None] + (balls[:, given.first] - balls[:, given.second]) * counts[:, :, None]
-        length = np.sqrt((difference**2).sum(axis=0))
-        residual = length - np.sqrt((exact**2).sum(axis=0))[:, None] - drawn.distances
-        residual /= given.uncertainty[:, None]
-        squares += (residual**2).sum(axis=0)
-        force = residual / (given.uncertainty[:, None] * length) * difference
-        for axis in range(design.dimension):
-            np.add.at(by_ball[axis], given.first, force[axis])
-            np.subtract.at(by_ball[axis], given.second, force[axis])
+        difference = base + (balls[:, :, given.first] - balls[:, :, given.second]) * counts
+        length = np.sqrt((difference**2).sum(axis=1))
+        residual = (length - np.sqrt((exact**2).sum(axis=0)) - drawn.distances) / given.uncertainty
+        squares += (residual**2).sum(axis=1)
+        force = (residual / (given.uncertainty * length))[:, None] * difference
+        # A ball may stand in several pairs.
+        of_pair = force.transpose(2, 0, 1)
+        pulled = np.zeros((len(start.balls), *of_pair.shape[1:]))
+        np.add.at(pulled, given.first, of_pair)
+        np.subtract.at(pulled, given.second, of_pair)
+        by_ball += pulled.transpose(1, 2, 0)
     known = design.coordinates
     if len(known):
         offset = start.balls[known.ball, known.axis] - true[known.ball, known.axis]
-        residual = offset[:, None] + balls[known.axis, known.ball] - drawn.coordinates
-        residual /= known.uncertainty[:, None]
-        squares += (residual**2).sum(axis=0)
-        np.add.at(by_ball, (known.axis, known.ball), residual / known.uncertainty[:, None])
+        residual = (offset + balls[:, known.axis, known.ball] - drawn.coordinates) / known.uncertainty
+        squares += (residual**2).sum(axis=1)
+        # A co-ordinate may be certified twice.
+        certified = np.zeros((start.balls.size, BATCH))
+        np.add.at(certified, design.dimension * known.ball + known.axis, (residual / known.uncertainty).T)
+        by_ball += certified.reshape(*start.balls.shape, BATCH).transpose(2, 1, 0)
 
 
 def _lengths(shared: Reference, drawn: Draw, step: Array | None, squares: Array, by_shared: Array) -> None:
@@ -269,43 +264,45 @@ def _lengths(shared: Reference, drawn: Draw, step: Array | None, squares: Array,
     if shared.ends is None:
         return
     first, second = shared.ends
-    difference = shared.end_difference.T[:, :, None] + (
+    difference = shared.end_difference.T + (
         drawn.ends[0] + first.change(drawn.ends[0], step) - drawn.ends[1] - second.change(drawn.ends[1], step)
     )
-    unit = difference / np.sqrt((difference**2).sum(axis=0))
-    unit = np.where(given.projected[:, None], given.direction.T[:, :, None], unit)
-    length = (unit * difference).sum(axis=0)
+    unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
+    unit = np.where(given.projected, given.direction.T, unit)
+    length = (unit * difference).sum(axis=1)
     scatter = ((given.direction.T**2) * (shared.end_noise**2).sum(axis=0)).sum(axis=0) * given.with_repeatability
-    weight = 1.0 / np.sqrt(given.uncertainty**2 + scatter)[:, None]
-    residual = weight * (length - given.value[:, None] - drawn.lengths)
-    squares += (residual**2).sum(axis=0)
-    pull = unit * (weight * residual)
+    weight = 1.0 / np.sqrt(given.uncertainty**2 + scatter)
+    residual = weight * (length - given.value - drawn.lengths)
+    squares += (residual**2).sum(axis=1)
+    pull = unit * (weight * residual)[:, None]
     model = shared.factor.layout.model
-    by_shared[model] += first.gather(drawn.ends[0], step, pull) - second.gather(drawn.ends[1], step, pull)
+    by_shared[:, model] += first.gather(drawn.ends[0], step, pull) - second.gather(drawn.ends[1], step, pull)
 
 
 def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
-    """Solve R'R step = -gradient for all replicates: steps of the balls (d, n, b), shared parameters (s, b)."""
+    """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared parameters (b, s)."""
     from scipy.linalg import solve_triangular
 
-    d, n, b = by_ball.shape
-    e, s = len(factor.eliminated), len(by_shared)
+    b, d, n = by_ball.shape
+    e, s = len(factor.eliminated), by_shared.shape[1]
     rows = factor.ball_shared.reshape(e * d, s)
-    single = _solve_balls_transposed(factor.ball_root, by_ball[:, factor.eliminated].transpose(1, 0, 2))
-    right = by_shared - rows.T @ single.reshape(e * d, b)
-    kept = by_ball[:, factor.kept].transpose(1, 0, 2).reshape(-1, b)
+    # The columns of the systems are replicates.
+    of_ball = np.ascontiguousarray(by_ball.transpose(2, 1, 0))
+    single = _solve_balls_transposed(factor.ball_root, of_ball[factor.eliminated])
+    right = by_shared.T - rows.T @ single.reshape(e * d, b)
+    kept = of_ball[factor.kept].reshape(-1, b)
     if len(factor.kept):
         kept = solve_triangular(factor.kept_root, kept, trans="T", check_finite=False)
         right = right - factor.kept_shared.T @ kept
     right = solve_triangular(factor.root, right, trans="T", check_finite=False)
     shared = solve_triangular(factor.root, right, check_finite=False)
-    steps = np.zeros((d, n, b))
+    steps = np.zeros((n, d, b))
     carried = (rows @ shared).reshape(e, d, b)
-    steps[:, factor.eliminated] = _solve_balls(factor.ball_root, single - carried).transpose(1, 0, 2)
+    steps[factor.eliminated] = _solve_balls(factor.ball_root, single - carried)
     if len(factor.kept):
         kept = solve_triangular(factor.kept_root, kept - factor.kept_shared @ shared, check_finite=False)
-        steps[:, factor.kept] = kept.reshape(-1, d, b).transpose(1, 0, 2)
-    return -steps, -shared
+        steps[factor.kept] = kept.reshape(-1, d, b)
+    return -np.ascontiguousarray(steps.transpose(2, 1, 0)), -shared.T
 
 
 def _solve_balls_transposed(root: Array, side: Array) -> Array:

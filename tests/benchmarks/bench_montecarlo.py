@@ -153,16 +153,8 @@ def by_scipy(shared: Reference, k: int) -> State:
             below[np.arange(len(below)), d * pairs.second + axis] = -tied.derivative[:, axis]
         return np.concatenate([rows.reshape(m * d, -1), below])
 
-    solution = least_squares(
-        residuals,
-        np.zeros(n * d + len(layout)),
-        jacobian,
-        method="trf",
-        x_scale="jac",
-        xtol=1e-15,
-        ftol=1e-15,
-        gtol=1e-15,
-    )
+    tight = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    solution = least_squares(residuals, np.zeros(n * d + len(layout)), jacobian, x_scale="jac", **tight)
     return state_of(solution.x)
 
 

@@ -123,24 +123,25 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
     plates = design.plate_readings
     for group in shared.groups:
         readings = design.readings.select(plates)
-        own = plates[(readings.position == group.position) & np.isin(readings.ball, group.ball)]
+        balls = np.arange(len(design.balls))[group.ball]
+        own = plates[(readings.position == group.position) & np.isin(readings.ball, balls)]
         # A ball's repeats stand in the groups of a position in the order of the readings.
         earlier = [g for g in shared.groups if g.position == group.position and g.rows.start < group.rows.start]
-        for place, ball in enumerate(group.ball):
-            turn = sum(int((g.ball == ball).sum()) for g in earlier)
+        for place, ball in enumerate(balls):
+            turn = sum(int((np.arange(len(design.balls))[g.ball] == ball).sum()) for g in earlier)
             row = own[design.readings.ball[own] == ball][turn]
-            x[row] += drawn.moved[:, group.rows.start + place, k]
+            x[row] += drawn.moved[k, :, group.rows.start + place]
     given = design.lengths
     for side, ends in enumerate((given.first, given.second)):
-        x[ends] += drawn.ends[side][:, :, k].T
+        x[ends] += drawn.ends[side][k].T
     pairs, known = design.distances, design.coordinates
     counts = np.arange(design.dimension) < pairs.dimensions[:, None]
     apart = (real.balls[pairs.first] - real.balls[pairs.second]) * counts
     observed = replace(
         design,
-        distances=replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + drawn.distances[:, k]),
-        coordinates=replace(known, value=real.balls[known.ball, known.axis] + drawn.coordinates[:, k]),
-        lengths=replace(given, value=given.value + drawn.lengths[:, k]),
+        distances=replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + drawn.distances[k]),
+        coordinates=replace(known, value=real.balls[known.ball, known.axis] + drawn.coordinates[k]),
+        lengths=replace(given, value=given.value + drawn.lengths[k]),
     )
     solution = gauss_newton(observed, x, start)
     return solution.state, solution.factor.sum_of_squares
@@ -151,12 +152,12 @@ def assert_agree(shared: Reference, found: Estimates, state: State, squares: flo
     start, own = shared.start, found.found
 
     def assert_close(value: np.ndarray, expected: np.ndarray, spread: np.ndarray) -> None:
-        np.testing.assert_allclose(value, expected, rtol=0, atol=1e-6 * float(spread.std(axis=-1).max()))
+        np.testing.assert_allclose(value, expected, rtol=0, atol=1e-6 * float(spread.std(axis=0).max()))
 
-    assert_close(start.balls + own.balls[:, :, k].T, state.balls, own.balls)
-    assert_close(start.origins + own.origins[:, :, k], state.origins, own.origins)
-    assert_close(start.a + own.a[:, k], state.a, own.a)
-    turned = rotation_from_vector(own.rotations[:, :, k]) @ start.rotations
+    assert_close(start.balls + own.balls[k].T, state.balls, own.balls)
+    assert_close(start.origins + own.origins[k], state.origins, own.origins)
+    assert_close(start.a + own.a[k], state.a, own.a)
+    turned = rotation_from_vector(own.rotations[k]) @ start.rotations
     assert_close(turned, state.rotations, own.rotations)
     assert found.sum_of_squares[k] == pytest.approx(squares, rel=1e-6)
 
