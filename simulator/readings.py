@@ -12,9 +12,10 @@ import numpy as np
 
 from .design import Design, Integers, Readings
 from .experiment.messages import ExperimentError, Message
-from .experiment.tables import Row, read_table
-from .experiment.yamltree import read_text
+from .experiment.tables import Row, column_names, read_table
+from .experiment.yamltree import Mark
 from .machines.protocol import Array
+from .misreading_messages import refuse_misreadings
 from .settings import hint, listing
 
 AXES = ("x", "y", "z")
@@ -25,12 +26,14 @@ class ObservedReadings:
     """A design whose readings are those of a file, with their scale readings x (readings, d) in metres.
 
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the design did not foresee.
+    `marks` tell where each reading stands; of the mean of several, where the first does.
     """
 
     design: Design
     x: Array
     missing: tuple[str, ...]
     unplanned: tuple[str, ...]
+    marks: tuple[Mark, ...] = ()
 
 
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
@@ -50,10 +53,11 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
     The probe's column may be left out where there is one probe only. A reading that stands in the file several
     times counts as often.
 
-    :raises ExperimentError: a wrong table, or names that the design does not know; all of them at once.
+    :raises ExperimentError: a wrong table, names that the design does not know, or readings that cannot be of the
+        ball they name (`estimation.misreadings`); all of a kind at once.
     """
     texts = ["position", "ball", "probe"]
-    if len(design.probe_names) == 1 and "probe" not in read_text(path).partition("\n")[0]:
+    if len(design.probe_names) == 1 and "probe" not in column_names(path):
         texts.remove("probe")
     rows = read_table(path, texts, AXES[: design.dimension])
     index, messages = _indices(rows, design)
@@ -61,14 +65,17 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
         raise ExperimentError(messages)
     x = np.array([row.lengths for row in rows])
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
-    missing, unplanned = _compare(design, readings)
+    missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread):
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
         raise ExperimentError(
             [Message(str(path), 0, 0, "", f"no reading of the balls {names}; read each at least once")]
         )
-    return _combine_standards(design, readings, x, missing, unplanned)
+    marks = tuple(row.mark for row in rows)
+    observed = _combine_standards(design, readings, x, missing, unplanned, marks)
+    refuse_misreadings(observed.design, observed.x, observed.marks)
+    return observed
 
 
 def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Message]]:
@@ -100,28 +107,34 @@ def _key(readings: Readings) -> list[tuple[int, int, int]]:
     return [(row[0], row[1], row[2]) for row in table.tolist()]
 
 
-def _compare(design: Design, readings: Readings) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _compare(design: Design, readings: Readings, lines: list[int]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, found = _key(design.readings.expanded()), _key(readings)
 
     def name(key: tuple[int, int, int]) -> str:
         position, ball, probe = key
         return f"{design.position_names[position]}: ball {design.ball_label(ball)} with {design.probe_names[probe]}"
 
-    def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> tuple[str, ...]:
+    def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> list[int]:
         left = Counter(others)
-        names = []
-        for key in these:
+        surplus = []
+        for i, key in enumerate(these):
             if left[key]:
                 left[key] -= 1
             else:
-                names.append(name(key))
-        return tuple(names)
+                surplus.append(i)
+        return surplus
 
-    return without(planned, found), without(found, planned)
+    missing = tuple(name(planned[i]) for i in without(planned, found))
+    return missing, tuple(f"{name(found[i])} (line {lines[i]})" for i in without(found, planned))
 
 
 def _combine_standards(
-    design: Design, readings: Readings, x: Array, missing: tuple[str, ...], unplanned: tuple[str, ...]
+    design: Design,
+    readings: Readings,
+    x: Array,
+    missing: tuple[str, ...],
+    unplanned: tuple[str, ...],
+    marks: tuple[Mark, ...],
 ) -> ObservedReadings:
     """Take the mean of what a length standard's repeats read, and let its lengths point to it.
 
@@ -156,4 +169,5 @@ def _combine_standards(
     chosen = np.concatenate([plate, first])
     combined = replace(readings.select(chosen), repeats=np.concatenate([np.ones(len(plate), np.int64), repeats]))
     observed = replace(design, readings=combined, lengths=lengths)
-    return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned)
+    chosen_marks = tuple(marks[i] for i in chosen)
+    return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned, chosen_marks)
