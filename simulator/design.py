@@ -20,19 +20,25 @@ def pose_size(dimension: int) -> int:
 
 @dataclass(frozen=True)
 class Readings:
-    """Which ball is read in which position with which probe, and how often; all arrays (m,)."""
+    """Which ball is read in which position with which probe, and how often; all arrays (m,).
+
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None where all
+    have the machine's repeatability.
+    """
 
     ball: Integers
     position: Integers
     probe: Integers
     repeats: Integers
+    uncertainty: Array | None = None
 
     def __len__(self) -> int:
         return len(self.ball)
 
     def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
         """The readings at the given indices."""
-        return Readings(self.ball[chosen], self.position[chosen], self.probe[chosen], self.repeats[chosen])
+        uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
+        return Readings(self.ball[chosen], self.position[chosen], self.probe[chosen], self.repeats[chosen], uncertainty)
 
     def expanded(self) -> Readings:
         """One row for each repeat."""
@@ -173,6 +179,13 @@ class State:
     rotations: Array
     origins: Array
     a: Array
+
+
+def reading_uncertainties(design: Design, readings: Readings) -> Array:
+    """Standard uncertainties (m, d) of each co-ordinate of a single one of each reading's repeats, in metres."""
+    if readings.uncertainty is not None:
+        return readings.uncertainty
+    return np.broadcast_to(design.repeatability, (len(readings), design.dimension))
 
 
 def nominal_state(design: Design) -> State:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .design import Design, Readings, State, locations
+from .design import Design, Readings, State, locations, reading_uncertainties
 from .machines.protocol import Array, ErrorModel
 
 
@@ -41,9 +41,9 @@ def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
 
 
 def noisy_readings(design: Design, truth: State, generator: np.random.Generator) -> tuple[Readings, Array]:
-    """The same with normal noise of the design's repeatability added to each co-ordinate."""
+    """The same with normal noise of the readings' standard uncertainties added to each co-ordinate."""
     readings, x = exact_readings(design, truth)
-    return readings, x + generator.standard_normal(x.shape) * design.repeatability
+    return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(design, readings)
 
 
 def noisy_certificate(design: Design, truth: State, generator: np.random.Generator) -> Design:

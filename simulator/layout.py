@@ -83,19 +83,26 @@ def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
 def _readings(experiment: Experiment, first_ball: dict[str, int], probe_index: dict[str, int]) -> Readings:
     """All readings in the order of the file, the same one named twice merged into one with more repeats."""
     rows = []
+    uncertainties = [experiment.machine.repeatability]
     for k, place in enumerate(experiment.positions):
         for group in place.readings:
             balls = first_ball[place.artefact] + group.ball_indices
+            # Readings of the same ball with different uncertainties stay apart.
+            kind = 0
+            if group.standard_uncertainty is not None:
+                kind = len(uncertainties)
+                uncertainties.append(group.standard_uncertainty)
             for name in group.probes:
-                columns = np.full((len(balls), 4), (0, k, probe_index[name], group.repeats), np.int64)
+                columns = np.full((len(balls), 5), (0, k, probe_index[name], kind, group.repeats), np.int64)
                 columns[:, 0] = balls
                 rows.append(columns)
     table = np.concatenate(rows)
-    unique, first, inverse = np.unique(table[:, :3], axis=0, return_index=True, return_inverse=True)
-    repeats = np.bincount(inverse.ravel(), weights=table[:, 3], minlength=len(unique)).astype(np.int64)
+    unique, first, inverse = np.unique(table[:, :4], axis=0, return_index=True, return_inverse=True)
+    repeats = np.bincount(inverse.ravel(), weights=table[:, 4], minlength=len(unique)).astype(np.int64)
     order = np.argsort(first, kind="stable")
-    ball, position, probe = unique[order].T
-    return Readings(ball, position, probe, repeats[order])
+    ball, position, probe, kind_of = unique[order].T
+    uncertainty = np.array(uncertainties)[kind_of] if len(uncertainties) > 1 else None
+    return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
 def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordinates:

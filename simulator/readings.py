@@ -50,21 +50,30 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
 def read_readings(path: Path, design: Design) -> ObservedReadings:
     """Readings of a file as observations of a design.
 
-    The probe's column may be left out where there is one probe only. A reading that stands in the file several
-    times counts as often.
+    The probe's column may be left out where there is one probe only. An optional column u, with a unit as in u_um,
+    states the standard uncertainty of each co-ordinate of a reading; without it a reading has the uncertainty that
+    the design plans for it, and one that is not planned the machine's repeatability. A reading that stands in the
+    file several times counts as often.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that cannot be of the
         ball they name (`estimation.misreadings`); all of a kind at once.
     """
     texts = ["position", "ball", "probe"]
-    if len(design.probe_names) == 1 and "probe" not in column_names(path):
+    columns, d = column_names(path), design.dimension
+    if len(design.probe_names) == 1 and "probe" not in columns:
         texts.remove("probe")
-    rows = read_table(path, texts, AXES[: design.dimension])
+    rows = read_table(path, texts, AXES[:d], ["u"])
     index, messages = _indices(rows, design)
+    lengths = np.array([row.lengths for row in rows])
+    x, stated = lengths[:, :d], lengths[:, d]
+    if "u" in columns:
+        text = "a standard uncertainty must be above zero; correct it, or leave the column out"
+        messages += [rows[i].mark.message("", text) for i in np.flatnonzero(stated <= 0.0)]
     if messages:
         raise ExperimentError(messages)
-    x = np.array([row.lengths for row in rows])
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
+    uncertainty = np.repeat(stated[:, None], d, axis=1) if "u" in columns else _planned_uncertainty(design, readings)
+    readings = replace(readings, uncertainty=uncertainty)
     missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread):
@@ -105,6 +114,15 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
 def _key(readings: Readings) -> list[tuple[int, int, int]]:
     table = np.stack([readings.position, readings.ball, readings.probe], axis=1)
     return [(row[0], row[1], row[2]) for row in table.tolist()]
+
+
+def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
+    """Standard uncertainties (m, d) that the design plans for the readings, None where it plans none in particular."""
+    planned = design.readings
+    if planned.uncertainty is None:
+        return None
+    of_key = dict(zip(_key(planned), planned.uncertainty, strict=True))
+    return np.array([of_key.get(key, design.repeatability) for key in _key(readings)])
 
 
 def _compare(design: Design, readings: Readings, lines: list[int]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -168,6 +186,11 @@ def _combine_standards(
     )
     chosen = np.concatenate([plate, first])
     combined = replace(readings.select(chosen), repeats=np.concatenate([np.ones(len(plate), np.int64), repeats]))
+    if readings.uncertainty is not None:
+        variance = readings.uncertainty**2
+        # The mean is a plain one, whatever the uncertainties of its parts.
+        of_means = np.sqrt([variance[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
+        combined = replace(combined, uncertainty=np.concatenate([readings.uncertainty[plate], of_means]))
     observed = replace(design, readings=combined, lengths=lengths)
     chosen_marks = tuple(marks[i] for i in chosen)
     return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned, chosen_marks)

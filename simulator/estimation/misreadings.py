@@ -184,8 +184,8 @@ def _against_readings(
         if sweep >= 3:
             fresh = _worst_of_each_ball(readings.ball, apart, suspect & (count[readings.ball] > 2))
             # Two readings are equally far from their mean; the drawing may tell which of them is wrong.
-            two = np.flatnonzero(suspect & (count[readings.ball] == 2))
-            two = two[np.argsort(readings.ball[two], kind="stable")].reshape(-1, 2)
+            halves = np.flatnonzero(suspect & (count[readings.ball] == 2))
+            two = halves[np.argsort(readings.ball[halves], kind="stable")].reshape(-1, 2)
             clear = off_drawing[two].max(axis=1, initial=0.0) > 4 * off_drawing[two].min(axis=1, initial=np.inf)
             decided = two[clear]
             fresh[decided[np.arange(len(decided)), off_drawing[decided].argmax(axis=1)]] = True

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design, Readings, State, locations, pose_size
+from ..design import Design, Readings, State, locations, pose_size, reading_uncertainties
 from ..machines.protocol import Array
 
 
@@ -56,7 +56,7 @@ def rotation_sensitivity(arm: Array) -> Array:
 
 def reading_weights(design: Design, readings: Readings) -> Array:
     """Reciprocal standard uncertainties (m, d) of the mean of each reading's repeats."""
-    return np.asarray(np.sqrt(readings.repeats)[:, None] / design.repeatability)
+    return np.asarray(np.sqrt(readings.repeats)[:, None] / reading_uncertainties(design, readings))
 
 
 def reading_blocks(design: Design, state: State, readings: Readings, x: Array | None) -> ReadingBlocks:
@@ -112,7 +112,7 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
         points = expected_readings(design, state, readings) if x is None else x[chosen]
         corrected.append(points + (p if x is None else design.model.error(points, state.a, p)))
         jacobian.append(design.model.jacobian(points, state.a, p))
-        noise.append(design.repeatability**2 / readings.repeats[:, None])
+        noise.append(reading_weights(design, readings) ** -2)
     difference = corrected[0] - corrected[1]
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected[:, None], given.direction, unit)

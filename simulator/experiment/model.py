@@ -44,12 +44,14 @@ class ReadingGroup:
     """Balls read with the same probes: each ball with each probe, ``repeats`` times.
 
     ``probes``: names. ``balls``: names, ``ball_indices``: (k,) the same as indices into the layout.
+    ``standard_uncertainty``: (d,) metres of each reading, None where it is the machine's repeatability.
     """
 
     probes: tuple[str, ...]
     balls: tuple[str, ...]
     ball_indices: Indices
     repeats: int
+    standard_uncertainty: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

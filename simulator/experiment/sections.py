@@ -72,6 +72,14 @@ class SomeAxisLengthsSettings(Settings):
 Edges = Annotated[tuple[PositiveLength, ...], Field(min_length=2, max_length=3)]
 
 
+LengthPerAxis = Annotated[
+    Annotated[PositiveLength, Tag("<one>")]
+    | Annotated[Edges, Tag("<list>")]
+    | Annotated[AxisLengthsSettings, Tag("<mapping>")],
+    FORM,
+]
+
+
 class MachineSettings(Settings):
     """The machine: where it can measure and how well it repeats."""
 
@@ -81,12 +89,9 @@ class MachineSettings(Settings):
         | Annotated[VolumeSettings, Tag("<one>")],
         FORM,
     ] = Field(description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]; two axes: 2-D")
-    repeatability: Annotated[
-        Annotated[PositiveLength, Tag("<one>")]
-        | Annotated[Edges, Tag("<list>")]
-        | Annotated[AxisLengthsSettings, Tag("<mapping>")],
-        FORM,
-    ] = Field(description="standard uncertainty of a reading: for every co-ordinate, or one per axis")
+    repeatability: LengthPerAxis = Field(
+        description="standard uncertainty of a reading: for every co-ordinate, or one per axis"
+    )
 
 
 class InPlaneSettings(Settings):
@@ -118,6 +123,9 @@ class ReadingSettings(Settings):
     probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")
     balls: BallSelection = Field("all", description="all, or a list of balls")
     repeats: Count = Field(1, description="how often every ball is read with every probe")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None, description="of each of these readings, one length or per axis; default: machine.repeatability"
+    )
 
 
 class PositionSettings(Settings):
@@ -136,8 +144,11 @@ class PositionSettings(Settings):
     probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")
     balls: BallSelection | None = Field(None, description="all (default), or a list of balls")
     repeats: Count | None = Field(None, description="how often every ball is read with every probe; default 1")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None, description="of each reading there, one length or per axis; default: machine.repeatability"
+    )
     readings: Annotated[tuple[ReadingSettings, ...], Field(min_length=1)] | None = Field(
-        None, description="groups of readings, instead of probes, balls and repeats"
+        None, description="groups of readings, instead of probes, balls, repeats and standard_uncertainty"
     )
 
 
