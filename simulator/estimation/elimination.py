@@ -24,6 +24,9 @@ from .parameters import SharedLayout
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
 ROWS_AT_ONCE = 2048
 
+# Columns that are eliminated before the rest is multiplied by them.
+PANEL = 16
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -70,7 +73,7 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
         q, r = np.linalg.qr(by_ball)
         top = q.transpose(0, 2, 1) @ rest
         rest -= q @ top
-        shared = _triangle(np.concatenate([shared, rest.reshape(-1, s + 1)]))
+        shared = _absorbed(shared, rest.reshape(-1, s + 1))
         order.append(balls)
         roots.append(r)
         tops.append(top)
@@ -118,6 +121,18 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
         sum_of_squares=total,
         remainder=float(triangle[-1, -1] ** 2),
     )
+
+
+def _absorbed(triangle: Array, rows: Array) -> Array:
+    """Triangular factor of `triangle` (up to s, s) with `rows` (m, s) below it."""
+    if len(rows) < ROWS_AT_ONCE // 2:
+        return _triangle(np.concatenate([triangle, rows]))
+    # Three times as fast on many rows, which pay for the time that it takes to import.
+    from scipy.linalg.lapack import dtpqrt
+
+    above = np.asfortranarray(_square(triangle, rows.shape[1]))
+    found, _, _, _ = dtpqrt(0, min(PANEL, rows.shape[1]), above, np.asfortranarray(rows), overwrite_a=1, overwrite_b=1)
+    return np.triu(found)
 
 
 def _triangle(rows: Array) -> Array:

@@ -1,0 +1,196 @@
+"""What all replicates share: the readings without noise, the estimate from them and one factorisation there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..design import Design, Integers, State
+from ..estimation.covariance import Spectrum
+from ..estimation.elimination import Factor
+from ..estimation.gauss_newton import gauss_newton
+from ..estimation.initial import initial_state
+from ..estimation.observations import reading_blocks, reading_weights
+from ..generate import scale_readings
+from ..machines.protocol import Array, ErrorModel
+from ..threads import single_threaded
+from .expansion import Direct, Expansion, LocalModel, expand
+
+# Readings handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
+READINGS_AT_ONCE = 512
+
+# How well, in standard uncertainties of a reading, the expansion of a model must agree with the model itself.
+FAITHFUL = 1e-8
+
+
+class NoReferenceError(ValueError):
+    """The readings without noise do not give an estimate that the replicates could be compared with."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The true artefacts and poses, and the true machine, whose error model need not be the fitted one."""
+
+    state: State
+    model: ErrorModel
+
+
+@dataclass(frozen=True)
+class Group:
+    """Readings `rows` of one position in which no ball occurs twice, at the reference.
+
+    `ball` (m,), `arm` (d, m) the balls turned into the machine's axes, `residual` (d, m) in metres and `weight` (d, m).
+    """
+
+    rows: slice
+    position: int
+    ball: Integers
+    arm: Array
+    residual: Array
+    weight: Array
+    model: LocalModel
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What all replicates share.
+
+    The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
+    the model at the first and the second ends of the length standards' lengths, with `end_noise` (2, d, m) and
+    `end_difference` (m, d), their difference at the reference. `start` is the estimate from readings without noise.
+    """
+
+    design: Design
+    truth: Truth
+    start: State
+    factor: Factor
+    spectrum: Spectrum
+    noise: Array
+    groups: tuple[Group, ...]
+    ends: tuple[LocalModel, LocalModel] | None
+    end_noise: Array
+    end_difference: Array
+    exact: Array
+
+    @property
+    def sum_of_squares(self) -> float:
+        """S^2 of readings without noise: zero unless the true machine is none of the fitted model's."""
+        return self.factor.sum_of_squares
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        return self.design.observations - self.design.parameter_count
+
+
+@single_threaded
+def reference(design: Design, truth: Truth) -> Reference:
+    """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.
+
+    :raises NoReferenceError: a rank deficient design, or readings without noise that cannot be fitted.
+    :raises NoReadingError: errors of the true machine so large that no reading belongs to some location.
+    """
+    observed = _observed(design)
+    readings = observed.readings
+    p = observed.probes[readings.probe]
+    turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
+    exact = scale_readings(truth.model, turned + truth.state.origins[readings.position], truth.state.a, p)
+    solution = gauss_newton(observed, exact, initial_state(observed, exact))
+    if solution.spectrum.deficiency:
+        raise NoReferenceError(f"the design is rank deficient by {solution.spectrum.deficiency}")
+    if solution.status != "converged":
+        raise NoReferenceError(f"the estimate from readings without noise has {solution.status}")
+    start, plates = solution.state, observed.plate_readings
+    local = _local_model(observed, solution.spectrum, solution.factor.layout.model, start, exact)
+    blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
+    weight = reading_weights(observed, readings.select(plates))
+    groups, at = [], 0
+    for chosen in _groups(observed):
+        rows = readings.select(plates[chosen])
+        position = int(rows.position[0])
+        groups.append(
+            Group(
+                slice(at, at + len(chosen)),
+                position,
+                rows.ball,
+                np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
+                np.ascontiguousarray((blocks.residual / weight)[chosen].T),
+                np.ascontiguousarray(weight[chosen].T),
+                local(plates[chosen]),
+            )
+        )
+        at += len(chosen)
+    order = np.concatenate([np.arange(0), *_groups(observed)])
+    given = observed.lengths
+    ends = (local(given.first), local(given.second)) if len(given) else None
+    both = np.stack([given.first, given.second])
+    corrected = exact[both] + np.stack(
+        [observed.model.error(exact[k], start.a, p[k]) for k in both] if len(given) else [exact[k] for k in both]
+    )
+    return Reference(
+        observed,
+        truth,
+        start,
+        solution.factor,
+        solution.spectrum,
+        np.ascontiguousarray((1.0 / weight)[order].T),
+        tuple(groups),
+        ends,
+        np.stack([(1.0 / reading_weights(observed, readings.select(k))).T for k in both]),
+        corrected[0] - corrected[1],
+        exact,
+    )
+
+
+def _observed(design: Design) -> Design:
+    """The design with a row for each repeat, but for length standards, whose lengths point to their readings."""
+    lengths, readings = design.lengths, design.readings
+    times = readings.repeats.copy()
+    times[np.setdiff1d(np.arange(len(readings)), design.plate_readings)] = 1
+    chosen = np.repeat(np.arange(len(readings)), times)
+    first = np.cumsum(times) - times
+    repeats = np.where(times == readings.repeats, 1, readings.repeats)[chosen]
+    single = replace(readings.select(chosen), repeats=repeats)
+    return replace(
+        design,
+        readings=single,
+        lengths=replace(lengths, first=first[lengths.first], second=first[lengths.second]),
+    )
+
+
+def _groups(design: Design) -> list[Integers]:
+    """Indices into the plates' readings: of one position each, no ball twice, of bounded number."""
+    readings = design.readings.select(design.plate_readings)
+    key = readings.position * len(design.ball_names) + readings.ball
+    order = np.argsort(key, kind="stable")
+    first = np.searchsorted(key[order], key[order])
+    turn = np.empty(len(key), np.int64)
+    turn[order] = np.arange(len(key)) - first
+    order = np.lexsort((readings.ball, turn, readings.position))
+    changes = np.diff(readings.position[order]) | np.diff(turn[order])
+    found: list[Integers] = []
+    for part in np.split(order, np.flatnonzero(changes) + 1):
+        pieces = -(-len(part) // READINGS_AT_ONCE)
+        found += [piece for piece in np.array_split(part, pieces) if len(piece)] if len(part) else []
+    return found
+
+
+def _local_model(design: Design, found: Spectrum, model: slice, start: State, exact: Array):  # type: ignore[no-untyped-def]
+    """A function from indices of readings to the model about them: expanded where that is faithful."""
+    p = design.probes[design.readings.probe]
+
+    def direct(chosen: Integers) -> Direct:
+        value = design.model.error(exact[chosen], start.a, p[chosen])
+        return Direct(design.model, exact[chosen], start.a, p[chosen], value)
+
+    def expanded(chosen: Integers) -> Expansion:
+        return expand(design.model, exact[chosen], start.a, p[chosen])
+
+    used = np.arange(len(exact))
+    generator = np.random.default_rng(np.random.SeedSequence(0))
+    noise = 1.0 / reading_weights(design, design.readings)
+    moved = noise.T[:, :, None] * generator.standard_normal((design.dimension, len(exact), 2))
+    step = found.root[model] @ generator.standard_normal((found.root.shape[1], 2))
+    difference = expanded(used).change(moved, step) - direct(used).change(moved, step)
+    is_faithful = bool((np.abs(difference) <= FAITHFUL * noise.T[:, :, None]).all())
+    return expanded if is_faithful else direct

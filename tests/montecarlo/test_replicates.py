@@ -1,0 +1,204 @@
+"""Replicates estimated many at a time against the estimator run on each of them by itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simulator.design import Coordinates, Design, Lengths, Readings, State, nominal_state
+from simulator.estimation.gauss_newton import gauss_newton
+from simulator.geometry.motions import rotation_from_vector
+from simulator.machines.metric import MetricModel
+from simulator.montecarlo.expansion import Direct, Expansion
+from simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
+from simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
+from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
+
+
+def truth(design: Design, seed: int = 1, size: float = 2e-6) -> Truth:
+    """Artefacts and poses a little off the drawing, on a machine with errors."""
+    generator = np.random.default_rng(seed)
+    drawn = nominal_state(design)
+    free = (~design.held[:, : design.dimension]).all(axis=1)
+    turn = rotation_from_vector(1e-4 * generator.standard_normal((len(free), design.held.shape[1] - design.dimension)))
+    state = State(
+        drawn.balls + 1e-5 * generator.standard_normal(drawn.balls.shape),
+        np.where(free[:, None, None], turn @ drawn.rotations, drawn.rotations),
+        drawn.origins + 1e-5 * free[:, None] * generator.standard_normal(drawn.origins.shape),
+        size * generator.standard_normal(len(drawn.a)) / [p.effect for p in design.model.parameters],
+    )
+    return Truth(state, design.model)
+
+
+def small(pairs: bool = True, kept: bool = False) -> Design:
+    balls = grid(4)
+    sides = neighbours(balls) if kept else corner_sides(balls)
+    design = plate_design(
+        balls,
+        six_positions(),
+        sides if pairs else (),
+        () if pairs else (0, 3, 12, 15),
+        position_coefficients=4,
+        rotation_coefficients=4,
+        repeatability=(2e-7, 3e-7, 1e-7),
+    )
+    generator = np.random.default_rng(3)
+    return replace(
+        design, readings=replace(design.readings, repeats=generator.integers(1, 4, len(design.readings.ball)))
+    )
+
+
+def with_length_standard(projected: bool) -> Design:
+    """A step gauge of two marks beside the plate, in two places."""
+    design = small()
+    ends = np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0]])
+    n, k, m = len(design.balls), len(design.position_names), len(design.readings)
+    direction = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    turned = np.array([np.eye(3), [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    return replace(
+        design,
+        artefact_names=("plate", "bar"),
+        is_plate=np.array([True, False]),
+        ball_names=(*design.ball_names, "left", "right"),
+        ball_artefact=np.append(design.ball_artefact, [1, 1]),
+        balls=np.concatenate([design.balls, ends]),
+        position_names=(*design.position_names, "bar x", "bar y"),
+        position_artefact=np.append(design.position_artefact, [1, 1]),
+        rotations=np.concatenate([design.rotations, turned]),
+        origins=np.concatenate([design.origins, [[0.1, 0.5, 0.5], [0.5, 0.1, 0.5]]]),
+        held=np.concatenate([design.held, np.ones((2, 6), bool)]),
+        readings=Readings(
+            np.append(design.readings.ball, [n, n + 1, n, n + 1]),
+            np.append(design.readings.position, [k, k, k + 1, k + 1]),
+            np.append(design.readings.probe, [0, 0, 0, 0]),
+            np.append(design.readings.repeats, [2, 2, 3, 3]),
+        ),
+        lengths=Lengths(
+            np.array([m, m + 2]),
+            np.array([m + 1, m + 3]),
+            np.array([0.6, 0.6]),
+            np.array([1e-7, 2e-7]),
+            np.array([projected, projected]),
+            -direction,
+            np.array([True, True]),
+        ),
+    )
+
+
+def plane() -> Design:
+    """A plate turned on a two-dimensional machine."""
+    balls = grid(4)[:, :2]
+    turns = rotation_from_vector(np.array([[0.0], [np.pi / 2], [2.0]]))
+    ball, position = np.tile(np.arange(16), 3), np.repeat(np.arange(3), 16)
+    design = small()
+    certified = np.repeat(np.arange(16), 2)
+    return replace(
+        design,
+        model=MetricModel(scale="x"),
+        lower=np.zeros(2),
+        upper=np.ones(2),
+        repeatability=np.array([2e-7, 4e-7]),
+        probe_names=("tip",),
+        probes=np.zeros((1, 2)),
+        balls=balls,
+        position_names=("a", "b", "c"),
+        position_artefact=np.zeros(3, np.int64),
+        rotations=turns,
+        origins=np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.3]]),
+        held=np.zeros((3, 3), bool),
+        readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
+        distances=small(pairs=False).distances,
+        coordinates=Coordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
+        points=np.zeros((0, 2)),
+    )
+
+
+def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
+    """The estimator's answer to the readings of one replicate."""
+    drawn, k = draw(shared, seed, index // BATCH), index % BATCH
+    design, start, real = shared.design, shared.start, shared.truth.state
+    x = shared.exact.copy()
+    plates = design.plate_readings
+    for group in shared.groups:
+        readings = design.readings.select(plates)
+        own = plates[(readings.position == group.position) & np.isin(readings.ball, group.ball)]
+        # A ball's repeats stand in the groups of a position in the order of the readings.
+        earlier = [g for g in shared.groups if g.position == group.position and g.rows.start < group.rows.start]
+        for place, ball in enumerate(group.ball):
+            turn = sum(int((g.ball == ball).sum()) for g in earlier)
+            row = own[design.readings.ball[own] == ball][turn]
+            x[row] += drawn.moved[:, group.rows.start + place, k]
+    given = design.lengths
+    for side, ends in enumerate((given.first, given.second)):
+        x[ends] += drawn.ends[side][:, :, k].T
+    pairs, known = design.distances, design.coordinates
+    counts = np.arange(design.dimension) < pairs.dimensions[:, None]
+    apart = (real.balls[pairs.first] - real.balls[pairs.second]) * counts
+    observed = replace(
+        design,
+        distances=replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + drawn.distances[:, k]),
+        coordinates=replace(known, value=real.balls[known.ball, known.axis] + drawn.coordinates[:, k]),
+        lengths=replace(given, value=given.value + drawn.lengths[:, k]),
+    )
+    solution = gauss_newton(observed, x, start)
+    return solution.state, solution.factor.sum_of_squares
+
+
+def assert_agree(shared: Reference, found: Estimates, state: State, squares: float, k: int) -> None:
+    start, d = shared.start, shared.design.dimension
+    np.testing.assert_allclose(start.balls + found.found.balls[:, :, k].T, state.balls, rtol=0, atol=2e-14)
+    np.testing.assert_allclose(start.origins + found.found.origins[:, :, k], state.origins, rtol=0, atol=2e-14)
+    np.testing.assert_allclose(start.a + found.found.a[:, k], state.a, rtol=0, atol=1e-13)
+    turned = rotation_from_vector(found.found.rotations[:, :, k]) @ start.rotations
+    np.testing.assert_allclose(turned, state.rotations, rtol=0, atol=1e-13)
+    assert found.sum_of_squares[k] == pytest.approx(squares, rel=1e-7)
+    assert found.found.balls.shape == (d, len(start.balls), BATCH)
+
+
+@pytest.mark.parametrize(
+    "design",
+    [small(), small(kept=True), small(pairs=False), with_length_standard(True), with_length_standard(False), plane()],
+    ids=["distances", "neighbours", "co-ordinates", "projected length", "length", "plane"],
+)
+def test_each_replicate_is_the_estimate_of_its_own_readings(design: Design) -> None:
+    shared = reference(design, truth(design))
+    found = estimate_batch(shared, seed=5, batch=2)
+    assert found.converged.all() and (found.passes >= 2).all()
+    for k in (0, 17):
+        state, squares = alone(shared, 5, 2 * BATCH + k)
+        assert_agree(shared, found, state, squares, k)
+
+
+def test_a_model_that_is_not_linear_is_evaluated_itself() -> None:
+    design = small()
+    design = replace(design, model=replace(design.model, full_rotations=True))
+    large = truth(design, size=2e-4)
+    shared = reference(design, large)
+    assert isinstance(shared.groups[0].model, Direct)
+    found = estimate_batch(shared, seed=5, batch=0)
+    state, squares = alone(shared, 5, 3)
+    assert found.converged.all()
+    assert_agree(shared, found, state, squares, 3)
+
+
+def test_an_expansion_serves_the_linearised_model() -> None:
+    shared = reference(small(), truth(small()))
+    assert isinstance(shared.groups[0].model, Expansion)
+
+
+def test_a_batch_is_the_same_whatever_came_before() -> None:
+    shared = reference(small(), truth(small()))
+    first = estimate_batch(shared, 1, 3)
+    estimate_batch(shared, 1, 0)
+    again = estimate_batch(shared, 1, 3)
+    assert (first.found.a == again.found.a).all() and (first.sum_of_squares == again.sum_of_squares).all()
+    assert (first.found.a != estimate_batch(shared, 2, 3).found.a).any()
+
+
+def test_a_deficient_design_has_no_replicates() -> None:
+    design = replace(small(), distances=small(pairs=False).distances)
+    design = replace(design, probes=np.zeros_like(design.probes))
+    with pytest.raises(NoReferenceError, match="deficient"):
+        reference(design, truth(design))
