@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .design import Design, Readings, State, locations, reading_uncertainties
+from .design import Design, Priors, Readings, State, locations, probe_offsets, reading_uncertainties
+from .estimation.observations import prior_values
 from .machines.protocol import Array, ErrorModel
 
 
@@ -36,7 +37,7 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
     readings = design.readings.expanded()
-    p = design.probes[readings.probe]
+    p = probe_offsets(design, truth)[readings.probe]
     return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
 
 
@@ -47,7 +48,7 @@ def noisy_readings(design: Design, truth: State, generator: np.random.Generator)
 
 
 def noisy_certificate(design: Design, truth: State, generator: np.random.Generator) -> Design:
-    """The design with calibration values drawn about those of the true artefacts."""
+    """The design with calibration values, and priors, drawn about those of the truth."""
     distances, coordinates, lengths = design.distances, design.coordinates, design.lengths
     difference = truth.balls[distances.first] - truth.balls[distances.second]
     difference *= np.arange(design.dimension) < distances.dimensions[:, None]
@@ -63,4 +64,14 @@ def noisy_certificate(design: Design, truth: State, generator: np.random.Generat
             value=true_coordinate + coordinates.uncertainty * generator.standard_normal(len(coordinates)),
         ),
         lengths=replace(lengths, value=lengths.value + lengths.uncertainty * generator.standard_normal(len(lengths))),
+        priors=_drawn(design, truth, generator),
     )
+
+
+def _drawn(design: Design, truth: State, generator: np.random.Generator) -> Priors:
+    """Priors with values drawn about those of the truth."""
+    priors = design.priors
+    if not len(priors):
+        return priors
+    noise = priors.uncertainty * generator.standard_normal(len(priors))
+    return replace(priors, value=prior_values(design, truth) + noise)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import Coordinates, Design, Distances, Lengths, Readings, pose_size
-from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment
+from .design import Coordinates, Design, Distances, Lengths, Priors, Readings, pose_size
+from .experiment.messages import ExperimentError
+from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior
+from .experiment.yamltree import Mark
 from .machines.protocol import Array
 from .machines.settings import build_error_model
 
@@ -48,6 +50,7 @@ def lay_out(experiment: Experiment) -> Design:
     points = experiment.evaluation.points
     if not len(points):
         points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
+    held = _held(readings, balls, ball_artefact, position_artefact, rotations, coordinates, d)
     return Design(
         model=model,
         lower=lower,
@@ -64,13 +67,55 @@ def lay_out(experiment: Experiment) -> Design:
         position_artefact=position_artefact,
         rotations=rotations,
         origins=origins,
-        held=_held(readings, balls, ball_artefact, position_artefact, rotations, coordinates, d),
+        held=held,
         readings=readings,
         distances=distances,
         coordinates=coordinates,
         lengths=lengths,
         points=points,
         point_probe=probe_index[experiment.evaluation.probe],
+        priors=_priors(experiment, held, len(model.parameters)),
+        free_offsets=_free_offsets(experiment),
+    )
+
+
+def _free_offsets(experiment: Experiment) -> NDArray[np.bool_] | None:
+    """Which probe offsets are parameters (l, d)."""
+    if not experiment.offset_uncertainties:
+        return None
+    free = [name in experiment.offset_uncertainties for name in experiment.probes]
+    return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
+
+
+def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) -> Priors:
+    """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
+
+    :raises ExperimentError: a prior is about a pose parameter that is held.
+    """
+    given = list(experiment.priors)
+    places = [place.name for place in experiment.positions]
+    messages = []
+    for i, prior in enumerate(given):
+        if prior.position is not None and held[places.index(prior.position), prior.component]:
+            text = f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other positions'
+            messages.append(prior.mark.message(f"priors[{i}].parameter", text))
+    if messages:
+        raise ExperimentError(messages)
+    nowhere = Mark(str(experiment.source), 0, 0)
+    for name, uncertainty in experiment.offset_uncertainties.items():
+        for axis in np.flatnonzero(np.isfinite(uncertainty)):
+            value, u = float(experiment.probes[name][axis]), float(uncertainty[axis])
+            label = f"probe {name}: offset {'xyz'[axis]}"
+            given.append(Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere))
+    probes = list(experiment.probes)
+    return Priors(
+        tuple(prior.name for prior in given),
+        np.array([-1 if p.position is None else places.index(p.position) for p in given], np.int64),
+        np.array([-1 if p.probe is None else probes.index(p.probe) for p in given], np.int64),
+        np.array([p.component for p in given], np.int64),
+        np.array([p.by_model for p in given], float).reshape(len(given), parameters),
+        np.array([p.value for p in given], float),
+        np.array([p.standard_uncertainty for p in given], float),
     )
 
 
@@ -190,7 +235,8 @@ def _held(
 
     An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it. As many
     parameters of the artefact's first pose are held as are left free: all of them when only distances are
-    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose.
+    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose, and a
+    single ball every turn.
     """
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
     for artefact in np.unique(position_artefact):
@@ -198,7 +244,9 @@ def _held(
         own = np.flatnonzero(ball_artefact == artefact)
         centred = balls[own] - balls[own].mean(axis=0)
         _, extent, directions = np.linalg.svd(centred)
-        on_a_line = d == 3 and (len(own) == 2 or extent[1] <= FLAT * extent[0])
+        if len(own) == 1:
+            held[positions, d:] = True
+        on_a_line = d == 3 and len(own) > 1 and (len(own) == 2 or extent[1] <= FLAT * extent[0])
         if on_a_line:
             for k in positions:
                 held[k, d + int(np.abs(rotations[k] @ directions[0]).argmax())] = True

@@ -8,8 +8,7 @@ Two comparisons are made before anything is fitted, both of places after the bes
   that distance *and* than ten times the median of all such differences. The latter is what the machine's own
   errors and the noise amount to, so that a bad machine is not taken for bad readings.
 
-Uncertain probe offsets widen the second limit by six of their standard uncertainties; with an unknown offset only
-the first comparison is made.
+Uncertain probe offsets widen the second limit by six of their standard uncertainties, up to the first limit.
 """
 
 from __future__ import annotations
@@ -167,7 +166,8 @@ def _against_readings(
         rows = np.flatnonzero(readings.position == k)
         nominal = design.balls[readings.ball[rows]]
         off_drawing[rows] = distances(nominal, seen[rows], found.rotations[k], found.origins[k])
-    limit = AGAINST_READINGS * pitch[readings.ball]
+    limit = AGAINST_READINGS * pitch[readings.ball] + TIMES_OFFSET * _offset_uncertainties(design)[readings.probe]
+    limit = np.minimum(limit, AGAINST_DRAWING * pitch[readings.ball])
     undecided: list[tuple[int, int]] = []
     apart = np.zeros(len(readings))
     for sweep in range(12):
@@ -204,6 +204,17 @@ def _against_readings(
                 else:
                     rotations[k], origins[k] = fit_motion(places, seen[rows])
     return _Motions(rotations, origins, ~wrong), shape, wrong, undecided
+
+
+def _offset_uncertainties(design: Design) -> Array:
+    """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
+    if design.free_offsets is None:
+        return np.zeros(len(design.probes))
+    variance = np.where(design.free_offsets, np.inf, 0.0)
+    known = np.flatnonzero(design.priors.probe >= 0)
+    probe, axis = design.priors.probe[known], design.priors.component[known]
+    variance[probe, axis] = design.priors.uncertainty[known] ** 2
+    return np.asarray(np.sqrt(variance.sum(axis=1)))
 
 
 def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Integers]:

@@ -9,13 +9,12 @@ import numpy as np
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import IN_PLANE_AXES, Axis, FreePlacement, PlanePlacement, Pose, nominal_pose
 from .messages import Steps
-from .model import Floats, Position, ReadingGroup
-from .references import References, frozen
+from .model import Position, ReadingGroup
+from .references import References, lengths_per_axis
 from .sections import PositionSettings, ReadingSettings
 
 PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
-AXES = ("x", "y", "z")
 
 
 def resolve_position(settings: PositionSettings, steps: Steps, references: References) -> Position | None:
@@ -64,7 +63,9 @@ def _group(
 ) -> ReadingGroup | None:
     balls = settings.balls
     probe_names = references.probe_names(settings.probes, steps)
-    uncertainty, is_right = _per_axis(settings.standard_uncertainty, (*steps, "standard_uncertainty"), references)
+    uncertainty, is_right = lengths_per_axis(
+        settings.standard_uncertainty, (*steps, "standard_uncertainty"), references
+    )
     if layout is None:
         return None
     names = layout.names if balls == "all" else balls
@@ -75,19 +76,6 @@ def _group(
         return None
     indices.setflags(write=False)
     return ReadingGroup(probe_names, tuple(names), indices, settings.repeats, uncertainty)
-
-
-def _per_axis(stated: Any, steps: Steps, references: References) -> tuple[Floats | None, bool]:
-    """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is right."""
-    dimension = references.dimension
-    if stated is None or dimension is None:
-        return None, True
-    if isinstance(stated, float):
-        return frozen([stated] * dimension), True
-    listed = stated if isinstance(stated, tuple) else tuple(getattr(stated, axis) for axis in AXES)
-    given = tuple(length for length in listed if length is not None)
-    text = f"has {len(given)} axes, but the experiment has {dimension}; give one length for all, or {dimension}"
-    return frozen(given), references.require(len(given) == dimension, steps, text)
 
 
 def _placement(

@@ -203,11 +203,22 @@ class TwoSpheresSettings(ArtefactSettings):
         )
 
 
+class SphereSettings(ArtefactSettings):
+    """A single ball, as the reference sphere that probes are qualified with; named 1."""
+
+    kind: Literal["sphere"] = Field(description="a single ball, as the reference sphere of probes")
+
+    def layout(self) -> BallLayout:
+        """Return one ball at the origin of its own frame."""
+        return BallLayout(("1",), _frozen([(0.0, 0.0, 0.0)]))
+
+
 ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
     "grid": GridSettings,
     "square": SquareSettings,
     "balls": BallsSettings,
     "two_spheres": TwoSpheresSettings,
+    "sphere": SphereSettings,
 }
 
 if TYPE_CHECKING:
