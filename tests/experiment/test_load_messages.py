@@ -116,7 +116,7 @@ MACHINE = [
 ARTEFACTS = [
     ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
     ("kind: grid, ", "", [
-        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres']),
+        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere']),
     ("balls: [3, 3]", "balls: [3]", [
         "8:30: artefacts.plate.balls: has 1 entry; 2 are needed (number of columns, number of rows)"]),
     ("balls: [3, 3]", "balls: [3, 1]", [
