@@ -54,6 +54,7 @@ class Comparison:
     estimator: RivalName
     trials: int
     pairs: int
+    across_probes: bool
     points: int
     rms: Array
     maximum: Array
@@ -84,6 +85,7 @@ def fit_rival(
     observed: ObservedReadings,
     estimator: RivalName,
     pair_set: str | None = None,
+    across_probes: bool = False,
     monomials: bool = False,
 ) -> RivalFit:
     """Estimate machine errors from the distances of readings.
@@ -92,7 +94,7 @@ def fit_rival(
     """
     design = observed.design
     chosen = ball_pairs(experiment, design, pair_set)
-    solution = rival_estimate(design, observed.x, chosen, estimator)
+    solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
     names, units, matrix = [p.name for p in parameters], [p.unit for p in parameters], np.eye(len(parameters))
     if monomials:
@@ -114,6 +116,7 @@ def compare_estimators(
     trials: int,
     estimator: RivalName = "distances",
     pair_set: str | None = None,
+    across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
     progress: Callable[[int], None] | None = None,
@@ -131,7 +134,7 @@ def compare_estimators(
     rms, maximum, failed = [], [], []
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
-        both = _both_estimates(design, truth, chosen, estimator, generator)
+        both = _both_estimates(design, truth, chosen, estimator, across_probes, generator)
         if both is None:
             failed.append(trial)
         else:
@@ -147,6 +150,7 @@ def compare_estimators(
         estimator,
         trials,
         len(chosen),
+        across_probes,
         points,
         np.array(rms),
         np.array(maximum),
@@ -155,14 +159,19 @@ def compare_estimators(
 
 
 def _both_estimates(
-    design: Design, truth: State, chosen: Integers, estimator: RivalName, generator: np.random.Generator
+    design: Design,
+    truth: State,
+    chosen: Integers,
+    estimator: RivalName,
+    across_probes: bool,
+    generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
     """Parameters by the full and by the rival estimator from one data set; None where one did not converge."""
     drawn = noisy_certificate(design, truth, generator)
     readings, x = noisy_readings(drawn, truth, generator)
     drawn = replace(drawn, readings=readings)
     full = gauss_newton(drawn, x, initial_state(drawn, x), ENOUGH)
-    rival = rival_estimate(drawn, x, chosen, estimator, ENOUGH, start=full.state.a)
+    rival = rival_estimate(drawn, x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
     if full.status != "converged" or rival.status != "converged":
         return None
     return full.state.a, rival.a
@@ -216,10 +225,11 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
 
 def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
     """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum") stand in them."""
+    across = ", across probes" if found.across_probes else ""
     lines = [
         f"{found.label}: {found.title}",
-        f"estimator {found.estimator} ({found.pairs} pairs of balls) against the full one: corrected distances of "
-        f"{found.points} random pairs of points in each of {found.trials} data sets, differences in um",
+        f"estimator {found.estimator} ({found.pairs} pairs of balls{across}) against the full one: corrected distances "
+        f"of {found.points} random pairs of points in each of {found.trials} data sets, differences in um",
     ]
     if found.failed:
         lines.append(f"not converged: {len(found.failed)} data sets, numbers {', '.join(map(str, found.failed[:20]))}")
@@ -243,6 +253,7 @@ def comparison_data(found: Comparison, published: dict[str, float | None]) -> di
         "estimator": found.estimator,
         "trials": found.trials,
         "pairs": found.pairs,
+        "across_probes": found.across_probes,
         "points": found.points,
         "not_converged": list(found.failed),
     }

@@ -45,6 +45,11 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
         help="pairs of balls whose distances are used; default: braced for grids (neighbours along rows, columns and "
         "one diagonal, and all corners), otherwise all",
     )
+    parser.add_argument(
+        "--across-probes",
+        action="store_true",
+        help="use distances between balls read with different probes in the same position, too",
+    )
 
 
 def _count(text: str) -> int:
@@ -83,6 +88,7 @@ def run(options: Namespace) -> int:
             options.trials,
             options.estimator,
             options.pairs,
+            options.across_probes,
             options.seed,
             options.points,
             _progress(experiment.label, options.trials),

@@ -80,7 +80,7 @@ def _run_rival(options: Namespace, experiment: Experiment, observed: ObservedRea
     from ..estimators import fit_rival, rival_fit_data, rival_fit_lines
     from .common import print_json
 
-    result = fit_rival(experiment, observed, options.estimator, options.pairs, options.monomials)
+    result = fit_rival(experiment, observed, options.estimator, options.pairs, options.across_probes, options.monomials)
     if options.json:
         print_json([rival_fit_data(result)])
     else:

@@ -16,6 +16,9 @@ kruth
     the plate is what the corrected points of its initial position 0 say, the first one in which both balls are
     read; calibrated distances are additional measurements of it (Kruth, Vanherck and de Jonge).
 
+Where a position is read with several probes, the two balls of a distance may also have been read with different ones;
+with `across_probes` such distances count like those of one probe. The report does not say which it used.
+
 Each treats its terms as independent, though they share readings; that is what makes them worse than the full
 estimator. Known lengths of length standards, and priors on the machine's parameters, enter all of them as they do
 there; calibrated co-ordinates, poses and probe offsets cannot.
@@ -61,18 +64,22 @@ class RivalSolution:
 
 @dataclass(frozen=True)
 class _Points:
-    """Places read, one for each ball, position and probe: scale readings (r, d) and their variances (r, d)."""
+    """Points read, one for each ball, position and probe: scale readings (r, d) and their variances (r, d).
+
+    `place` (r,) numbers the positions and probes, `position` (places,) tells the position of each.
+    """
 
     ball: Integers
     probe: Integers
     place: Integers
+    position: Integers
     x: Array
     variance: Array
 
 
 @dataclass(frozen=True)
 class _Measured:
-    """Distances between two points of the same place (m,): pair (m,), points, and variance of each.
+    """Distances between two points of the same position (m,): pair (m,), points, and variance of each.
 
     `calibrated`, `value` and `uncertainty` (c,) tell pairs whose distance is known. Sorted by pair, then place.
     """
@@ -97,6 +104,7 @@ def rival_estimate(
     x: Array,
     pairs: Integers,
     estimator: RivalName = "distances",
+    across_probes: bool = False,
     settings: GaussNewtonSettings | None = None,
     start: Array | None = None,
 ) -> RivalSolution:
@@ -107,7 +115,7 @@ def rival_estimate(
     """
     settings = settings or GaussNewtonSettings()
     points = _points(design, x)
-    measured = _measured(design, points, pairs)
+    measured = _measured(design, points, pairs, across_probes)
     a = np.zeros(len(design.model.parameters)) if start is None else start
     scale = np.array([MICROMETRE / parameter.effect for parameter in design.model.parameters])
     record: list[Iteration] = []
@@ -154,17 +162,20 @@ def _points(design: Design, x: Array) -> _Points:
     start[of] = x[chosen]
     np.add.at(mean, of, weight * (x[chosen] - start[of]))
     position, probe, ball = unique.T
-    _, place = np.unique(unique[:, :2], axis=0, return_inverse=True)
-    return _Points(ball, probe, place.ravel(), start + mean / total, 1.0 / total)
+    places, place = np.unique(unique[:, :2], axis=0, return_inverse=True)
+    return _Points(ball, probe, place.ravel(), places[:, 0], start + mean / total, 1.0 / total)
 
 
-def _measured(design: Design, points: _Points, pairs: Integers) -> _Measured:
+def _measured(design: Design, points: _Points, pairs: Integers, across_probes: bool) -> _Measured:
     given = design.distances
     known = np.stack([given.first, given.second], axis=1)
     ends, of = np.unique(np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-    at = np.full((len(design.balls), int(points.place.max(initial=-1)) + 1), -1)
+    at = np.full((len(design.balls), len(points.position)), -1)
     at[points.ball, points.place] = np.arange(len(points.ball))
-    first, second = at[ends[:, 0]], at[ends[:, 1]]
+    one, other = np.nonzero(points.position[:, None] == points.position)
+    if not across_probes:
+        one = other = np.arange(len(points.position))
+    first, second = at[ends[:, :1], one], at[ends[:, 1:], other]
     pair, place = np.nonzero((first >= 0) & (second >= 0))
     first, second = first[pair, place], second[pair, place]
     # Along the line as drawn, so that weights stay what they are while parameters change.

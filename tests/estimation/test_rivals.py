@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -34,16 +34,17 @@ def observed(design: Design, exact: bool = False) -> tuple[Design, np.ndarray]:
     return replace(design, readings=readings), x
 
 
+@pytest.mark.parametrize("across", [False, True])
 @pytest.mark.parametrize("estimator", RIVALS)
-def test_exact_readings_give_the_truth_back(estimator: RivalName) -> None:
+def test_exact_readings_give_the_truth_back(estimator: RivalName, across: bool) -> None:
     design, x = observed(small(), exact=True)
     truth = truth_of(small(), errors=3e-6)
-    found = rival_estimate(design, x, ALL, estimator)
+    found = rival_estimate(design, x, ALL, estimator, across)
     assert found.status == "converged" and found.deficiency == 0 and len(found.iterations) <= 6
     np.testing.assert_allclose(found.a, truth.a, rtol=0, atol=1e-12)
 
 
-def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chosen: np.ndarray) -> float:
+def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chosen: np.ndarray, across: bool) -> float:
     """What the estimator minimises, term by term."""
     readings = design.readings
     corrected = x + design.model.error(x, a, design.probes[readings.probe])
@@ -66,8 +67,10 @@ def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chos
     total = 0.0
     for i, j in sorted({tuple(sorted(map(int, pair))) for pair in chosen} | set(known)):
         lengths, variances = [], []
-        for place in places:
-            first, second = row.get((i, *place)), row.get((j, *place))
+        for one, other in product(places, places):
+            if one[0] != other[0] or (one != other and not across):
+                continue
+            first, second = row.get((i, *one)), row.get((j, *other))
             if first is None or second is None:
                 continue
             along = rough[first] - rough[second]
@@ -96,19 +99,20 @@ def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chos
     return total
 
 
+@pytest.mark.parametrize("across", [False, True])
 @pytest.mark.parametrize("estimator", RIVALS)
-def test_the_objective_is_the_one_stated_and_at_its_minimum(estimator: RivalName) -> None:
+def test_the_objective_is_the_one_stated_and_at_its_minimum(estimator: RivalName, across: bool) -> None:
     design, x = observed(small())
     seen = design.readings.ball % 7 != design.readings.position
     design, x = replace(design, readings=design.readings.select(seen)), x[seen]
     chosen = np.array(neighbours(grid(4)))
-    found = rival_estimate(design, x, chosen, estimator)
-    least = objective(design, x, estimator, found.a, chosen)
+    found = rival_estimate(design, x, chosen, estimator, across)
+    least = objective(design, x, estimator, found.a, chosen, across)
     assert found.iterations[-1].sum_of_squares == pytest.approx(least, rel=1e-7)
     for k in range(0, len(found.a), 4):
         step = np.zeros(len(found.a))
         step[k] = 1e-7
-        above, below = (objective(design, x, estimator, found.a + s, chosen) - least for s in (step, -step))
+        above, below = (objective(design, x, estimator, found.a + s, chosen, across) - least for s in (step, -step))
         assert above > 0 and below > 0 and above == pytest.approx(below, rel=0.02)
 
 
