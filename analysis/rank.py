@@ -50,11 +50,13 @@ class ArtefactPart:
 
 @dataclass(frozen=True)
 class PositionPart:
-    """A position's share, or a probe's: its shift in metres and its turn in radians."""
+    """A position's or a probe's share: its shift in metres, its turn in radians, and their axes in words if any."""
 
     name: str
     shift: float
     turn: float
+    along: str = ""
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -128,8 +130,9 @@ def null_directions(design: Design, layout: SharedLayout, spread: Covariance) ->
         shared, balls = spread.shared_null @ mixture, spread.ball_null @ mixture
         moved = np.abs(shared / layout.scale).max(initial=0.0)
         size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
-        # Told so that the largest change is a positive one.
-        size *= np.sign(shared[np.abs(shared / layout.scale).argmax()]) or 1.0
+        # Told so that the first of the largest changes is a positive one, whatever sign the decomposition gave.
+        change = np.abs(shared / layout.scale)
+        size *= np.sign(shared[np.flatnonzero(change >= 0.99 * change.max(initial=0.0))[0]]) or 1.0
         found.append(_describe(design, layout, shared / size, balls / size))
     return tuple(found)
 
@@ -187,7 +190,8 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
         if effect[columns[columns >= 0]].max(initial=0.0) > NEGLIGIBLE * largest:
             shift, turn = np.linalg.norm(values[:d]), np.linalg.norm(values[d:])
-            positions.append(PositionPart(design.position_names[k], float(shift), float(turn)))
+            along, about = _single_axis(values[:d], " along "), _single_axis(values[d:], " about ")
+            positions.append(PositionPart(design.position_names[k], float(shift), float(turn), along, about))
     artefacts = []
     for artefact in np.flatnonzero(design.is_plate):
         members = np.flatnonzero(design.ball_artefact == artefact)
@@ -202,6 +206,14 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
         if np.abs(values).max() > NEGLIGIBLE * largest:
             probes.append(PositionPart(design.probe_names[k], float(np.linalg.norm(values)), 0.0))
     return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes))
+
+
+def _single_axis(vector: Array, word: str) -> str:
+    """The axis that a vector lies along, if it lies along one."""
+    if len(vector) == 1 or not vector.any():
+        return ""
+    axis = int(np.abs(vector).argmax())
+    return f"{word}{'xyz'[axis]}" if abs(vector[axis]) > 0.999 * np.linalg.norm(vector) else ""
 
 
 def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tuple[FunctionPart, ...]:
@@ -310,8 +322,8 @@ def _function_words(part: FunctionPart) -> str:
 
 
 def _position_words(part: PositionPart) -> str:
-    amounts = [length(part.shift)] if part.shift > 1e-12 else []
-    amounts += [angle(part.turn)] if part.turn > 1e-12 else []
+    amounts = [length(part.shift) + part.along] if part.shift > 1e-12 else []
+    amounts += [angle(part.turn) + part.about] if part.turn > 1e-12 else []
     return f"{part.name} ({', '.join(amounts)})"
 
 

@@ -12,15 +12,19 @@ from simulator.estimation.covariance import Covariance, Spectrum, covariance, sp
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import Solution, gauss_newton
 from simulator.estimation.initial import initial_state
+from simulator.estimation.observations import reading_blocks, reading_weights
 from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
 from simulator.experiment.model import Experiment
 from simulator.geometry.motions import vector_from_rotation
 from simulator.layout import lay_out
-from simulator.machines.protocol import Unit
+from simulator.machines.protocol import Array, Unit
 from simulator.readings import ObservedReadings
 
 from .rank import Verdict, verdict
 from .uncertainty import Quantity, uncertainties
+
+# Residuals that a fit names.
+LARGEST = 10
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,20 @@ class ParameterEstimate:
 
 
 @dataclass(frozen=True)
+class Residual:
+    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties."""
+
+    position: str
+    ball: str
+    probe: str
+    axis: str
+    value: float
+    standardised: float
+
+
+@dataclass(frozen=True)
 class Fit:
-    """An estimate from readings.
+    """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
 
     `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
     freedom, or 1 where the file says that they are given.
@@ -62,20 +78,33 @@ class Fit:
     degrees_of_freedom: int
     quantities: dict[str, Quantity]
     estimates: tuple[ParameterEstimate, ...]
+    largest: tuple[Residual, ...]
+
+    @property
+    def converged(self) -> bool:
+        return self.solution.status == "converged"
+
+    @property
+    def too_large(self) -> bool:
+        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in a thousand."""
+        from scipy.special import chdtri
+
+        if not self.converged or self.degrees_of_freedom <= 0:
+            return False
+        return self.solution.factor.sum_of_squares > float(chdtri(self.degrees_of_freedom, 1e-3))
 
 
-def check(experiment: Experiment) -> Plan:
-    """Judge the rank of an experiment's design at zero machine error."""
-    return _plan(experiment, with_quantities=False)
+def check(experiment: Experiment, design: Design | None = None) -> Plan:
+    """Judge the rank of an experiment's design, or of what came of it, at zero machine error."""
+    return _plan(experiment, design or lay_out(experiment), with_quantities=False)
 
 
 def plan(experiment: Experiment) -> Plan:
     """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
-    return _plan(experiment, with_quantities=True)
+    return _plan(experiment, lay_out(experiment), with_quantities=True)
 
 
-def _plan(experiment: Experiment, with_quantities: bool) -> Plan:
-    design = lay_out(experiment)
+def _plan(experiment: Experiment, design: Design, with_quantities: bool) -> Plan:
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
     found = spectrum(factor)
@@ -108,6 +137,9 @@ def fit(
     design = observed.design
     layout = shared_layout(design)
     solution = gauss_newton(design, observed.x, initial_state(design, observed.x))
+    if solution.status != "converged":
+        judged = check(experiment, design).verdict
+        return Fit(experiment.label, experiment.title, design, solution, judged, 1.0, False, 0, {}, (), ())
     spread = covariance(design, solution.factor, solution.spectrum)
     judged = verdict(
         design, layout, solution.spectrum, spread, experiment.expected_rank_deficiency, experiment.target_accuracy
@@ -126,7 +158,30 @@ def fit(
         freedom,
         uncertainties(design, layout, solution.state, spread, scale, experiment.target_accuracy),
         _estimates(design, layout, solution, spread, scale, monomials),
+        _largest(design, solution, observed.x),
     )
+
+
+def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
+    """The largest residuals of readings, largest first."""
+    chosen = design.plate_readings
+    readings = design.readings.select(chosen)
+    weight = reading_weights(design, readings)
+    residual = reading_blocks(design, solution.state, readings, x[chosen]).residual
+    found = []
+    for place in np.argsort(-np.abs(residual), axis=None, kind="stable")[:LARGEST].tolist():
+        i, axis = divmod(place, design.dimension)
+        found.append(
+            Residual(
+                design.position_names[readings.position[i]],
+                design.ball_label(readings.ball[i]),
+                design.probe_names[readings.probe[i]],
+                "xyz"[axis],
+                float(residual[i, axis] / weight[i, axis]),
+                float(residual[i, axis]),
+            )
+        )
+    return tuple(found)
 
 
 def _estimates(

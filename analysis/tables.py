@@ -117,13 +117,16 @@ def fit_lines(fit: Fit) -> list[str]:
     record = fit.solution.iterations
     lines = [f"{fit.label}: {fit.title}", *verdict_lines(fit.verdict, with_values=True)]
     how = "estimated from the residuals" if fit.sigma_is_estimated else "as given"
-    lines.append(
-        f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g} with "
-        f"{fit.degrees_of_freedom} degrees of freedom; sigma = {fit.sigma:.4g} times the stated uncertainties ({how})"
-    )
+    summary = f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
+    if fit.converged:
+        summary += f" with {fit.degrees_of_freedom} degrees of freedom; sigma = {fit.sigma:.4g} times the stated "
+        summary += f"uncertainties ({how})"
     rows = [["iteration", "step", "S^2"]]
     rows += [[str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
-    lines += ["", *aligned(rows, [True, True, True]), "", *uncertainty_table(fit.quantities), ""]
+    lines += [summary, "", *aligned(rows, [True, True, True])]
+    if not fit.converged:
+        return lines
+    lines += ["", *residual_table(fit), "", *uncertainty_table(fit.quantities), ""]
     rows = [["parameter", "value", "standard uncertainty", "unit"]]
     machine_and_poses = [
         e for e in fit.estimates if ": origin" not in e.name and not e.name.endswith((": x", ": y", ": z"))
@@ -137,7 +140,18 @@ def fit_lines(fit: Fit) -> list[str]:
                 SHOWN[estimate.unit],
             ]
         )
-    return lines + aligned(rows, [False, True, True, False])
+    lines += aligned(rows, [False, True, True, False])
+    return [*lines, "(origins of positions and co-ordinates of balls are among the estimates of --json)"]
+
+
+def residual_table(fit: Fit, count: int = 3) -> list[str]:
+    """The largest residuals as lines of text."""
+    rows = [["largest residuals", "", "", "", "um", "standard uncertainties"]]
+    for one in fit.largest[:count]:
+        rows.append(
+            [one.position, one.ball, one.probe, one.axis, number(1e6 * one.value), number(one.standardised / fit.sigma)]
+        )
+    return aligned(rows, [False, False, False, False, True, True])
 
 
 def plan_data(plan: Plan) -> dict[str, Any]:
@@ -161,9 +175,24 @@ def fit_data(fit: Fit) -> dict[str, Any]:
         "sigma": fit.sigma,
         "sigma_is_estimated": fit.sigma_is_estimated,
         "degrees_of_freedom": fit.degrees_of_freedom,
-        "sum_of_squares": fit.solution.factor.sum_of_squares,
-        "iterations": [{"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations],
+        "too_large": fit.too_large,
+        "sum_of_squares": _finite(fit.solution.factor.sum_of_squares),
+        "iterations": [
+            {"step": _finite(it.step), "sum_of_squares": _finite(it.sum_of_squares)} for it in fit.solution.iterations
+        ],
         "quantities": _quantities_data(fit.quantities),
+        "largest_residuals": [
+            {
+                "position": one.position,
+                "ball": one.ball,
+                "probe": one.probe,
+                "axis": one.axis,
+                "value": one.value,
+                "unit": "m",
+                "standard_uncertainties": one.standardised / fit.sigma,
+            }
+            for one in fit.largest
+        ],
         "estimates": {
             e.name: {
                 "value": _finite(e.value),

@@ -68,8 +68,9 @@ def uncertainties(
     """U1 to U6 for a design at `state`, with U2 and U3 also split into lengths and angles.
 
     `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a fit. U3 is quoted for
-    the model's reported parameters, monomials on [0, 1] for a kinematic model. U5 runs over all pairs of balls
-    of an artefact, U6 over all pairs of evaluation points, compared with the `target` accuracy if there is one.
+    the model's reported parameters, monomials on [0, 1] for a kinematic model, less those that are zero in any
+    machine of the model. U5 runs over all pairs of balls of an artefact, U6 over all pairs of evaluation points,
+    compared with the `target` accuracy if there is one.
     """
     result: dict[str, Quantity] = {}
 
@@ -92,15 +93,17 @@ def uncertainties(
     add("U2 angles", of_poses[angle], "rad", [n for n, a in zip(names, angle, strict=True) if a])
 
     reported = design.model.reported()
-    matrix = np.zeros((len(reported.names), len(layout)))
-    matrix[:, layout.model] = reported.matrix
+    quoted = np.flatnonzero(reported.matrix.any(axis=1))
+    matrix = np.zeros((len(quoted), len(layout)))
+    matrix[:, layout.model] = reported.matrix[quoted]
     of_model = found.of_shared(matrix)
-    units = np.array(reported.units)
+    units = np.array(reported.units)[quoted]
+    quoted_names = [reported.names[i] for i in quoted]
     present = [u for u in ("m", "rad", "1") if (units == u).any()]
-    add("U3", of_model, ", ".join(present), reported.names)
+    add("U3", of_model, ", ".join(present), quoted_names)
     for unit, word in (("m", "lengths"), ("rad", "angles"), ("1", "ratios")):
         chosen = np.flatnonzero(units == unit)
-        add(f"U3 {word}", of_model[chosen], unit, [reported.names[i] for i in chosen])
+        add(f"U3 {word}", of_model[chosen], unit, [quoted_names[i] for i in chosen])
 
     pairs = ball_pairs(design, state, found)
     if pairs.count:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .design import Design, Priors, Readings, State, locations, probe_offsets, reading_uncertainties
-from .estimation.observations import prior_values
+from .design import Design, Priors, Readings, State, locations, nominal_state, probe_offsets, reading_uncertainties
+from .estimation.observations import distance_rows, prior_values
 from .machines.protocol import Array, ErrorModel
 
 
@@ -45,6 +45,40 @@ def noisy_readings(design: Design, truth: State, generator: np.random.Generator)
     """The same with normal noise of the readings' standard uncertainties added to each co-ordinate."""
     readings, x = exact_readings(design, truth)
     return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(design, readings)
+
+
+def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
+    """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its uncertainty.
+
+    Of all artefacts that differ so from their certificate, the nearest to the drawing; where there are more certified
+    items than can vary independently, as nearly as a real artefact can. For a length standard, each length moves the
+    second of its balls along the line between the two.
+    """
+    balls = design.balls.copy()
+    tied = distance_rows(design, nominal_state(design))
+    known = design.coordinates
+    columns = design.dimension * np.stack([design.distances.first, design.distances.second])
+    rows = np.zeros((len(tied.residual) + len(known), balls.size))
+    at = np.arange(len(tied.residual))
+    for axis in range(design.dimension):
+        rows[at, columns[0] + axis] = tied.derivative[:, axis]
+        rows[at, columns[1] + axis] = -tied.derivative[:, axis]
+    at = len(at) + np.arange(len(known))
+    rows[at, design.dimension * known.ball + known.axis] = 1.0 / known.uncertainty
+    used = np.flatnonzero(rows.any(axis=0))
+    off = np.concatenate([tied.residual, (balls[known.ball, known.axis] - known.value) / known.uncertainty])
+    wanted = generator.standard_normal(len(rows)) - off
+    if len(rows):
+        balls.flat[used] += np.linalg.lstsq(rows[:, used], wanted, rcond=None)[0]
+    given = design.lengths
+    ends = np.stack([design.readings.ball[given.first], design.readings.ball[given.second]])
+    pairs, first = np.unique(ends, axis=1, return_index=True)
+    for (one, other), k in zip(pairs.T.tolist(), first.tolist(), strict=True):
+        between = balls[other] - balls[one]
+        length = float(np.sqrt(between @ between))
+        true = given.value[k] + given.uncertainty[k] * generator.standard_normal()
+        balls[other] += between * (true / length - 1.0)
+    return balls
 
 
 def noisy_certificate(design: Design, truth: State, generator: np.random.Generator) -> Design:

@@ -235,33 +235,45 @@ def _held(
 
     An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it. As many
     parameters of the artefact's first pose are held as are left free: all of them when only distances are
-    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose, and a
+    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose, a
     single ball every turn.
     """
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
         own = np.flatnonzero(ball_artefact == artefact)
-        centred = balls[own] - balls[own].mean(axis=0)
-        _, extent, directions = np.linalg.svd(centred)
-        if len(own) == 1:
-            held[positions, d:] = True
-        on_a_line = d == 3 and len(own) > 1 and (len(own) == 2 or extent[1] <= FLAT * extent[0])
-        if on_a_line:
-            for k in positions:
-                held[k, d + int(np.abs(rotations[k] @ directions[0]).argmax())] = True
+        idle = _idle_turns(balls[own])
+        for k in positions:
+            held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
         chosen = np.isin(coordinates.ball, own)
         fixed = _motion_of_coordinates(
             balls[coordinates.ball[chosen]] - balls[own].mean(axis=0), coordinates.axis[chosen], d
         )
-        free = _null_space(fixed)
-        # A motion of the frame changes the pose that undoes it: in machine axes a shift and a turn.
-        turned = np.zeros((pose_size(d), free.shape[1]))
-        turned[:d] = rotations[positions[0]] @ free[:d]
-        turned[d:] = rotations[positions[0]] @ free[d:] if d == 3 else free[d:]
-        already = held[positions[0]]
-        held[positions[0]] |= _pivots(turned, already, free.shape[1])
+        # Turns that no reading shows are dealt with already, in every position.
+        free = _null_space(np.concatenate([fixed, idle.T]))
+        first = rotations[positions[0]]
+        motions = _in_machine_axes(np.concatenate([idle, free], axis=1), first)
+        held[positions[0]] |= _pivots(motions, held[positions[0]])
     return held
+
+
+def _idle_turns(balls: Array) -> Array:
+    """Motions (pose size, k) of an artefact about its centre that move none of its balls (n, d)."""
+    d = balls.shape[1]
+    centred = balls - balls.mean(axis=0)
+    moves = _motion_of_coordinates(np.repeat(centred, d, axis=0), np.tile(np.arange(d), len(balls)), d)
+    size = np.abs(centred).max(initial=0.0)
+    if size == 0.0:
+        return np.eye(pose_size(d))[:, d:]
+    turns = _null_space(moves[:, d:] / size)
+    return np.concatenate([np.zeros((d, turns.shape[1])), turns])
+
+
+def _in_machine_axes(motions: Array, rotation: Array) -> Array:
+    """Motions (pose size, k) of an artefact's frame as changes of the pose that undo them: a shift and a turn."""
+    d = len(rotation)
+    turned = rotation @ motions[d:] if d == 3 else motions[d:]
+    return np.concatenate([rotation @ motions[:d], turned])
 
 
 def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Array:
@@ -286,13 +298,14 @@ def _null_space(rows: Array) -> Array:
     return np.asarray(directions[rank:].T)
 
 
-def _pivots(motions: Array, already: NDArray[np.bool_], needed: int) -> NDArray[np.bool_]:
-    """Parameters (rows of `motions`) to hold so that no motion remains, largest pivot first."""
+def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+    """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first, then largest."""
     chosen = np.zeros(len(motions), bool)
+    waiting = [] if already is None else np.flatnonzero(already).tolist()
     left = motions.copy()
-    for _ in range(needed):
-        size = np.where(chosen | already, -1.0, (left**2).sum(axis=1))
-        row = int(size.argmax())
+    for k in range(motions.shape[1]):
+        size = np.where(chosen, -1.0, (left**2).sum(axis=1))
+        row = waiting[k] if k < len(waiting) else int(size.argmax())
         if size[row] <= FLAT:
             break
         chosen[row] = True

@@ -172,12 +172,14 @@ def parse_length_function(value: object) -> LengthFunction:
     >>> parse_length_function("0.5 um + L/1000000")
     LengthFunction(constant=5e-07, slope=1e-06)
     """
-    if not isinstance(value, str) or "L" not in value:
+    if not isinstance(value, str) or "L" not in value and "ppm" not in value:
         constant = parse_length(value)
         if constant <= 0:
             _positive(value, constant)
         return LengthFunction(constant)
     match = CONSTANT_AND_SLOPE.fullmatch(value)
+    if match is None and "ppm" in value:
+        raise QuantityError(f'"{shorten(value)}": write for example "{LENGTH_FUNCTION_EXAMPLE}" for 0.5 um + 1 ppm')
     if match is None:
         raise QuantityError(
             f'"{shorten(value)}" is not a length that grows with L; write for example "{LENGTH_FUNCTION_EXAMPLE}"'

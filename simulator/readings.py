@@ -62,15 +62,17 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
     columns, d = column_names(path), design.dimension
     if len(design.probe_names) == 1 and "probe" not in columns:
         texts.remove("probe")
-    rows = read_table(path, texts, AXES[:d], ["u"])
-    index, messages = _indices(rows, design)
+    messages: list[Message] = []
+    rows = read_table(path, texts, AXES[:d], ["u"], problems=messages)
+    index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
-    x, stated = lengths[:, :d], lengths[:, d]
     if "u" in columns:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
-        messages += [rows[i].mark.message("", text) for i in np.flatnonzero(stated <= 0.0)]
-    if messages:
-        raise ExperimentError(messages)
+        messages += [row.mark.message("", text) for row in rows if row.lengths[d] <= 0.0]
+    if messages or unknown:
+        raise ExperimentError(sorted([*messages, *unknown]))
+    x, stated = lengths[:, :d], lengths[:, d]
+    _refuse_far_outside(rows, x, design)
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     uncertainty = np.repeat(stated[:, None], d, axis=1) if "u" in columns else _planned_uncertainty(design, readings)
     readings = replace(readings, uncertainty=uncertainty)
@@ -79,7 +81,7 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
     if len(unread):
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
         raise ExperimentError(
-            [Message(str(path), 0, 0, "", f"no reading of the balls {names}; read each at least once")]
+            [Message(str(path), 1, 1, "", f"no reading of the balls {names}; read each at least once")]
         )
     marks = tuple(row.mark for row in rows)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
@@ -96,19 +98,34 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
         for artefact in range(len(design.artefact_names))
     ]
     index = np.zeros((len(rows), 3), np.int64)
-    messages: list[Message] = []
+    unknown: dict[str, list[Row]] = {}
     for i, row in enumerate(rows):
         position, ball, probe = (*row.texts, design.probe_names[0])[:3]
         if position not in positions:
-            messages.append(row.mark.message("", f'unknown position "{position}"; {hint(position, positions)}'))
+            unknown.setdefault(f'unknown position "{position}"; {hint(position, positions)}', []).append(row)
             continue
         own = balls[design.position_artefact[positions[position]]]
         if ball not in own:
-            messages.append(row.mark.message("", f'unknown ball "{ball}"; {hint(ball, own)}'))
+            unknown.setdefault(f'unknown ball "{ball}"; {hint(ball, own)}', []).append(row)
         if probe not in probes:
-            messages.append(row.mark.message("", f'unknown probe "{probe}"; {hint(probe, probes)}'))
+            unknown.setdefault(f'unknown probe "{probe}"; {hint(probe, probes)}', []).append(row)
         index[i] = own.get(ball, 0), positions[position], probes.get(probe, 0)
+    messages = []
+    for text, places in unknown.items():
+        more = f" (and in {len(places) - 1} lines more)" if len(places) > 1 else ""
+        messages.append(places[0].mark.message("", text + more))
     return index, messages
+
+
+def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
+    """Refuse readings that lie outside the volume by more than its own size: their unit is not what it says."""
+    size = float((design.upper - design.lower).max())
+    messages = []
+    for i, axis in np.argwhere((x < design.lower - size) | (x > design.upper + size)).tolist():
+        text = f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the column's name"
+        messages.append(rows[i].mark.message("", text))
+    if messages:
+        raise ExperimentError(messages)
 
 
 def _key(readings: Readings) -> list[tuple[int, int, int]]:

@@ -40,13 +40,19 @@ def hint(word: str, known: Iterable[str]) -> str:
     >>> hint("x", ["plate", "bar"])
     'known: plate, bar'
     """
-    known = list(known)
-    folded = {candidate.casefold(): candidate for candidate in reversed(known)}
-    # Beyond this length a word is no slip of the pen, and comparing it would take long.
-    nearest = difflib.get_close_matches(word.casefold(), folded, n=1) if len(word) <= 100 else []
-    if nearest:
-        return f'did you mean "{folded[nearest[0]]}"?'
+    known = list(dict.fromkeys(known))
+    meant = nearest(word, known)
+    if meant is not None:
+        return f'did you mean "{meant}"?'
     return f"known: {listing(known)}" if known else "there is none"
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that was probably meant, or None."""
+    folded = {candidate.casefold(): candidate for candidate in reversed(list(known))}
+    # Beyond this length a word is no slip of the pen, and comparing it would take long.
+    found = difflib.get_close_matches(word.casefold(), folded, n=1) if len(word) <= 100 else []
+    return folded[found[0]] if found else None
 
 
 def describe(value: Any) -> str:

@@ -19,7 +19,7 @@ def parser() -> argparse.ArgumentParser:
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
         epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used.",
     )
-    top.add_argument("--version", action="version", version=_version())
+    top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for module in (check, run, simulate, fit, compare, schema, init):
         module.add_parser(commands)
@@ -28,6 +28,8 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     options = parser().parse_args(arguments)
     # Loaded only now, so that --help and wrong usage answer at once.
     from simulator.experiment.messages import ExperimentError
@@ -43,21 +45,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader has gone; say nothing, and keep the interpreter from flushing into the closed pipe.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return AS_EXPECTED
+    except OSError as error:
+        print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BAD_FILE
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
 
 
-def _version() -> str:
-    """Version of the distribution, looked up only when asked for."""
+class _Version(argparse.Action):
+    """Looks the version up only when asked for it."""
 
-    class Lazy(str):
-        def __str__(self) -> str:
-            from importlib.metadata import version
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
 
-            return f"ballplate {version('ballplate')}"
-
-        def __mod__(self, other: object) -> str:
-            return str(self)
-
-    return Lazy("ballplate")
+        print(f"ballplate {version('ballplate')}")
+        parser.exit()

@@ -23,13 +23,13 @@ def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected."""
     from ..study import check
     from ..tables import plan_data, plan_lines
-    from .common import experiments, print_json
+    from .common import experiments, print_json, print_lines
 
     plans = []
     for experiment in experiments(options):
         plans.append(check(experiment))
         if not options.json:
-            print("\n".join(plan_lines(plans[-1])), flush=True)
+            print_lines(plan_lines(plans[-1]))
     if options.json:
         print_json([plan_data(plan) for plan in plans])
     return 0 if all(plan.verdict.as_expected for plan in plans) else 1

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+import textwrap
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,6 +75,16 @@ def single(options: Namespace) -> Experiment:
         text = f"the file has several variants; choose one with --variant: {', '.join(names)}"
         raise ExperimentError([Message(str(options.files[0]), 0, 0, "", text)])
     return found[0]
+
+
+def print_lines(lines: Sequence[str]) -> None:
+    """Print lines; on a terminal, sentences are wrapped to its width, and tables are left alone."""
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
+    for line in lines:
+        is_sentence = "  " not in line.strip()
+        wrapped = textwrap.wrap(line, width, subsequent_indent="  ") if width and is_sentence else [line]
+        print("\n".join(wrapped or [""]))
+    sys.stdout.flush()
 
 
 def print_json(results: list[dict[str, Any]]) -> None:

@@ -52,7 +52,7 @@ def run(options: Namespace) -> int:
 
     from ..study import fit
     from ..tables import fit_data, fit_lines
-    from .common import print_json, single
+    from .common import print_json, print_lines, single
 
     experiment = single(options)
     observed = read_readings(options.readings, lay_out(experiment))
@@ -65,10 +65,18 @@ def run(options: Namespace) -> int:
     if options.json:
         print_json([fit_data(result)])
     else:
-        print("\n".join(fit_lines(result)))
+        print_lines(fit_lines(result))
     if result.solution.status != "converged":
-        print(f"the estimate has {result.solution.status}; see the record of iterations", file=sys.stderr)
+        text = "see the record of iterations, and look for wrong units, balls or probes among the readings"
+        print(f"the estimate has {result.solution.status} and nothing is made of it: {text}", file=sys.stderr)
         return 1
+    if result.too_large:
+        times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
+        print(
+            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; look at the largest residuals, "
+            "or state larger uncertainties, or a richer error model",
+            file=sys.stderr,
+        )
     if not result.verdict.as_expected:
         print(f"rank deficiency {result.verdict.deficiency}: what is undetermined is left out", file=sys.stderr)
         return 1

@@ -23,13 +23,13 @@ def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
     from ..study import plan
     from ..tables import plan_data, plan_lines
-    from .common import experiments, print_json
+    from .common import experiments, print_json, print_lines
 
     plans = []
     for experiment in experiments(options):
         plans.append(plan(experiment))
         if not options.json:
-            print("\n".join([*([""] if len(plans) > 1 else []), *plan_lines(plans[-1])]), flush=True)
+            print_lines([*([""] if len(plans) > 1 else []), *plan_lines(plans[-1])])
     if options.json:
         print_json([plan_data(p) for p in plans])
     return 0 if all(p.verdict.as_expected for p in plans) else 1

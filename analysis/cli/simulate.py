@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 
 from .common import add_file
@@ -13,32 +13,35 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "simulate",
         help="write synthetic readings of a design",
-        description="Write readings that the file's true machine would give of artefacts and poses as drawn, with "
-        "noise of the stated repeatability. The same seed gives the same readings.",
+        description="Write readings that the file's true machine would give of artefacts that differ from their "
+        "certificates by the stated uncertainties, with noise of the stated repeatability. The same seed gives the "
+        "same readings.",
     )
     add_file(parser)
     parser.add_argument(
         "-o", "--output", metavar="CSV", required=True, type=Path, help="file to write, or - for standard output"
     )
     parser.add_argument("--seed", type=_seed, help="seed of the noise, instead of the file's")
-    parser.add_argument("--exact", action="store_true", help="leave the noise out")
+    parser.add_argument("--exact", action="store_true", help="leave all noise out; artefacts are as drawn")
+    parser.add_argument("--force", action="store_true", help="overwrite the output file if there is one")
     parser.set_defaults(run=run)
 
 
 def _seed(text: str) -> int:
-    seed = int(text)
-    if seed < 0:
-        raise ValueError
-    return seed
+    if not text.isascii() or not text.isdigit():
+        raise ArgumentTypeError(f'a seed is a whole number, 0 or above, not "{text}"')
+    return int(text)
 
 
 def run(options: Namespace) -> int:
     """Write one set of readings."""
+    from dataclasses import replace
+
     import numpy as np
 
     from simulator.design import State, nominal_state
     from simulator.experiment.messages import ExperimentError, Message
-    from simulator.generate import NoReadingError, exact_readings, noisy_readings
+    from simulator.generate import NoReadingError, exact_readings, noisy_readings, true_artefacts
     from simulator.layout import lay_out
     from simulator.machines.truth import true_parameters
     from simulator.readings import write_readings
@@ -55,6 +58,7 @@ def run(options: Namespace) -> int:
             readings, x = exact_readings(design, truth)
         else:
             generator = np.random.default_rng(np.random.SeedSequence(seed))
+            truth = replace(truth, balls=true_artefacts(design, generator))
             readings, x = noisy_readings(design, truth, generator)
     except NoReadingError as error:
         raise ExperimentError(
@@ -64,8 +68,11 @@ def run(options: Namespace) -> int:
         write_readings(sys.stdout, design, readings, x)
         return 0
     try:
-        with options.output.open("w", encoding="utf-8", newline="") as stream:
+        with options.output.open("w" if options.force else "x", encoding="utf-8", newline="") as stream:
             write_readings(stream, design, readings, x)
+    except FileExistsError:
+        text = "exists already; name a new file, or overwrite it with --force"
+        raise ExperimentError([Message(str(options.output), 0, 0, "", text)]) from None
     except OSError as error:
         raise ExperimentError(
             [Message(str(options.output), 0, 0, "", f"cannot be written ({error.strerror}); name another file")]

@@ -14,6 +14,7 @@ from ..design import Design
 from ..machines.protocol import Array
 from ..threads import single_threaded
 from .elimination import Factor
+from .parameters import SharedLayout
 
 # Below this fraction of the largest singular value a direction is undetermined: rounding leaves about 1e-14,
 # and the weakest determined direction of a usable design is many orders of magnitude above.
@@ -70,6 +71,12 @@ def spectrum(factor: Factor, exact: float = EXACT) -> Spectrum:
     _, values, rows = np.linalg.svd(factor.root * scale)
     deficiency = int((values <= exact * values.max(initial=0.0)).sum())
     return Spectrum(values, scale[:, None] * rows.T, scale, deficiency)
+
+
+def no_spectrum(layout: SharedLayout) -> Spectrum:
+    """What stands for a spectrum where the factor is not finite: no value is known, none counts as open."""
+    size = len(layout)
+    return Spectrum(np.full(size, np.nan), np.full((size, size), np.nan), layout.scale * MICROMETRE, 0)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from ..design import Design, State, probe_offsets
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
-from .covariance import Spectrum, _solve_balls, spectrum
+from .covariance import Spectrum, _solve_balls, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .parameters import shared_layout
 
@@ -64,12 +64,14 @@ def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSe
     length, previous = 0.0, np.inf
     status: Status = "not converged"
     while True:
-        factor = eliminate(design, layout, state, x)
-        found = spectrum(factor)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            factor = eliminate(design, layout, state, x)
         record.append(Iteration(length, factor.sum_of_squares))
-        if not np.isfinite(factor.sum_of_squares):
+        if not (np.isfinite(factor.sum_of_squares) and np.isfinite(factor.root).all()):
+            found = no_spectrum(layout)
             status = "diverged"
             break
+        found = spectrum(factor)
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found)

@@ -51,14 +51,6 @@ class SharedLayout:
     def is_angle(self) -> NDArray[np.bool_]:
         return np.array([p.unit == "rad" for p in self.parameters], bool)
 
-    def column(self, name: str) -> int:
-        """Column of a parameter by its name."""
-        return self._columns[name]
-
-    @cached_property
-    def _columns(self) -> dict[str, int]:
-        return {p.name: k for k, p in enumerate(self.parameters)}
-
 
 def shared_layout(design: Design) -> SharedLayout:
     """Lay out the shared parameters of a design."""

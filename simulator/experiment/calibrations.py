@@ -20,6 +20,9 @@ AXES = ("x", "y", "z")
 # Balls tied to one another by distances are estimated together, with memory that grows as the square of their number.
 MOST_TIED_BALLS = 3000
 
+# A certified distance that differs from the drawing by more than this fraction is a slip of the pen.
+FAR_FROM_DRAWING = 0.1
+
 
 def resolve_calibration(
     settings: DistancesSettings | CoordinatesSettings, steps: Steps, references: References
@@ -155,6 +158,12 @@ def _certified_distances(
         by_pair[pair] = distance
     wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
     missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
+    drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
+    for names, distance, mark, place in entries:
+        expected = drawn.get(frozenset(names))
+        if expected is not None and distance > 0 and not abs(distance - expected) <= FAR_FROM_DRAWING * expected:
+            text = f"{1e3 * distance:.6g} mm is far from the {1e3 * expected:.6g} mm of the artefact's drawing"
+            problems.add_at(mark, place, f"{text}; correct the one or the other")
     if missing and len(problems.messages) == before:
         problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
     if len(problems.messages) > before:

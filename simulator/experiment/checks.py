@@ -108,7 +108,7 @@ def check_use(sections: Sections, positions: dict[int, Position], position_count
     for name in references.artefact_names:
         if position_count and name not in placed:
             problems.add(("artefacts", name), "is never placed; add a position of it, or remove it", of_key=True)
-        elif name in references.layouts and name not in uncertain:
+        elif position_count and name in references.layouts and name not in uncertain:
             _check_balls_read(name, [one for one in positions.values() if one.artefact == name], references)
     calibration_count = len(sections.entries("calibration"))
     for name, settings in references.artefacts.items():

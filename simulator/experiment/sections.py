@@ -13,8 +13,10 @@ from ..quantities import Angle, Length, LengthFunction, PositiveLength
 from ..settings import Settings
 
 Text = Annotated[str, StringConstraints(min_length=1)]
+# Without control characters, which would reach the terminal.
+Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 Count = Annotated[int, Field(ge=1, le=10_000)]
-Seed = Annotated[int, Field(ge=0)]
+Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
 def _form(value: Any) -> str:
@@ -275,7 +277,7 @@ class EvaluationSettings(Settings):
 class ExperimentSettings(Settings):
     """A ball-plate experiment on a co-ordinate measuring machine."""
 
-    title: Text = Field(description="what the experiment is, in a line")
+    title: Line = Field(description="what the experiment is, in a line")
     description: Text | None = Field(None, description="what else is worth knowing")
     machine: MachineSettings = Field(description="measuring volume and repeatability")
     error_model: ErrorModelSettings = Field(  # type: ignore[valid-type,unused-ignore]
@@ -309,7 +311,7 @@ class ExperimentSettings(Settings):
         "estimated",
         description="whether the scale of all uncertainties is estimated from the residuals or given",
     )
-    expected_rank_deficiency: Annotated[int, Field(ge=0)] | None = Field(
+    expected_rank_deficiency: Annotated[int, Field(ge=0, strict=True)] | None = Field(
         None, description="number of undetermined parameters that is accepted as intended"
     )
     seed: Seed = Field(1, description="seed of simulated readings; default 1")

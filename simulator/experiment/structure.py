@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import TypeAdapter, ValidationError
 
 from ..geometry.artefacts import AnyArtefactSettings
-from ..settings import describe, hint
+from ..settings import describe, hint, nearest
 from .messages import Steps
 from .problems import Problems
 from .sections import AnyProbe, CalibrationSettings, ExperimentSettings, PositionSettings, PriorSettings
@@ -52,11 +52,16 @@ def validate_sections(root: Node, problems: Problems) -> Sections:
     for steps, node in walk(root):
         if isinstance(node, Scalar) and node.value is None:
             problems.add(steps, "empty; give a value, or leave it out")
+    absent = [name for name in fields if name not in root.items]
+    misspelt = set()
     for key in root.items:
         if key not in fields:
-            problems.add((key,), f"unknown key; {hint(key, [name for name in fields if name not in root.items])}", True)
+            problems.add((key,), f"unknown key; {hint(key, absent)}", True)
+            misspelt.add(nearest(key, absent))
     for key, field in fields.items():
         node_or_none = root.items.get(key)
+        if node_or_none is None and key in misspelt:
+            continue
         if node_or_none is None and field.is_required():
             problems.add((key,), f'missing; add "{key}" ({field.description})')
         elif node_or_none is None:

@@ -27,19 +27,24 @@ class Row:
 
 
 def read_table(
-    path: Path, texts: Sequence[str], lengths: Sequence[str], optional: Sequence[str] = ()
+    path: Path,
+    texts: Sequence[str],
+    lengths: Sequence[str],
+    optional: Sequence[str] = (),
+    problems: list[Message] | None = None,
 ) -> tuple[Row, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a unit such
     as ``x_mm``; ``optional`` are length columns that may be missing and then are 0. Empty lines and lines
-    that begin with # are skipped.
+    that begin with # are skipped. Messages about rows are added to ``problems`` if it is given, so that the caller can
+    say more at once; a length that is wrong is then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not a number,
         there are no rows; all problems of the file at once.
     """
     file = str(path)
-    messages: list[Message] = []
+    messages: list[Message] = [] if problems is None else problems
     lines = [
         (number, line)
         for number, line in enumerate(read_text(path).splitlines(), start=1)
@@ -47,7 +52,7 @@ def read_table(
     ]
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:
-        raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {example}")])
+        raise ExperimentError([Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")])
     places, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, example)
     rows = []
     for number, line in lines[1 : MOST_ROWS + 1]:
@@ -64,6 +69,7 @@ def read_table(
                 row_lengths.append(float(exact_number(cell) * factors.get(name, Fraction(1))))
             except QuantityError as error:
                 messages.append(Mark(file, number, column).message("", _wrong_number(cell, name) or str(error)))
+                row_lengths.append(float("nan"))
         for name in texts:
             if not by_name[name][1]:
                 messages.append(Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name"))
@@ -72,7 +78,7 @@ def read_table(
         messages.append(Message(file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"))
     if len(lines) > MOST_ROWS + 1:
         messages.append(Message(file, lines[MOST_ROWS][0], 1, "", f"more than {MOST_ROWS} rows; leave some out"))
-    if messages:
+    if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
 

@@ -38,8 +38,14 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
             continue
         tree: Node = base
         before = len(problems.messages)
+        places: dict[str, tuple[str, ...]] = {}
         for path, node in overrides.items.items():
             try:
+                place = _place(base, path)
+                other = next((p for p, steps in places.items() if _overlap(steps, place)), None)
+                if other is not None:
+                    raise ValueError(f'is part of the same place as "{other}"; replace it once')
+                places[path] = place
                 tree = override(tree, path, node, overrides.key_marks[path])
             except ValueError as error:
                 problems.add(("variants", name, path), str(error), of_key=True)
@@ -53,13 +59,37 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
 
     :raises ValueError: the path is malformed, or what it passes through does not exist.
     """
-    steps = [match[1] or match[2] or "" for match in STEP.finditer(path)]
-    if not path or "".join(match[0] for match in STEP.finditer(path)) != path or "" in steps:
-        raise ValueError(f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size')
+    steps = _steps(path)
     if len(steps) == 1 and steps[0] not in ExperimentSettings.model_fields or steps[0] == "variants":
         known = [key for key in ExperimentSettings.model_fields if key != "variants"]
         raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
     return _replaced(root, steps, value, mark, ())
+
+
+def _steps(path: str) -> list[str]:
+    steps = [match[1] or match[2] or "" for match in STEP.finditer(path)]
+    if not path or "".join(match[0] for match in STEP.finditer(path)) != path or "" in steps:
+        raise ValueError(f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size')
+    return steps
+
+
+def _place(root: Node, path: str) -> tuple[str, ...]:
+    """Steps of a path with entries of lists by index, so that one place has one name."""
+    node: Node | None = root
+    found: list[str] = []
+    for step in _steps(path):
+        if isinstance(node, Sequence):
+            i = _index(node, step, tuple(found))
+            node, step = node.items[i], str(i)
+        else:
+            node = child(node, step) if node is not None else None
+        found.append(step)
+    return tuple(found)
+
+
+def _overlap(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
+    shorter = min(len(one), len(other))
+    return one[:shorter] == other[:shorter]
 
 
 def _replaced(node: Node, steps: list[str], value: Node, mark: Mark, above: tuple[str, ...]) -> Node:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..estimation.observations import reading_blocks, reading_weights
 from ..generate import scale_readings
 from ..machines.protocol import Array, ErrorModel
 from ..threads import single_threaded
-from .expansion import Direct, Expansion, LocalModel, expand
+from .expansion import Direct, LocalModel, expand
 
 # Readings handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
 READINGS_AT_ONCE = 512
@@ -58,7 +59,8 @@ class Reference:
 
     The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
     the model at the first and the second ends of the length standards' lengths, with `end_noise` (2, d, m) and
-    `end_difference` (m, d), their difference at the reference. `start` is the estimate from readings without noise.
+    `end_difference` (m, d), their difference at the reference; `points` is the model at the evaluation points.
+    `start` is the estimate from readings without noise.
     """
 
     design: Design
@@ -71,6 +73,7 @@ class Reference:
     ends: tuple[LocalModel, LocalModel] | None
     end_noise: Array
     end_difference: Array
+    points: LocalModel
     exact: Array
 
     @property
@@ -101,7 +104,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     if solution.status != "converged":
         raise NoReferenceError(f"the estimate from readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
-    local = _local_model(observed, solution.spectrum, solution.factor.layout.model, start, exact)
+    local = _local_models(observed, solution.spectrum, solution.factor.layout.model, start, exact)
     blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
     weight = reading_weights(observed, readings.select(plates))
     groups, at = [], 0
@@ -116,14 +119,14 @@ def reference(design: Design, truth: Truth) -> Reference:
                 np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
                 np.ascontiguousarray((blocks.residual / weight)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
-                local(plates[chosen]),
+                local(exact[plates[chosen]], p[plates[chosen]]),
             )
         )
         at += len(chosen)
     order = np.concatenate([np.arange(0), *_groups(observed)])
     given = observed.lengths
-    ends = (local(given.first), local(given.second)) if len(given) else None
     both = np.stack([given.first, given.second])
+    ends = (local(exact[both[0]], p[both[0]]), local(exact[both[1]], p[both[1]])) if len(given) else None
     corrected = exact[both] + np.stack(
         [observed.model.error(exact[k], start.a, p[k]) for k in both] if len(given) else [exact[k] for k in both]
     )
@@ -138,6 +141,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         ends,
         np.stack([(1.0 / reading_weights(observed, readings.select(k))).T for k in both]),
         corrected[0] - corrected[1],
+        local(observed.points, np.broadcast_to(observed.probes[observed.point_probe], observed.points.shape)),
         exact,
     )
 
@@ -175,22 +179,21 @@ def _groups(design: Design) -> list[Integers]:
     return found
 
 
-def _local_model(design: Design, found: Spectrum, model: slice, start: State, exact: Array):  # type: ignore[no-untyped-def]
-    """A function from indices of readings to the model about them: expanded where that is faithful."""
-    p = design.probes[design.readings.probe]
+def _local_models(
+    design: Design, found: Spectrum, columns: slice, start: State, exact: Array
+) -> Callable[[Array, Array], LocalModel]:
+    """A function from readings (m, d) and probe offsets (m, d) to the model there: expanded where that is faithful."""
+    model, p = design.model, design.probes[design.readings.probe]
 
-    def direct(chosen: Integers) -> Direct:
-        value = design.model.error(exact[chosen], start.a, p[chosen])
-        return Direct(design.model, exact[chosen], start.a, p[chosen], value)
+    def direct(x: Array, p: Array) -> LocalModel:
+        return Direct(model, x, start.a, p, model.error(x, start.a, p))
 
-    def expanded(chosen: Integers) -> Expansion:
-        return expand(design.model, exact[chosen], start.a, p[chosen])
+    def expanded(x: Array, p: Array) -> LocalModel:
+        return expand(model, x, start.a, p)
 
-    used = np.arange(len(exact))
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    noise = 1.0 / reading_weights(design, design.readings)
-    moved = noise.T[:, :, None] * generator.standard_normal((design.dimension, len(exact), 2))
-    step = found.root[model] @ generator.standard_normal((found.root.shape[1], 2))
-    difference = expanded(used).change(moved, step) - direct(used).change(moved, step)
-    is_faithful = bool((np.abs(difference) <= FAITHFUL * noise.T[:, :, None]).all())
-    return expanded if is_faithful else direct
+    noise = 1.0 / reading_weights(design, design.readings).T[:, :, None]
+    moved = noise * generator.standard_normal((design.dimension, len(exact), 2))
+    step = found.root[columns] @ generator.standard_normal((found.root.shape[1], 2))
+    difference = expanded(exact, p).change(moved, step) - direct(exact, p).change(moved, step)
+    return expanded if bool((np.abs(difference) <= FAITHFUL * noise).all()) else direct

@@ -28,8 +28,9 @@ BATCH = 64
 # Passes after which a replicate counts as not converged.
 PASSES = 20
 
-# A replicate has converged when its next step, at the pace of the last two, is below this many metres.
-SMALLEST_STEP = 1e-14
+# A replicate has converged when its step is below this fraction of its first, which is as long as its errors are: what
+# passes of such a pace leave to the next one is far below anything that statistics of replicates could show.
+SMALLEST_STEP = 1e-4
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
         np.zeros((len(shared.start.a), BATCH)),
     )
     passes, converged = np.zeros(BATCH, np.int64), np.zeros(BATCH, bool)
-    squares, previous = np.full(BATCH, np.nan), np.full(BATCH, np.inf)
+    squares, first = np.full(BATCH, np.nan), np.zeros(BATCH)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
             now, by_ball, by_shared = _gradient(shared, drawn, None if number == 0 else at, at)
@@ -134,9 +135,10 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
                 np.abs(balls).max(axis=(0, 1), initial=0.0),
             )
             passes += active
-            pace = size / previous if number else np.ones(BATCH)
-            converged |= (size * pace < SMALLEST_STEP) & (pace < 0.5)
-            previous = np.where(active, size, previous)
+            if number == 0:
+                first = size
+            else:
+                converged |= size <= SMALLEST_STEP * first
             if converged.all():
                 break
     converged &= np.isfinite(squares)

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -83,9 +84,11 @@ def test_simulate_and_fit(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
     readings = tmp_path / "readings.csv"
     assert run("simulate", QUICKSTART, "-o", readings) == 0
     first = readings.read_bytes()
-    assert run("simulate", QUICKSTART, "-o", readings) == 0
+    assert run("simulate", QUICKSTART, "-o", readings, "--seed", "2") == 3
+    assert "exists already" in capsys.readouterr().err and readings.read_bytes() == first
+    assert run("simulate", QUICKSTART, "-o", readings, "--force") == 0
     assert readings.read_bytes() == first
-    assert run("simulate", QUICKSTART, "-o", readings, "--seed", "2") == 0
+    assert run("simulate", QUICKSTART, "-o", readings, "--force", "--seed", "2") == 0
     assert readings.read_bytes() != first
     out, err = capsys.readouterr()
     assert out == "" and "250 readings written" in err
@@ -142,9 +145,6 @@ def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     out, err = capsys.readouterr()
     assert out == ""
     assert f'{readings}:3:22: "x" is not a number' in err
-    readings.write_text(readings.read_text(encoding="utf-8").replace("2,x", "2,3"), encoding="utf-8")
-    assert run("fit", QUICKSTART, readings) == 3
-    err = capsys.readouterr().err
     assert 'unknown position "z lo"; did you mean "z low"?' in err
     assert 'unknown ball "r9c9"' in err and 'unknown probe "downn"; did you mean "down"?' in err
 
@@ -154,6 +154,83 @@ def test_fit_needs_every_ball(capsys: pytest.CaptureFixture[str], tmp_path: Path
     readings.write_text("position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,1,2,3\n", encoding="utf-8")
     assert run("fit", QUICKSTART, readings) == 3
     assert 'no reading of the balls "r1c2", "r1c3"' in capsys.readouterr().err
+
+
+def quickstart_readings(folder: Path, *options: str) -> tuple[Path, list[str]]:
+    path = folder / "readings.csv"
+    run("simulate", QUICKSTART, "-o", path, *options)
+    return path, path.read_text(encoding="utf-8").splitlines()
+
+
+def test_fit_of_readings_in_another_unit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings, lines = quickstart_readings(tmp_path)
+    readings.write_text("\n".join([lines[0].replace("_mm", "_m"), *lines[1:]]), encoding="utf-8")
+    assert run("fit", QUICKSTART, readings) == 3
+    assert "far outside the volume; check the unit" in capsys.readouterr().err
+
+
+def test_a_wrong_reading_is_warned_of_and_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings, lines = quickstart_readings(tmp_path)
+    cells = lines[40].split(",")
+    cells[4] = str(float(cells[4]) + 0.005)
+    readings.write_text("\n".join([*lines[:40], ",".join(cells), *lines[41:]]), encoding="utf-8")
+    capsys.readouterr()
+    assert run("fit", "--json", QUICKSTART, readings) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["too_large"] and "warning: S^2 is" in err
+    worst = found["largest_residuals"][0]
+    assert [worst["position"], worst["ball"], worst["probe"], worst["axis"]] == [*cells[:3], "y"]
+    assert run("fit", QUICKSTART, readings) == 0
+    assert f"{cells[0]}" in capsys.readouterr().out.partition("largest residuals")[2]
+
+
+def test_nothing_is_made_of_a_failed_estimate(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    readings, lines = quickstart_readings(tmp_path)
+    readings.write_text("\n".join([lines[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in lines[1:])]), "utf-8")
+    capsys.readouterr()
+    assert run("fit", "--json", QUICKSTART, readings) == 1
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert found["status"] == "diverged" and found["quantities"] == {} and found["estimates"] == {}
+    assert "the estimate has diverged and nothing is made of it" in err
+    assert run("fit", QUICKSTART, readings) == 1
+    assert "U1" not in capsys.readouterr().out
+
+
+def test_simulated_certificates_are_wrong_by_their_uncertainty(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Otherwise the residuals would be too small and sigma with them."""
+    found = []
+    for seed in range(6):
+        path = tmp_path / f"{seed}.csv"
+        run("simulate", "designs/npl/6.1.1.yaml", "--variant", "C", "-o", path, "--seed", str(seed))
+        capsys.readouterr()
+        run("fit", "--json", "designs/npl/6.1.1.yaml", "--variant", "C", path)
+        fit = json.loads(capsys.readouterr().out)
+        found.append(fit["sum_of_squares"])
+    freedom = fit["degrees_of_freedom"]
+    assert abs(np.mean(found) - freedom) < 4 * np.sqrt(2 * freedom / len(found))
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"ballplate {version('ballplate')}\n"
+
+
+def test_a_full_disk_is_told() -> None:
+    with Path("/dev/full").open("w") as full:
+        found = subprocess.run(
+            [sys.executable, "-m", "analysis.cli", "check", QUICKSTART],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert found.returncode == 3
+    assert found.stderr.startswith("standard output: cannot be written") and "Traceback" not in found.stderr
 
 
 def test_bad_files_give_messages_and_nothing_else(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -169,7 +246,7 @@ def test_bad_files_give_messages_and_nothing_else(capsys: pytest.CaptureFixture[
         assert run(command, broken, tmp_path / "missing.yaml") == 3
         out, err = capsys.readouterr()
         assert out == ""
-        assert 'machine.repeatability: "0.2" has no unit; write for example "0.2 um"' in err or "has no unit" in err
+        assert 'machine.repeatability: "0.2" has no unit; ' in err
         assert 'did you mean "down"?' in err and 'did you mean "position"?' in err
         assert "missing.yaml" in err and "Traceback" not in err
         assert all(line.startswith(str(tmp_path)) for line in err.splitlines())

@@ -41,7 +41,6 @@ SIDES = "pairs: corner sides, standard_uncertainty: 0.2 um"
 SECTIONS = [
     ("title: good", "titel: good", [
         '1:1: titel: unknown key; did you mean "title"?',
-        '1:1: title: missing; add "title" (what the experiment is, in a line)',
     ]),
     ("title: good", "title: 2024", [
         "1:8: title: expected a text, found the number 2024; put it in quotes (what the experiment "
@@ -305,11 +304,13 @@ def test_tables_are_reported_at_their_own_lines(tmp_path: Path) -> None:
         "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (what the experiment is, in a line)",
         'd.csv:2:11: "five" is not a number; write for example "500.0003"',
     ]
-    (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,5\nr1c1,r9c9,-1\nr1c3,r1c1,5\n")
+    (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,500\nr1c1,r9c9,-1\nr1c3,r1c1,5\n")
     assert refusals(tmp_path, text)[1:] == [
         "d.csv:3:1: calibration[0].values: a distance must be above zero; correct it",
         'd.csv:3:1: calibration[0].values: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, '
         "r3c1, r3c2 and 1 more",
+        "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's drawing; "
+        "correct the one or the other",
         'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice; remove one of the two',
     ]
 

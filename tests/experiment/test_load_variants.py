@@ -30,6 +30,31 @@ def refusals(folder: Path, text: str) -> list[str]:
     return str(caught.value).replace(f"{folder}/", "").split("\n")
 
 
+def test_variants_replace_a_place_once(tmp_path: Path) -> None:
+    text = (
+        BASE
+        + """\
+variants:
+  A:
+    positions[low].level: 1 mm
+    positions[0].level: 2 mm
+  B:
+    positions: []
+    positions[0].level: 2 mm
+"""
+    )
+    lines = refusals(tmp_path, text)
+    assert lines[0].startswith("e.yaml:12:5: variants.A[positions[0].level]: is part of the same place as")
+    assert lines[1].startswith("e.yaml:15:5: variants.B[positions[0].level]: is part of the same place as")
+
+
+@pytest.mark.parametrize("value", ["true", '"7"', "7.0", "1e0"])
+@pytest.mark.parametrize("key", ["seed", "expected_rank_deficiency"])
+def test_whole_numbers_are_whole_numbers(tmp_path: Path, key: str, value: str) -> None:
+    (line,) = refusals(tmp_path, f"{BASE}{key}: {value}\n")
+    assert line.startswith(f"e.yaml:9:{len(key) + 3}: {key}: expected a whole number")
+
+
 def test_one_experiment_per_variant(tmp_path: Path) -> None:
     first, second, third = loaded(
         tmp_path,

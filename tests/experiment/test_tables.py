@@ -24,7 +24,7 @@ def test_units_quotes_and_comments(table: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "lines"),
     [
-        ("", [": the file is empty; its first line should be ball,x_mm"]),
+        ("", [":1:1: the file is empty; its first line should be ball,x_mm"]),
         ("ball,x_mm\n", [":1:1: no rows below the names of the columns; add at least one"]),
         ("ball;x_mm\na;1\n", [":1:1: the columns are not separated by commas; write ball,x_mm"]),
         ("ball,x\na,1\n", [':1:6: the column "x" has no unit; write for example x_mm']),

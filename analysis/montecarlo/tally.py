@@ -1,0 +1,131 @@
+"""Running sums over replicates, and the figures that they come to, each with its own standard error.
+
+A replicate's errors in one quantity, say all distances of U5, are far from independent of one another; replicates are.
+Each figure is therefore a mean over replicates of one number for each, and its standard error that of the mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulator.machines.protocol import Array
+from simulator.montecarlo.reference import Reference
+from simulator.montecarlo.replicates import Estimates
+
+from .targets import Target
+
+# Share of true values that an expanded uncertainty is to cover.
+COVERAGE = 0.95
+
+# Names of the numbers that each replicate gives for a quantity.
+SPREAD, ACTUAL, KNOWN, ESTIMATED = range(4)
+
+
+@dataclass(frozen=True)
+class Factors:
+    """Coverage factors, normal and Student's, and the largest S^2 that is no sign of misfit."""
+
+    known: float
+    estimated: float
+    limit: float
+    freedom: int
+
+
+def factors(freedom: int) -> Factors:
+    """Factors for 95 % coverage, and S^2's 95 % quantile; NaN without degrees of freedom."""
+    from scipy.special import chdtri, ndtri, stdtrit
+
+    tail = 0.5 * (1.0 + COVERAGE)
+    if freedom <= 0:
+        return Factors(float(ndtri(tail)), np.nan, np.nan, freedom)
+    limit = float(chdtri(freedom, 1.0 - COVERAGE))
+    return Factors(float(ndtri(tail)), float(stdtrit(freedom, tail)), limit, freedom)
+
+
+@dataclass(frozen=True)
+class QuantityTally:
+    """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (4,) numbers and their squares.
+
+    The four: mean square of the errors' scatter, and of the errors, in standard uncertainties; share of errors within
+    the expanded uncertainty with sigma known, and with sigma estimated from the replicate's residuals.
+    """
+
+    errors: Array
+    squares: Array
+    numbers: Array
+    numbers_squared: Array
+
+    def __add__(self, other: QuantityTally) -> QuantityTally:
+        return QuantityTally(
+            self.errors + other.errors,
+            self.squares + other.squares,
+            self.numbers + other.numbers,
+            self.numbers_squared + other.numbers_squared,
+        )
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Sums over `count` replicates that converged; `failed` holds the numbers of the others.
+
+    `residual` (2,) sums S^2 and its square, `rejected` counts S^2 beyond its limit, `passes` is the most that any took.
+    """
+
+    count: int
+    failed: tuple[int, ...]
+    passes: int
+    residual: Array
+    rejected: int
+    quantities: tuple[QuantityTally, ...]
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(
+            self.count + other.count,
+            self.failed + other.failed,
+            max(self.passes, other.passes),
+            self.residual + other.residual,
+            self.rejected + other.rejected,
+            tuple(one + two for one, two in zip(self.quantities, other.quantities, strict=True)),
+        )
+
+
+def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: int) -> Tally:
+    """Sums over the first `count` replicates of a batch."""
+    limits = factors(shared.degrees_of_freedom)
+    used = found.converged & (np.arange(len(found.index)) < count)
+    failed = found.index[:count][~found.converged[:count]]
+    squares = found.sum_of_squares[used]
+    sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
+    quantities = []
+    for aim in aims:
+        change = aim.change(found.found)[:, used]
+        scatter = change / aim.uncertainty[:, None]
+        error = scatter + (aim.base / aim.uncertainty)[:, None]
+        size = np.abs(error)
+        numbers = np.stack(
+            [
+                (scatter**2).mean(axis=0),
+                (error**2).mean(axis=0),
+                (size <= limits.known).mean(axis=0),
+                (size <= limits.estimated * sigma).mean(axis=0),
+            ]
+        )
+        absolute = change + aim.base[:, None]
+        quantities.append(
+            QuantityTally(
+                absolute.sum(axis=1),
+                (absolute**2).sum(axis=1),
+                numbers.sum(axis=1),
+                (numbers**2).sum(axis=1),
+            )
+        )
+    return Tally(
+        int(used.sum()),
+        tuple(int(k) for k in failed),
+        int(found.passes[:count].max(initial=0)),
+        np.array([squares.sum(), (squares**2).sum()]),
+        int((squares > limits.limit).sum()),
+        tuple(quantities),
+    )

@@ -1,0 +1,119 @@
+"""Runs replicates, on one processor or on several, until there are enough, and sums them up in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from simulator.montecarlo.reference import Reference
+from simulator.montecarlo.replicates import BATCH, estimate_batch
+
+from .figures import Outcome, outcome
+from .tally import Tally, tally
+from .targets import Target, targets
+
+# Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
+BATCHES = 8
+
+# Replicates of a run that is to go on until its figures are accurate, at the most.
+MOST_TRIALS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run has come: replicates done of those wanted, and how accurate it is, relative to what is measured."""
+
+    done: int
+    wanted: int
+    accuracy: float
+
+
+def run_trials(
+    shared: Reference,
+    seed: int,
+    trials: int,
+    until: float | None = None,
+    workers: int = 1,
+    report: Callable[[Progress], None] = lambda progress: None,
+) -> Outcome:
+    """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
+
+    With `until` the run ends as soon as the relative standard error of every ratio of spread to linearised uncertainty is
+    no larger. Neither `workers` nor an interruption changes what a given number of replicates comes to: after a
+    KeyboardInterrupt the outcome is that of the tasks done so far, in order.
+
+    :raises KeyboardInterrupt: before the first task was done.
+    """
+    aims = targets(shared)
+    total: Tally | None = None
+    interrupted = False
+    try:
+        for part in _parts(shared, aims, seed, trials, workers):
+            total = part if total is None else total + part
+            accuracy = accuracy_of(total)
+            report(Progress(total.count + len(total.failed), trials, accuracy))
+            if until is not None and accuracy <= until:
+                break
+    except KeyboardInterrupt:
+        if total is None:
+            raise
+        interrupted = True
+    assert total is not None
+    return replace(outcome(shared, aims, total), interrupted=interrupted)
+
+
+def accuracy_of(total: Tally) -> float:
+    """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite below 2 replicates."""
+    if total.count < 2:
+        return float("inf")
+    n = total.count
+    worst = 0.0
+    for one in total.quantities:
+        mean = one.numbers[0] / n
+        variance = max(one.numbers_squared[0] / n - mean**2, 0.0) * n / (n - 1)
+        worst = max(worst, float(np.sqrt(variance / n) / (2.0 * mean)))
+    return worst
+
+
+def sum_of_task(shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int) -> Tally:
+    """Sums over the replicates of one task."""
+    total: Tally | None = None
+    for batch in range(task * BATCHES, (task + 1) * BATCHES):
+        count = min(BATCH, trials - batch * BATCH)
+        if count <= 0:
+            break
+        part = tally(shared, aims, estimate_batch(shared, seed, batch), count)
+        total = part if total is None else total + part
+    assert total is not None
+    return total
+
+
+def _parts(shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, workers: int) -> Iterator[Tally]:
+    tasks = range(-(-trials // (BATCH * BATCHES)))
+    if workers == 1 or len(tasks) == 1:
+        for task in tasks:
+            yield sum_of_task(shared, aims, seed, task, trials)
+        return
+    from joblib import Parallel, delayed
+    from joblib.externals.loky import get_reusable_executor
+
+    parallel = Parallel(n_jobs=workers, return_as="generator", pre_dispatch="2*n_jobs", batch_size=1)
+    parts = parallel(delayed(_in_worker)(shared, aims, seed, task, trials) for task in tasks)
+    finished = False
+    try:
+        yield from parts
+        finished = True
+    finally:
+        if not finished:
+            # Nobody waits for what is under way; a run that has ended early ends at once.
+            get_reusable_executor().shutdown(wait=False, kill_workers=True)
+
+
+def _in_worker(shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int) -> Tally:
+    import signal
+
+    # An interruption from the keyboard reaches every process; the one that started the workers answers it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return sum_of_task(shared, aims, seed, task, trials)
