@@ -24,8 +24,8 @@ class Target:
     """A vector of q quantities.
 
     `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the linearised standard
-    uncertainties, `change` its change (q, b) in replicates, `units` (q,) metres, radians or 1. `sampled` tells that q is a
-    sample of all pairs.
+    uncertainties, `change` its change (q, b) in replicates, `units` (q,) metres, radians or 1. `sampled` tells that q
+    is a sample of all pairs.
     """
 
     symbol: str

@@ -40,8 +40,8 @@ def run_trials(
 ) -> Outcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
-    With `until` the run ends as soon as the relative standard error of every ratio of spread to linearised uncertainty is
-    no larger. Neither `workers` nor an interruption changes what a given number of replicates comes to: after a
+    With `until` the run ends as soon as the relative standard error of every ratio of spread to linearised uncertainty
+    is no larger. Neither `workers` nor an interruption changes what a given number of replicates comes to: after a
     KeyboardInterrupt the outcome is that of the tasks done so far, in order.
 
     :raises KeyboardInterrupt: before the first task was done.
@@ -65,7 +65,7 @@ def run_trials(
 
 
 def accuracy_of(total: Tally) -> float:
-    """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite below 2 replicates."""
+    """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite for 1 replicate."""
     if total.count < 2:
         return float("inf")
     n = total.count

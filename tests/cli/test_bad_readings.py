@@ -94,6 +94,12 @@ def test_a_position_read_in_mirrored_order(good: Lines, tmp_path: Path, capsys: 
     assert ": position y low: the readings fit the plate turned over; correct the names" in line
 
 
+def test_readings_that_are_all_the_same(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [good[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in good[1:])]
+    found = refusals(lines, tmp_path, capsys)
+    assert len(found) == 6 and all(": only " in line and "of 25 readings fit" in line for line in found[:2])
+
+
 def test_names_in_no_order_at_all(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     order = np.random.default_rng(3).permutation(25)
     names = [good[i].split(",")[1] for i in range(1, 26)]
@@ -165,7 +171,7 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (lambda lines: [], [" the file is empty; its first line should be position,ball,probe,x_mm,y_mm,z_mm"]),
+        (lambda lines: [], ["1:1: the file is empty; its first line should be position,ball,probe,x_mm,y_mm,z_mm"]),
         (lambda lines: lines[:1], ["1:1: no rows below the names of the columns; add at least one"]),
         (
             lambda lines: [line.replace(",", ";") for line in lines],

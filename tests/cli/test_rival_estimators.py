@@ -27,7 +27,8 @@ def test_fit(estimator: str, capsys: pytest.CaptureFixture[str], tmp_path: Path)
     differences = [value["value"] - full[name]["value"] for name, value in rival["estimates"].items()]
     assert len(differences) == 69
     sizes = [full[name]["standard_uncertainty"] for name in rival["estimates"]]
-    assert 0.1 < np.sqrt(np.mean(np.square(np.array(differences) / sizes))) < 4
+    # Distances hardly show the roll of X and what goes with it: there a rival is some ten times less certain.
+    assert 0.1 < np.sqrt(np.mean(np.square(np.array(differences) / sizes))) < 20
     assert main(["fit", QUICKSTART, readings, "--estimator", estimator, "--monomials", "--pairs", "all"]) == 0
     out = capsys.readouterr().out
     assert "300 pairs of balls" in out and "EXX t^4" in out and max(map(len, out.splitlines())) <= 180

@@ -207,7 +207,7 @@ POSITIONS = [
 CALIBRATION = [
     (SIDES, "pairs: corner, standard_uncertainty: 0 um", [
         '14:47: calibration[0].pairs: unknown value "corner"; did you mean "corners"? '
-        "allowed: corner sides, corner diagonals, corners, neighbours, all",
+        "allowed: corner sides, corner diagonals, corners, neighbours, braced, all",
         '14:77: calibration[0].standard_uncertainty: "0 um" must be above zero; give a small one, '
         'such as 1 nm',
     ]),
