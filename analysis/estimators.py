@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from simulator.design import Design, Integers, State, nominal_state
+from simulator.design import Design, Integers, State
 from simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
 from simulator.estimation.initial import initial_state
 from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
-from simulator.generate import noisy_certificate, noisy_readings
+from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
 from simulator.geometry.artefacts import pairs
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
-from simulator.machines.truth import true_parameters
+from simulator.machines.truth import true_machine
 from simulator.readings import ObservedReadings
 
 from .study import ParameterEstimate
@@ -129,12 +129,13 @@ def compare_estimators(
     """
     design = lay_out(experiment)
     chosen = ball_pairs(experiment, design, pair_set)
-    truth = replace(nominal_state(design), a=true_parameters(experiment.true_machine, design.model))
+    corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
+    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
-        both = _both_estimates(design, truth, chosen, estimator, across_probes, generator)
+        both = _both_estimates(design, on_truth, truth, chosen, estimator, across_probes, generator)
         if both is None:
             failed.append(trial)
         else:
@@ -160,6 +161,7 @@ def compare_estimators(
 
 def _both_estimates(
     design: Design,
+    on_truth: Design,
     truth: State,
     chosen: Integers,
     estimator: RivalName,
@@ -168,7 +170,7 @@ def _both_estimates(
 ) -> tuple[Array, Array] | None:
     """Parameters by the full and by the rival estimator from one data set; None where one did not converge."""
     drawn = noisy_certificate(design, truth, generator)
-    readings, x = noisy_readings(drawn, truth, generator)
+    readings, x = noisy_readings(on_truth, truth, generator)
     drawn = replace(drawn, readings=readings)
     full = gauss_newton(drawn, x, initial_state(drawn, x), ENOUGH)
     rival = rival_estimate(drawn, x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)

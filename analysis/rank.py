@@ -14,7 +14,7 @@ from simulator.design import Design
 from simulator.estimation.covariance import Covariance, Spectrum
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array
+from simulator.machines.protocol import Array, HasLines
 from simulator.quantities import LengthFunction
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
@@ -24,6 +24,8 @@ NEGLIGIBLE = 0.01
 # than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
 WEAK = 10.0
 
+# Curves that no polynomial of this degree describes are called irregular.
+HIGHEST = 10
 SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
@@ -221,17 +223,22 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
     effect = np.abs(a / layout.scale[layout.model])
     largest = float(np.abs(shared / layout.scale).max(initial=0.0))
     parts = []
-    functions = {f.name: f for f in getattr(design.model, "functions", ())}
+    model = design.model
     for name in dict.fromkeys(p.function for p in parameters):
         members = [i for i, p in enumerate(parameters) if p.function == name]
         if effect[members].max() <= NEGLIGIBLE * largest:
             continue
         parameter = parameters[members[0]]
-        if name in functions:
+        if isinstance(model, HasLines):
             t = np.linspace(0.0, 1.0, 201)
-            values = functions[name].basis.values(t) @ a[members]
-            peak = float(values[np.abs(values).argmax()])
-            parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, shape(t, values)))
+            lines = model.lines(name, t)
+            values = np.stack([line.basis @ a[members] for line in lines])
+            peak = float(values.flat[np.abs(values).argmax()])
+            # The first of the lines along which it changes most, but for rounding.
+            change = np.ptp(values, axis=1)
+            k = int((change >= (1 - 1e-6) * change.max()).argmax())
+            form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
+            parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, form))
         else:
             parts.append((effect[members].max(), name, parameter.meaning, float(a[members[0]]), parameter.unit, ""))
     parts.sort(key=lambda part: -part[0])
@@ -239,15 +246,15 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
 
 
 def shape(t: Array, values: Array) -> str:
-    """Word for a curve's shape: the lowest degree of polynomial that describes it.
+    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it.
 
     >>> t = np.linspace(0, 1, 50)
     >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5)
     ('linear', 'quadratic', 'of degree 5')
     """
-    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, 30)
+    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, HIGHEST)
     size = float(np.abs(values).max())
-    for degree in range(1, 31):
+    for degree in range(1, HIGHEST + 1):
         part = basis[:, : degree + 1]
         left = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
         if np.abs(left).max() <= 1e-3 * size:

@@ -9,10 +9,17 @@ import numpy as np
 from .design import Design, Priors, Readings, State, locations, nominal_state, probe_offsets, reading_uncertainties
 from .estimation.observations import distance_rows, prior_values
 from .machines.protocol import Array, ErrorModel
+from .machines.truth import TrueMachine
 
 
 class NoReadingError(ValueError):
     """The true machine's errors are so large that no scale reading belongs to some location."""
+
+
+def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State]:
+    """The design as drawn on the true machine, whose error model may be another than the design's."""
+    drawn = nominal_state(design)
+    return replace(design, model=machine.model), State(drawn.balls, drawn.rotations, drawn.origins, machine.a)
 
 
 def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:

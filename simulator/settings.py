@@ -6,7 +6,16 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Discriminator
+
+
+def _form(value: Any) -> str:
+    # Tags in angle brackets are left out of paths in messages.
+    return "<mapping>" if isinstance(value, dict) else "<list>" if isinstance(value, tuple) else "<one>"
+
+
+FORM = Discriminator(_form)
+"""Chooses among the forms of a value by the tags <mapping>, <list> and <one>."""
 
 
 class Settings(BaseModel):

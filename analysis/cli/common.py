@@ -6,7 +6,7 @@ import json
 import shutil
 import sys
 import textwrap
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,13 @@ def add_json(parser: ArgumentParser) -> None:
         action="store_true",
         help="print JSON in metres and radians: an object, or an array of them for several experiments",
     )
+
+
+def seed(text: str) -> int:
+    """Read a seed from the command line."""
+    if not text.isascii() or not text.isdigit():
+        raise ArgumentTypeError(f'a seed is a whole number, 0 or above, not "{text}"')
+    return int(text)
 
 
 def experiments(options: Namespace) -> list[Experiment]:

@@ -78,7 +78,8 @@ def run(options: Namespace) -> int:
             file=sys.stderr,
         )
     if not result.verdict.as_expected:
-        print(f"rank deficiency {result.verdict.deficiency}: what is undetermined is left out", file=sys.stderr)
+        expected = result.verdict.expected or 0
+        print(f"rank deficiency {result.verdict.deficiency} where the file expects {expected}", file=sys.stderr)
         return 1
     return 0
 

@@ -1,22 +1,58 @@
-"""`ballplate run`: the uncertainty tables of a design."""
+"""`ballplate run`: the uncertainty tables of a design, and Monte Carlo beside them."""
 
 from __future__ import annotations
 
-from argparse import Namespace
+import sys
+from argparse import ArgumentTypeError, Namespace
+from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json
+from .common import add_file, add_json, seed
+
+if TYPE_CHECKING:
+    from simulator.experiment.model import Experiment
+
+    from ..montecarlo.study import Trials
+
+INTERRUPTED = 130
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "run",
         help="tell the uncertainties U1 to U6 that a design will give",
-        description="Compute the rank and the standard uncertainties U1 to U6 of a design at zero machine error. The "
-        "exit status is 0 if the rank is as expected, otherwise 1.",
+        description="Compute the rank and the standard uncertainties U1 to U6 of a design at zero machine error. With "
+        "--trials, synthetic data sets of the file's true machine are estimated too, and bias, spread and coverage "
+        "stand beside the linearised uncertainties. The exit status is 0 if the rank is as expected, otherwise 1.",
     )
     add_file(parser, several=True)
+    group = parser.add_argument_group("Monte Carlo")
+    group.add_argument("--trials", metavar="N", type=_count, help="number of data sets, at most")
+    group.add_argument(
+        "--until", metavar="1%", type=_share, help="stop when the ratios of spread to U are as accurate as this"
+    )
+    group.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
+    group.add_argument(
+        "--workers", metavar="N", type=_count, help="processes that share the work; default: one for each processor"
+    )
     add_json(parser)
     parser.set_defaults(run=run)
+
+
+def _count(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise ArgumentTypeError(f'expected a whole number, 1 or above, not "{text}"')
+    return int(text)
+
+
+def _share(text: str) -> float:
+    digits = text.removesuffix("%").strip()
+    try:
+        value = float(digits)
+    except ValueError:
+        value = float("nan")
+    if not text.endswith("%") or not 0.0 < value <= 100.0:
+        raise ArgumentTypeError(f'expected a percentage such as 1%, not "{text}"')
+    return value / 100.0
 
 
 def run(options: Namespace) -> int:
@@ -25,11 +61,53 @@ def run(options: Namespace) -> int:
     from ..tables import plan_data, plan_lines
     from .common import experiments, print_json, print_lines
 
-    plans = []
+    plans, found, interrupted = [], [], False
+    with_trials = options.trials is not None or options.until is not None
     for experiment in experiments(options):
         plans.append(plan(experiment))
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plan_lines(plans[-1])])
+        data: dict[str, Any] = plan_data(plans[-1])
+        if with_trials:
+            from ..montecarlo.tables import trials_data, trials_lines
+
+            done = _trials(experiment, options)
+            data["monte_carlo"] = trials_data(done)
+            if not options.json:
+                print_lines(["", *trials_lines(done)])
+            interrupted = done.outcome is not None and done.outcome.interrupted
+        found.append(data)
+        if interrupted:
+            print("interrupted: the figures are those of the data sets done so far", file=sys.stderr)
+            break
     if options.json:
-        print_json([plan_data(p) for p in plans])
+        print_json(found)
+    if interrupted:
+        return INTERRUPTED
     return 0 if all(p.verdict.as_expected for p in plans) else 1
+
+
+def _trials(experiment: Experiment, options: Namespace) -> Trials:
+    import os
+
+    from ..montecarlo.study import trials
+    from ..montecarlo.trials import MOST_TRIALS, Progress
+    from .progress import ProgressBar
+
+    bar = ProgressBar("data sets")
+
+    def report(progress: Progress) -> None:
+        remark = f"accurate to {100 * progress.accuracy:.2g} %" if progress.accuracy < 1.0 else ""
+        bar.show(progress.done, progress.wanted, remark)
+
+    try:
+        return trials(
+            experiment,
+            options.trials or MOST_TRIALS,
+            options.seed,
+            options.until,
+            options.workers or len(os.sched_getaffinity(0)),
+            report,
+        )
+    finally:
+        bar.close()

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentTypeError, Namespace
+from argparse import Namespace
 from pathlib import Path
 
-from .common import add_file
+from .common import add_file, seed
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -21,16 +21,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "-o", "--output", metavar="CSV", required=True, type=Path, help="file to write, or - for standard output"
     )
-    parser.add_argument("--seed", type=_seed, help="seed of the noise, instead of the file's")
+    parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
     parser.add_argument("--exact", action="store_true", help="leave all noise out; artefacts are as drawn")
     parser.add_argument("--force", action="store_true", help="overwrite the output file if there is one")
     parser.set_defaults(run=run)
-
-
-def _seed(text: str) -> int:
-    if not text.isascii() or not text.isdigit():
-        raise ArgumentTypeError(f'a seed is a whole number, 0 or above, not "{text}"')
-    return int(text)
 
 
 def run(options: Namespace) -> int:
@@ -39,27 +33,32 @@ def run(options: Namespace) -> int:
 
     import numpy as np
 
-    from simulator.design import State, nominal_state
     from simulator.experiment.messages import ExperimentError, Message
-    from simulator.generate import NoReadingError, exact_readings, noisy_readings, true_artefacts
+    from simulator.generate import (
+        NoReadingError,
+        exact_readings,
+        noisy_readings,
+        on_true_machine,
+        true_artefacts,
+    )
     from simulator.layout import lay_out
-    from simulator.machines.truth import true_parameters
+    from simulator.machines.truth import true_machine
     from simulator.readings import write_readings
 
     from .common import single
 
     experiment = single(options)
     design = lay_out(experiment)
-    drawn = nominal_state(design)
-    truth = State(drawn.balls, drawn.rotations, drawn.origins, true_parameters(experiment.true_machine, design.model))
-    seed = experiment.seed if options.seed is None else options.seed
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    chosen = experiment.seed if options.seed is None else options.seed
     try:
         if options.exact:
-            readings, x = exact_readings(design, truth)
+            readings, x = exact_readings(on_truth, truth)
         else:
-            generator = np.random.default_rng(np.random.SeedSequence(seed))
+            generator = np.random.default_rng(np.random.SeedSequence(chosen))
             truth = replace(truth, balls=true_artefacts(design, generator))
-            readings, x = noisy_readings(design, truth, generator)
+            readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
         raise ExperimentError(
             [Message(str(experiment.source), 0, 0, "true_machine", f"{error}; state smaller ones")]

@@ -34,9 +34,9 @@ class Comparison:
     `count` members, a `sampled` selection of all pairs. `spread` is the ratio of the errors' scatter to the linearised
     uncertainty, root mean square over the members, `actual` that of the errors themselves, what noise-free readings
     leave included; `bias` the mean error, likewise a root mean square in standard uncertainties, and `largest_bias` the
-    largest, in the member's unit. `known` and `estimated` are the shares of true values within the expanded uncertainty for
-    95 %, with sigma given and with sigma estimated by each replicate. `flags` names the figures that linear theory gets
-    wrong.
+    largest, in the member's unit. `known` and `estimated` are the shares of true values within the expanded
+    uncertainty for 95 %, with sigma given and with sigma estimated by each replicate. `flags` names the figures that
+    linear theory gets wrong.
     """
 
     symbol: str
@@ -71,7 +71,7 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All comparisons, how many replicates they rest on and which failed."""
+    """All comparisons, how many replicates they rest on and which failed; no comparison where all did."""
 
     trials: int
     failed: tuple[int, ...]
@@ -85,6 +85,8 @@ def outcome(shared: Reference, aims: tuple[Target, ...], total: Tally) -> Outcom
     """Figures from sums."""
     comparisons: dict[str, Comparison] = {}
     for aim, sums in zip(aims, total.quantities, strict=True):
+        if not total.count:
+            break
         # Of several artefacts each has its own distances.
         name = aim.symbol
         while name in comparisons:
@@ -130,7 +132,9 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
     square = float(((mean_error / aim.uncertainty) ** 2).mean() - means[SPREAD] / count)
     scatter = errors[SPREAD] * np.sqrt(count)
     # Correlation between members is in the scatter of a replicate's mean square, from which both parts follow.
-    error = float(np.sqrt((scatter / count) ** 2 + 4.0 * max(square, 0.0) * scatter / (np.sqrt(2.0) * count)))
+    error = float("inf")
+    if n > 1:
+        error = float(np.sqrt((scatter / count) ** 2 + 4.0 * max(square, 0.0) * scatter / (np.sqrt(2.0) * count)))
     value = float(np.sqrt(max(square, 0.0)))
     bias = Figure(value, error / (2.0 * value) if square > error else float(np.sqrt(error)))
     flags = []
@@ -163,9 +167,9 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
     )
 
 
-def limit_of_misfit(freedom: int) -> float:
-    """S^2 that a fit with the right model exceeds once in twenty times."""
-    return factors(freedom).limit
+def power_of_difference(more: int, gain: float) -> float:
+    """Probability that `more` parameters, which take `gain` from S^2 without noise, lower it significantly, at 95 %."""
+    return power_of_misfit(more, gain)
 
 
 def power_of_misfit(freedom: int, noise_free: float) -> float:
@@ -176,4 +180,4 @@ def power_of_misfit(freedom: int, noise_free: float) -> float:
     """
     from scipy.special import chndtr
 
-    return float(1.0 - chndtr(limit_of_misfit(freedom), freedom, noise_free))
+    return float(1.0 - chndtr(factors(freedom).limit, freedom, noise_free))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -52,8 +53,10 @@ def run_trials(
     try:
         for part in _parts(shared, aims, seed, trials, workers):
             total = part if total is None else total + part
-            accuracy = accuracy_of(total)
-            report(Progress(total.count + len(total.failed), trials, accuracy))
+            accuracy, count = accuracy_of(total), total.count + len(total.failed)
+            # Accuracy improves as the root of the number.
+            enough = trials if until is None else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
+            report(Progress(count, enough, accuracy))
             if until is not None and accuracy <= until:
                 break
     except KeyboardInterrupt:
@@ -103,12 +106,17 @@ def _parts(shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, 
     parts = parallel(delayed(_in_worker)(shared, aims, seed, task, trials) for task in tasks)
     finished = False
     try:
-        yield from parts
+        # Not `yield from`, which would end the workers before the warning below is silenced.
+        for part in parts:  # noqa: UP028
+            yield part
         finished = True
     finally:
         if not finished:
-            # Nobody waits for what is under way; a run that has ended early ends at once.
+            # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
             get_reusable_executor().shutdown(wait=False, kill_workers=True)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                parts.close()
 
 
 def _in_worker(shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int) -> Tally:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..geometry.positions import ball_coordinates
-from ..machines.settings import build_error_model, dimension_of
-from ..machines.truth import TruthError, true_parameters
+from ..machines.curves import Points
+from ..machines.custom import CustomModelError
+from ..machines.settings import CurvesSettings, PythonSettings, build_error_model, dimension_of
+from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing
-from .messages import Steps
+from .curves import read_curves
+from .messages import ExperimentError, Steps
 from .model import Calibration, DistanceCalibration, Floats, Machine, Position, Volume
 from .problems import Problems, written_text
 from .references import References
@@ -22,29 +26,89 @@ TOLERANCE = 1e-9
 AXES = ("x", "y", "z")
 
 
-def check_error_model(sections: Sections, references: References) -> None:
-    """Report an error model for another number of dimensions than the volume has."""
+def check_error_model(sections: Sections, machine: Machine | None, references: References) -> None:
+    """Report an error model for another number of dimensions than the volume has, or a user's own that is wrong."""
     settings = sections.get("error_model")
-    if settings is None or references.dimension is None or dimension_of(settings) == references.dimension:
-        return
-    text = (
-        f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '
-        f"{references.dimension}; change one of the two"
-    )
-    references.problems.add(("error_model", "kind"), text)
+    if settings is not None:
+        _check_model(settings, ("error_model",), machine, references)
+
+
+def _check_model(settings: Any, steps: Steps, machine: Machine | None, references: References) -> None:
+    if isinstance(settings, PythonSettings):
+        settings.beside(references.folder)
+        if machine is None:
+            return
+        try:
+            build_error_model(settings, *_corners(machine))
+        except CustomModelError as error:
+            references.problems.add((*steps, error.key), str(error))
+    elif references.dimension not in (None, dimension_of(settings)):
+        text = (
+            f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '
+            f"{references.dimension}; change one of the two"
+        )
+        references.problems.add((*steps, "kind"), text)
 
 
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
-    """Report values of the true machine that its error model cannot have."""
+    """Report a true machine whose own error model is wrong, or values that its error model cannot have."""
     settings, truth = sections.get("error_model"), sections.get("true_machine")
-    if settings is None or truth is None or machine is None or dimension_of(settings) != machine.dimension:
+    if truth is None:
         return
-    lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
+    other = getattr(truth, "error_model", None)
+    if other is not None:
+        _check_model(other, ("true_machine", "error_model"), machine, references)
+    if isinstance(truth, CurvesSettings):
+        _read_curves(truth, machine, references)
+        return
+    problems = references.problems
+    if settings is None or machine is None or problems.has_below(("error_model",)) or problems.has_below(_TRUE_MODEL):
+        return
+    corners = _corners(machine)
     try:
-        true_parameters(truth, build_error_model(settings, lower, upper))
+        true_machine(truth, build_error_model(settings, *corners), *corners)
     except TruthError as error:
         for name, text in error.problems:
-            references.problems.add(("true_machine", "values", name), text)
+            problems.add(("true_machine", "values", name), text)
+
+
+def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
+    """Let the true machine have the curves of its files, or report what is wrong with them."""
+    problems, curves = references.problems, dict[str, Points]()
+    if references.dimension == 2:
+        text = 'kind "curves" has 3 dimensions, but machine.volume has 2; change one of the two'
+        problems.add(("true_machine", "kind"), text)
+    for i, file in enumerate(truth.files):
+        steps: Steps = ("true_machine", "files", i)
+        try:
+            found = read_curves(references.folder / file)
+        except ExperimentError as error:
+            problems.take(error, steps)
+            continue
+        twice = [name for name in found if name in curves]
+        if twice:
+            problems.add(steps, f"{listing(twice)} is in an earlier file already; leave it out of one of the two")
+        curves |= found
+        if machine is None or machine.dimension != 3:
+            continue
+        name, points = next(iter(found.items()))
+        axis = "XYZ".index(name[2])
+        lower, upper = machine.volume.lower[axis], machine.volume.upper[axis]
+        covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
+        if covered < 0.5 * (upper - lower):
+            text = (
+                f"goes from {format_length(points.positions[0])} to {format_length(points.positions[-1])}, but "
+                f"machine.volume from {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most of it"
+            )
+            problems.add(steps, text)
+    truth.of(curves)
+
+
+_TRUE_MODEL = ("true_machine", "error_model")
+
+
+def _corners(machine: Machine) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(map(float, machine.volume.lower)), tuple(map(float, machine.volume.upper))
 
 
 def check_names(position_count: int, problems: Problems) -> None:

@@ -59,7 +59,7 @@ def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None
     references = resolve_references(sections, source.parent, problems)
     machine = resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
     probes = resolve_probes(sections, references)
-    check_error_model(sections, references)
+    check_error_model(sections, machine, references)
     check_true_machine(sections, machine, references)
     for section in ("positions", "calibration"):
         for i in range(written_count(root, section)):

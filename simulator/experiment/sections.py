@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, StringConstraints, Tag
+from pydantic import Field, StringConstraints, Tag
 
 from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name, PairSet
 from ..geometry.positions import Axis
 from ..machines.settings import ErrorModelSettings, TrueMachineSettings, ZeroSettings
 from ..quantities import Angle, Length, LengthFunction, PositiveLength
-from ..settings import Settings
+from ..settings import FORM, Settings
 
 Text = Annotated[str, StringConstraints(min_length=1)]
 # Without control characters, which would reach the terminal.
@@ -19,12 +19,6 @@ Count = Annotated[int, Field(ge=1, le=10_000)]
 Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
-def _form(value: Any) -> str:
-    # Tags in angle brackets are left out of paths in messages.
-    return "<mapping>" if isinstance(value, dict) else "<list>" if isinstance(value, tuple) else "<one>"
-
-
-FORM = Discriminator(_form)
 BallNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 ProbeNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 BallSelection = Annotated[

@@ -125,7 +125,10 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         known = [key for one in _schemas_at(schema, root, steps[:-1]) for key in one.get("properties", {})]
         written = to_python_keys(root, steps[:-1])
         free = [key for key in dict.fromkeys(known) if key not in written]
-        return Explanation(steps, f"unknown key; {hint(str(steps[-1]), free or known)}", of_key=True)
+        # A misspelt key may stand beside the right one.
+        meant = hint(str(steps[-1]), known)
+        meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
+        return Explanation(steps, f"unknown key; {meant}", of_key=True)
     if isinstance(node, Scalar) and node.value is None:
         return Explanation(steps, "empty; give a value, or leave it out")
     if kind in ("union_tag_invalid", "union_tag_not_found"):

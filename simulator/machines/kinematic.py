@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from .arrangement import AXES, Arrangement
-from .polynomial import Polynomial
-from .protocol import Array, Parameter, Reported, Unit
+from .bases import Basis, Polynomial
+from .protocol import Array, Line, Parameter, Reported, Unit
 
 # Translations along x, y, z and rotations about them, by the letters of ISO 230-1.
 TRANSLATIONS = ("X", "Y", "Z")
@@ -52,7 +52,7 @@ class ErrorFunction:
     axis: int
     component: int
     rotation: bool
-    basis: Polynomial
+    basis: Basis
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,11 @@ class KinematicModel:
         lower = np.asarray(self.lower)
         return np.asarray((x - lower) / (np.asarray(self.upper) - lower))
 
-    def _bases(self, x: Array) -> dict[tuple[int, Polynomial], Array]:
+    def _bases(self, x: Array) -> dict[tuple[int, Basis], Array]:
         t = self.scaled(x)
         return {(f.axis, f.basis): f.basis.values(t[:, f.axis]) for f in self.functions}
 
-    def _motions(self, bases: dict[tuple[int, Polynomial], Array], a: Array, m: int) -> tuple[Array, Array]:
+    def _motions(self, bases: dict[tuple[int, Basis], Array], a: Array, m: int) -> tuple[Array, Array]:
         """Displacement and rotation of every axis, each (m, 3 axes, 3 components)."""
         translation, rotation = np.zeros((m, 3, 3), a.dtype), np.zeros((m, 3, 3), a.dtype)
         for f in self.functions:
@@ -149,16 +149,20 @@ class KinematicModel:
                 result[:, f.component, columns] = values
         return result
 
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        """The function along its axis."""
+        return tuple(Line("", f.basis.values(t)) for f in self.functions if f.name == function)
+
     def reported(self) -> Reported:
-        """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3."""
+        """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or coefficients of B-splines."""
+        quoted = [f.basis.quoted() for f in self.functions]
         names: list[str] = []
         units: list[Unit] = []
-        matrix = np.zeros((sum(f.basis.monomials.shape[0] for f in self.functions), len(self.parameters)))
-        for f in self.functions:
-            block = f.basis.monomials
-            matrix[len(names) : len(names) + block.shape[0], self.slices[f.name]] = block
-            names += [f"{f.name} t^{k + 1}" for k in range(block.shape[0])]
-            units += ["rad" if f.rotation else "m"] * block.shape[0]
+        matrix = np.zeros((sum(len(q.names) for q in quoted), len(self.parameters)))
+        for f, q in zip(self.functions, quoted, strict=True):
+            matrix[len(names) : len(names) + len(q.names), self.slices[f.name]] = q.matrix
+            names += [f"{f.name} {name}" for name in q.names]
+            units += ["rad" if f.rotation else "m"] * len(q.names)
         return Reported(tuple(names), tuple(units), matrix)
 
 
@@ -172,23 +176,36 @@ def kinematic_model(
 ) -> KinematicModel:
     """The model with polynomials of the stated numbers of coefficients, constants included.
 
-    These are NDEL and NEPS of NPL Report CISE 15/98; all 18 functions vanish at the lower corner, and
-    the three straightness functions EYX, EZX and EZY at the far end too.
+    These are NDEL and NEPS of NPL Report CISE 15/98.
 
     >>> from .arrangement import ARRANGEMENTS
     >>> len(kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1)).parameters)
     69
     """
+    position, rotation = Polynomial(position_coefficients), Polynomial(rotation_coefficients)
+    return kinematic_model_of(arrangement, position, rotation, lower, upper, full_rotations)
+
+
+def kinematic_model_of(
+    arrangement: Arrangement,
+    position: Basis,
+    rotation: Basis,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+    full_rotations: bool = False,
+) -> KinematicModel:
+    """The model with functions of the two families for its positional and its rotational errors.
+
+    All 18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and EZY at the far end
+    too.
+    """
     functions = []
-    for letters, count, rotation in (
-        (TRANSLATIONS, position_coefficients, False),
-        (ROTATIONS, rotation_coefficients, True),
-    ):
+    for letters, basis, is_rotation in ((TRANSLATIONS, position, False), (ROTATIONS, rotation, True)):
         for axis, axis_name in enumerate(AXES):
             for component, letter in enumerate(letters):
                 name = f"E{letter}{axis_name.upper()}"
-                basis = Polynomial(count, zero_at_one=name in HELD_AT_FAR_END)
-                functions.append(ErrorFunction(name, axis, component, rotation, basis))
+                own = basis.interior() if name in HELD_AT_FAR_END else basis
+                functions.append(ErrorFunction(name, axis, component, is_rotation, own))
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
 
 
@@ -209,14 +226,20 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
 
 def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
     """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector, signed."""
-    found = []
-    for sign, v in carried:
-        matrix = np.zeros((len(v), 3, 3), v.dtype)
-        matrix[:, 0, 1], matrix[:, 0, 2] = sign * v[:, 2], -sign * v[:, 1]
-        matrix[:, 1, 0], matrix[:, 1, 2] = -sign * v[:, 2], sign * v[:, 0]
-        matrix[:, 2, 0], matrix[:, 2, 1] = sign * v[:, 1], -sign * v[:, 0]
-        found.append(matrix)
-    return found
+    return [cross_matrices(sign * vector) for sign, vector in carried]
+
+
+def cross_matrices(v: Array) -> Array:
+    """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
+
+    >>> cross_matrices(np.array([[1.0, 2.0, 3.0]]))[0].tolist()
+    [[0.0, 3.0, -2.0], [-3.0, 0.0, 1.0], [2.0, -1.0, 0.0]]
+    """
+    matrix = np.zeros((len(v), 3, 3), v.dtype)
+    matrix[:, 0, 1], matrix[:, 0, 2] = v[:, 2], -v[:, 1]
+    matrix[:, 1, 0], matrix[:, 1, 2] = -v[:, 2], v[:, 0]
+    matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 1], -v[:, 0]
+    return matrix
 
 
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
@@ -231,7 +254,7 @@ def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array
     return matrix
 
 
-def _rotation(angles: Array) -> tuple[Array, list[Array]]:
+def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
     """Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
     plain = [_plane_rotation(angles[:, k], k) for k in range(3)]
     derivatives = []
@@ -269,20 +292,20 @@ class _Chain:
         tip = self.p.astype(dtype, copy=True)
         on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]
         for axis in reversed(on_probe_side):
-            matrix, derivatives = _rotation(self.rotation[:, axis])
+            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
             by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
             tip = step(axis) + turned(matrix, tip)
         prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
         for axis in on_probe_side:
             by_translation[axis] = prefix
             by_rotation[axis] = prefix @ by_rotation[axis]
-            prefix = prefix @ _rotation(self.rotation[:, axis])[0]
+            prefix = prefix @ rotation_and_derivatives(self.rotation[:, axis])[0]
 
         # The table moves the other way: going outwards, undo each axis's displacement, then its rotation.
         passed = list(on_probe_side)
         for name in self.arrangement.workpiece_side:
             axis = AXES.index(name)
-            matrix, derivatives = _rotation(self.rotation[:, axis])
+            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
             back = matrix.transpose(0, 2, 1)
             outside = tip + step(axis)
             by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))

@@ -67,3 +67,26 @@ class ErrorModel(Protocol):
     def reported(self) -> Reported:
         """The parameters as the field quotes them: monomial coefficients, angles, ratios."""
         ...
+
+
+@dataclass(frozen=True)
+class Line:
+    """Values of an error function along a line: `basis` (points, parameters of the function) times its parameters.
+
+    `words` names the line where a function has more than one, such as "along X".
+    """
+
+    words: str
+    basis: Array
+
+
+@runtime_checkable
+class HasLines(Protocol):
+    """What an error model may offer besides: its error functions as curves, to describe and to draw them.
+
+    A function has the parameters whose `function` is its name, in their order.
+    """
+
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        """The function at fractions t (m,) of lines through the volume; along its axis if it depends on one only."""
+        ...

@@ -6,18 +6,26 @@ An error model is registered by its settings class and builder in `ERROR_MODELS`
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Union
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, StringConstraints, Tag, model_validator
 
 from ..quantities import Angle, PositiveLength
-from ..settings import Settings
+from ..settings import FORM, Settings
 from .arrangement import ARRANGEMENTS, AXES, Arrangement
-from .kinematic import kinematic_model
+from .bases import Basis, Monomial, Polynomial, Spline
+from .curves import Interpolation, Points, curves_model
+from .custom import custom_model
+from .empirical import empirical_model
+from .kinematic import kinematic_model_of
 from .metric import MetricModel, Scale
 from .protocol import ErrorModel
+from .terms import Radial, quadratic, sums, tensor
 
 Corner = tuple[float, ...]
+Centres = Annotated[int, Field(ge=2, le=8)]
+MOST_INTERIOR = 6
 AxisName = Literal["x", "y", "z"]
 
 
@@ -38,20 +46,61 @@ class ArrangementSettings(Settings):
         return self
 
 
+ArrangementName = Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"]
+ARRANGEMENT = (
+    "Which axis carries which: a named arrangement, or the axes on either side. "
+    "MB2 (x carries y carries z carries the probe) is NPL's kinematic model."
+)
+ROTATIONS = "Whether products of small errors are left out or multiplied out."
+
+
+def _arrangement(settings: str | ArrangementSettings) -> Arrangement:
+    if isinstance(settings, str):
+        return ARRANGEMENTS[settings]
+    return Arrangement(settings.probe_side, settings.workpiece_side)
+
+
+class SplineSettings(Settings):
+    """B-splines of an order with interior knots, along every axis of the volume."""
+
+    order: int = Field(default=4, ge=2, le=12, description="Order of the splines, degree plus one: 4 for cubic ones.")
+    knots: tuple[float, ...] = Field(
+        default=(), description="Interior knots in ascending order, in fractions of the axis between 0 and 1."
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        Spline(self.order, self.knots)
+        return self
+
+
+BasisSettings = Annotated[
+    Annotated[Literal["chebyshev", "monomial"], Tag("<one>")]
+    | Annotated[SplineSettings, Tag("<mapping>")]
+    | Annotated[SplineSettings, Tag("<list>")],
+    FORM,
+]
+BASIS = "Univariate functions: chebyshev or monomial polynomials, or B-splines as {order: 4, knots: [0.5]}."
+
+
+def _basis(settings: Any, coefficients: int) -> Basis:
+    if isinstance(settings, SplineSettings):
+        return Spline(settings.order, settings.knots)
+    return Monomial(coefficients) if settings == "monomial" else Polynomial(coefficients)
+
+
+def _without(settings: Settings, keys: tuple[str, ...], instead: str) -> None:
+    stated = [key for key in keys if key in settings.model_fields_set]
+    if stated:
+        raise ValueError(f'"{stated[0]}" has no meaning with {instead}; remove it')
+
+
 class KinematicSettings(Settings):
-    """Errors of each axis as polynomials, superposed along the chain of axes."""
+    """Errors of each axis as polynomials or splines, superposed along the chain of axes."""
 
     kind: Literal["kinematic"]
-    arrangement: Literal["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "CY1"] | ArrangementSettings = (
-        Field(
-            default="MB2",
-            description="Which axis carries which: a named arrangement, or the axes on either side. "
-            "MB2 (x carries y carries z carries the probe) is NPL's kinematic model.",
-        )
-    )
-    rotations: Literal["linearised", "full"] = Field(
-        default="linearised", description="Whether products of small errors are left out or multiplied out."
-    )
+    arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
     position_coefficients: int = Field(
         default=5,
         ge=2,
@@ -65,6 +114,59 @@ class KinematicSettings(Settings):
         le=30,
         description="Coefficients of each rotational error's polynomial, the constant included (NEPS).",
     )
+    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
+
+    @model_validator(mode="after")
+    def _coefficients_of_polynomials(self) -> Self:
+        if isinstance(self.basis, SplineSettings):
+            _without(self, ("position_coefficients", "rotation_coefficients"), "splines, which have an order and knots")
+        return self
+
+
+class RadialSettings(Settings):
+    """Multiquadric radial basis functions on a grid of centres."""
+
+    centres: tuple[Centres, Centres, Centres] = Field(description="Number of centres along x, y and z.")
+    constant: float = Field(
+        default=0.5, gt=0, le=10, description="Constant c of sqrt(r^2 + c^2), in fractions of the volume."
+    )
+
+
+class EmpiricalSettings(Settings):
+    """Six functions of three variables: displacement and rotation of the probe."""
+
+    kind: Literal["empirical"]
+    terms: Annotated[
+        Annotated[Literal["sums", "quadratic", "tensor"], Tag("<one>")]
+        | Annotated[RadialSettings, Tag("<mapping>")]
+        | Annotated[RadialSettings, Tag("<list>")],
+        FORM,
+    ] = Field(
+        default="sums",
+        description="Functions of x, y and z: sums of tensor products with linear factors, quadratic polynomials, "
+        "full tensor products, or radial basis functions as {centres: [3, 3, 3], constant: 0.5}.",
+    )
+    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
+    coefficients: int = Field(
+        default=3, ge=2, le=12, description="Coefficients of each univariate polynomial, the constant included."
+    )
+    rotations: Literal["linearised", "full"] = Field(
+        default="linearised", description="Whether the probe offset is turned by cross products or rotation matrices."
+    )
+
+    @model_validator(mode="after")
+    def _what_belongs_together(self) -> Self:
+        if isinstance(self.terms, RadialSettings):
+            _without(self, ("basis", "coefficients"), "radial basis functions")
+        elif self.terms == "quadratic":
+            _without(self, ("basis", "coefficients"), "quadratic terms")
+        elif isinstance(self.basis, SplineSettings):
+            _without(self, ("coefficients",), "splines, which have an order and knots")
+        if self.terms == "tensor" and _basis(self.basis, self.coefficients).interior().size > MOST_INTERIOR:
+            raise ValueError(
+                f"full tensor products have at most {MOST_INTERIOR + 2} functions along an axis; give fewer, or sums"
+            )
+        return self
 
 
 class MetricSettings(Settings):
@@ -76,28 +178,60 @@ class MetricSettings(Settings):
     )
 
 
+class PythonSettings(Settings):
+    """A user's own error model, made by a Python function that is called with the volume's corners and the options."""
+
+    kind: Literal["python"]
+    object: Annotated[str, StringConstraints(min_length=1)] = Field(
+        description="module:function, the module installed or beside this file, or the name of an installed entry "
+        "point of the group ballplate.error_models."
+    )
+    options: dict[str, Any] = Field(default={}, description="Keyword arguments of the function.")
+
+    # Where the experiment file is; its modules are looked for there.
+    _folder: Path | None = PrivateAttr(default=None)
+
+    def beside(self, folder: Path) -> None:
+        """Look for modules in the folder too."""
+        self._folder = folder
+
+
 def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    named = settings.arrangement
-    arrangement = ARRANGEMENTS[named] if isinstance(named, str) else Arrangement(named.probe_side, named.workpiece_side)
-    return kinematic_model(
-        arrangement,
-        settings.position_coefficients,
-        settings.rotation_coefficients,
+    return kinematic_model_of(
+        _arrangement(settings.arrangement),
+        _basis(settings.basis, settings.position_coefficients),
+        _basis(settings.basis, settings.rotation_coefficients),
         lower,
         upper,
         settings.rotations == "full",
     )
 
 
+def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    if isinstance(settings.terms, RadialSettings):
+        return empirical_model(
+            Radial(settings.terms.centres, settings.terms.constant), lower, upper, settings.rotations == "full"
+        )
+    basis = _basis(settings.basis, settings.coefficients)
+    terms = {"sums": lambda: sums(basis), "quadratic": quadratic, "tensor": lambda: tensor(basis)}[settings.terms]()
+    return empirical_model(terms, lower, upper, settings.rotations == "full")
+
+
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
     return MetricModel(settings.scale, max(b - a for a, b in zip(lower, upper, strict=True)))
 
 
-ERROR_MODELS: dict[type[Settings], tuple[int, Callable[[Any, Corner, Corner], ErrorModel]]] = {
+def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    return custom_model(settings.object, settings.options, settings._folder, lower, upper)
+
+
+ERROR_MODELS: dict[type[Settings], tuple[int | None, Callable[[Any, Corner, Corner], ErrorModel]]] = {
     KinematicSettings: (3, _kinematic),
+    EmpiricalSettings: (3, _empirical),
     MetricSettings: (2, _metric),
+    PythonSettings: (None, _python),
 }
-"""Settings class of every error model, with its number of dimensions and its builder."""
+"""Settings class of every error model, with its number of dimensions, None for any, and its builder."""
 
 ErrorModelSettings = Annotated[Union[tuple(ERROR_MODELS)], Field(discriminator="kind")]  # type: ignore[valid-type]  # noqa: UP007
 
@@ -108,6 +242,9 @@ class ZeroSettings(Settings):
     kind: Literal["zero"] = "zero"
 
 
+OTHER_MODEL = "Error model of the true machine, where it is another than the estimated one."
+
+
 class CoefficientSettings(Settings):
     """A machine with stated errors."""
 
@@ -116,6 +253,9 @@ class CoefficientSettings(Settings):
         description="Value with unit of each parameter that is not zero, by its name in the error model or in the "
         'monomial form, for example "EXX t^2": 3 um.'
     )
+    error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
+        default=None, description=OTHER_MODEL
+    )
 
 
 class RandomSettings(Settings):
@@ -123,24 +263,59 @@ class RandomSettings(Settings):
 
     kind: Literal["random"]
     position: PositiveLength | None = Field(
-        default=None, description="Root mean square of each positional error along its axis."
+        default=None, description="Root mean square of each positional error along its axis, or in the volume."
     )
     rotation: Angle | None = Field(
-        default=None, description="Root mean square of each rotational error along its axis."
+        default=None, description="Root mean square of each rotational error along its axis, or in the volume."
     )
     seed: int = Field(default=1, ge=0, description="Seed of the draw.")
+    error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
+        default=None, description=OTHER_MODEL
+    )
 
 
-TrueMachineSettings = Annotated[ZeroSettings | CoefficientSettings | RandomSettings, Field(discriminator="kind")]
+class CurvesSettings(Settings):
+    """A machine with measured error curves."""
+
+    kind: Literal["curves"]
+    files: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
+        description="CSV files, each with the columns position_mm and errors of one axis such as EXX_um and EAX_urad; "
+        "errors that no file has are zero."
+    )
+    interpolation: Interpolation = Field(
+        default="linear", description="Between the points: linear, cubic splines, or monotone cubics."
+    )
+    arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
+
+    # What the files hold, by ISO 230-1 name; filled in when the experiment is loaded.
+    _curves: dict[str, Points] = PrivateAttr(default_factory=dict)
+
+    def of(self, curves: dict[str, Points]) -> None:
+        """Take the curves that the files hold."""
+        self._curves = curves
+
+    def model(self, lower: Corner, upper: Corner) -> ErrorModel:
+        """The curves as an error model, all of whose parameters are one."""
+        return curves_model(
+            self._curves, self.interpolation, _arrangement(self.arrangement), lower, upper, self.rotations == "full"
+        )
 
 
-def dimension_of(settings: Settings) -> int:
-    """Number of dimensions, 2 or 3, of the error model that the settings describe."""
+TrueMachineSettings = Annotated[
+    ZeroSettings | CoefficientSettings | RandomSettings | CurvesSettings, Field(discriminator="kind")
+]
+
+
+def dimension_of(settings: Settings) -> int | None:
+    """Number of dimensions, 2 or 3, of the error model that the settings describe; None if that depends."""
     return ERROR_MODELS[type(settings)][0]
 
 
 def build_error_model(settings: Settings, lower: Corner, upper: Corner) -> ErrorModel:
     """The error model that settings describe, for a volume from `lower` to `upper` in metres.
+
+    :raises CustomModelError: a user's own model that cannot be used.
 
     >>> build_error_model(MetricSettings(kind="metric"), (0.0, 0.0), (1.0, 1.0)).dimension
     2

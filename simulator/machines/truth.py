@@ -1,13 +1,15 @@
-"""The parameters of the machine that synthetic readings come from."""
+"""The machine that synthetic readings come from: an error model, not always the estimated one, and its parameters."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import Settings, hint
-from .protocol import Array, ErrorModel
-from .settings import CoefficientSettings, RandomSettings, ZeroSettings
+from .protocol import Array, ErrorModel, HasLines
+from .settings import CoefficientSettings, Corner, CurvesSettings, RandomSettings, ZeroSettings, build_error_model
 
 _PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
@@ -18,6 +20,35 @@ class TruthError(ValueError):
     def __init__(self, problems: list[tuple[str, str]]) -> None:
         self.problems = tuple(problems)
         super().__init__("; ".join(f"{name}: {text}" for name, text in problems))
+
+
+@dataclass(frozen=True)
+class TrueMachine:
+    """An error model with its parameters `a` (n,)."""
+
+    model: ErrorModel
+    a: Array
+
+
+def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
+    """The true machine in a volume from `lower` to `upper` in metres.
+
+    Its error model is `fitted`, the one that is estimated, unless the settings name another.
+
+    :raises TruthError: see `true_parameters`.
+
+    >>> from .arrangement import ARRANGEMENTS
+    >>> from .kinematic import kinematic_model
+    >>> corners = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    >>> true_machine(ZeroSettings(), kinematic_model(ARRANGEMENTS["MB2"], 2, 1, *corners), *corners).a
+    array([0., 0., 0., 0., 0., 0.])
+    """
+    if isinstance(settings, CurvesSettings):
+        curves = settings.model(lower, upper)
+        return TrueMachine(curves, np.ones(len(curves.parameters)))
+    other = getattr(settings, "error_model", None)
+    model = fitted if other is None else build_error_model(other, lower, upper)
+    return TrueMachine(model, true_parameters(settings, model))
 
 
 def true_parameters(settings: Settings, model: ErrorModel) -> Array:
@@ -66,9 +97,8 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
             off = left[reported.names.index(name)]
             if abs(off) > 1e-9 * max(abs(value), np.abs(wanted).max()):
                 function = name.split()[0]
-                problems.append(
-                    (name, f"{function} must be zero at both ends of its axis; let its coefficients add up to zero")
-                )
+                text = f"{function} must be zero at both ends of its axis, where it fixes the machine's frame"
+                problems.append((name, f"{text}; let its coefficients add up to zero"))
         if problems:
             raise TruthError(problems)
         a += solution
@@ -76,20 +106,22 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
 
 
 def _random(settings: RandomSettings, model: ErrorModel) -> Array:
-    """Each error function gets a random shape, scaled to the stated root mean square over its axis."""
+    """Each error function gets a random shape, scaled to the stated root mean square.
+
+    It is taken over the function's axis or, where it has several, over the lines on which the model shows it.
+    """
     sizes = {"m": settings.position or 0.0, "rad": settings.rotation or 0.0, "1": settings.rotation or 0.0}
     generator = np.random.default_rng(np.random.SeedSequence(settings.seed))
     drawn = generator.standard_normal(len(model.parameters))
-    shapes = getattr(model, "functions", None)
-    if shapes is None:
+    if not isinstance(model, HasLines):
         return np.asarray(drawn * [sizes[p.unit] for p in model.parameters])
     # Gauss's rule integrates squared polynomials exactly.
     nodes, weights = np.polynomial.legendre.leggauss(64)
     t = 0.5 * (nodes + 1.0)
-    for function in shapes:
-        columns = model.slices[function.name]  # type: ignore[attr-defined]
-        values = function.basis.values(t) @ drawn[columns]
-        size = sizes["rad" if function.rotation else "m"]
-        rms = float(np.sqrt(0.5 * weights @ values**2))
-        drawn[columns] *= size / rms if rms else 0.0
+    for name in dict.fromkeys(p.function for p in model.parameters):
+        columns = [k for k, p in enumerate(model.parameters) if p.function == name]
+        lines = model.lines(name, t)
+        squares = [0.5 * weights @ (line.basis @ drawn[columns]) ** 2 for line in lines]
+        rms = float(np.sqrt(np.mean(squares)))
+        drawn[columns] *= sizes[model.parameters[columns[0]].unit] / rms if rms else 0.0
     return drawn

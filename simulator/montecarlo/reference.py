@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, Integers, State
-from ..estimation.covariance import Spectrum
-from ..estimation.elimination import Factor
+from ..design import Design, Integers, State, nominal_state
+from ..estimation.covariance import Spectrum, spectrum
+from ..estimation.elimination import Factor, eliminate
 from ..estimation.gauss_newton import gauss_newton
 from ..estimation.initial import initial_state
 from ..estimation.observations import reading_blocks, reading_weights
+from ..estimation.parameters import shared_layout
 from ..generate import scale_readings
 from ..machines.protocol import Array, ErrorModel
 from ..threads import single_threaded
@@ -94,13 +95,15 @@ def reference(design: Design, truth: Truth) -> Reference:
     :raises NoReadingError: errors of the true machine so large that no reading belongs to some location.
     """
     observed = _observed(design)
+    # As drawn, because a small machine error makes a direction that is open merely all but open.
+    drawn = spectrum(eliminate(observed, shared_layout(observed), nominal_state(observed)))
+    if drawn.deficiency:
+        raise NoReferenceError(f"the design is rank deficient by {drawn.deficiency}")
     readings = observed.readings
     p = observed.probes[readings.probe]
     turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
     exact = scale_readings(truth.model, turned + truth.state.origins[readings.position], truth.state.a, p)
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
-    if solution.spectrum.deficiency:
-        raise NoReferenceError(f"the design is rank deficient by {solution.spectrum.deficiency}")
     if solution.status != "converged":
         raise NoReferenceError(f"the estimate from readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings

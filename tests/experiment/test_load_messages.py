@@ -64,7 +64,7 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: kinetic}", [
         '5:21: error_model.kind: unknown kind "kinetic"; did you mean "kinematic"?']),
     ("error_model: {kind: kinematic}", "error_model: {}", [
-        '5:14: error_model.kind: missing; add "kind", one of: kinematic, metric']),
+        '5:14: error_model.kind: missing; add "kind", one of: kinematic, empirical, metric, python']),
     ("error_model: {kind: kinematic}", "error_model: {kind: metric}", [
         '5:21: error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; change '
         'one of the two']),
@@ -74,6 +74,32 @@ SECTIONS = [
     ("error_model: {kind: kinematic}",
      "error_model: {kind: kinematic, arrangement: {probe_side: [x, w], workpiece_side: []}}", [
         '5:62: error_model.arrangement.probe_side[1]: unknown value "w"; allowed: x, y, z']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4, knots: [0.5, 1]}}", [
+        "5:39: error_model.basis: interior knots are between 0 and 1, in ascending order"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: spline}", [
+        '5:39: error_model.basis: unknown value "spline"; allowed: chebyshev, monomial']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4}, rotation_coefficients: 3}", [
+        '5:14: error_model: "rotation_coefficients" has no meaning with splines, which have an order and knots; '
+        "remove it"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: quadratic, coefficients: 3}", [
+        '5:14: error_model: "coefficients" has no meaning with quadratic terms; remove it']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: {centres: [3, 1, 3]}}", [
+        "5:53: error_model.terms.centres[1]: the number 1 is out of range; give one at least 2"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: 9}", [
+        "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
+    ("error_model: {kind: kinematic}",
+     "error_model: {kind: kinematic}\ntrue_machine: {kind: random, error_model: {kind: metric}}", [
+         '6:50: true_machine.error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; '
+         "change one of the two"]),
+    ("error_model: {kind: kinematic}",
+     "error_model: {kind: kinematic}\ntrue_machine: {kind: coefficients, values: {EX x^3: 1 um, EY x^2: 1 um}, "
+     "error_model: {kind: empirical, terms: quadratic}}", [
+         '6:53: true_machine.values[EX x^3]: the error model has no parameter "EX x^3"; did you mean "EX x^2"?']),
+    ("error_model: {kind: kinematic}",
+     "error_model: {kind: kinematic}\ntrue_machine: {kind: coefficients, values: {EY x^2: 1 um}, "
+     "error_model: {kind: empirical, terms: quadratic}}", [
+         "6:53: true_machine.values[EY x^2]: EY must be zero at both ends of its axis, where it fixes the machine's "
+         "frame; let its coefficients add up to zero"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: zero", [
         "6:15: true_machine: expected a mapping, key: value, found the text \"zero\" "
         "(the errors that simulated readings have; default zero)"]),

@@ -8,9 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simulator.machines.arrangement import ARRANGEMENTS, Arrangement
-from simulator.machines.kinematic import carried_vectors, kinematic_model
+from simulator.machines.bases import Monomial, Polynomial, Spline
+from simulator.machines.empirical import empirical_model
+from simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
 from simulator.machines.metric import MetricModel
-from simulator.machines.protocol import ErrorModel
+from simulator.machines.protocol import ErrorModel, HasLines
+from simulator.machines.terms import Radial, quadratic, sums, tensor
 from tests.reference.derivatives import assert_derivative, complex_step
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
@@ -22,6 +25,24 @@ MODELS: dict[str, ErrorModel] = {
         for full in (False, True)
     },
     "few coefficients": kinematic_model(ARRANGEMENTS["MB2"], 2, 1, LOWER, UPPER),
+    **{
+        f"kinematic of {type(basis).__name__} {'full' if full else 'linearised'}": kinematic_model_of(
+            ARRANGEMENTS["MB2"], basis, Monomial(3), LOWER, UPPER, full
+        )
+        for basis in (Monomial(4), Spline(4, (0.3, 0.5)))
+        for full in (False, True)
+    },
+    **{
+        f"empirical {name} {'full' if full else 'linearised'}": empirical_model(terms, LOWER, UPPER, full)
+        for name, terms in {
+            "sums of polynomials": sums(Polynomial(4)),
+            "sums of splines": sums(Spline(4, (0.5,))),
+            "quadratic": quadratic(),
+            "tensor": tensor(Spline(3, (0.5,))),
+            "radial": Radial((3, 3, 2), 0.5),
+        }.items()
+        for full in (False, True)
+    },
     **{f"metric {scale}": MetricModel(scale) for scale in ("none", "x", "y", "split")},
 }
 
@@ -54,6 +75,25 @@ def test_reported_values_are_the_same_number_of_degrees_of_freedom(model: ErrorM
     assert reported.matrix.shape == (len(reported.names), len(model.parameters))
     assert len(set(reported.names)) == len(reported.names) == len(reported.units)
     assert np.linalg.matrix_rank(reported.matrix) == len(model.parameters)
+
+
+@models
+def test_parameters_have_names_of_their_own_and_effects(model: ErrorModel) -> None:
+    names = [parameter.name for parameter in model.parameters]
+    assert len(set(names)) == len(names)
+    assert all(parameter.effect > 0 and parameter.meaning for parameter in model.parameters)
+
+
+@models
+def test_lines_have_a_column_for_each_parameter_of_a_function(model: ErrorModel) -> None:
+    if not isinstance(model, HasLines):
+        return
+    t = np.linspace(0, 1, 5)
+    for name in {parameter.function for parameter in model.parameters}:
+        count = sum(parameter.function == name for parameter in model.parameters)
+        lines = model.lines(name, t)
+        assert lines and {line.basis.shape for line in lines} == {(5, count)}
+        assert len({line.words for line in lines}) == len(lines)
 
 
 @given(st.sampled_from(sorted(ARRANGEMENTS)), st.integers(0, 10_000))

@@ -9,7 +9,7 @@ from simulator.machines.arrangement import ARRANGEMENTS
 from simulator.machines.kinematic import kinematic_model
 from simulator.machines.metric import MetricModel
 from simulator.machines.settings import CoefficientSettings, RandomSettings, ZeroSettings
-from simulator.machines.truth import TruthError, true_parameters
+from simulator.machines.truth import TruthError, true_machine, true_parameters
 
 MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
 ORIGIN = np.zeros((1, 3))
@@ -61,3 +61,39 @@ def test_random_errors_have_the_stated_size_and_seed() -> None:
         curve = function.basis.values(t) @ a[MODEL.slices[function.name]]
         size = 3e-6 if function.rotation else 2e-6
         assert np.sqrt(np.trapezoid(curve**2, t)) == pytest.approx(size, rel=1e-4)
+
+
+@pytest.mark.parametrize("terms", ["quadratic", "sums", {"centres": (2, 3, 2)}])
+def test_random_errors_of_another_model_have_the_stated_size_in_the_volume(terms: object) -> None:
+    settings = RandomSettings.model_validate(
+        {
+            "kind": "random",
+            "position": "2 um",
+            "rotation": "3 urad",
+            "error_model": {"kind": "empirical", "terms": terms},
+        }
+    )
+    machine = true_machine(settings, MODEL, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    assert machine.model is not MODEL and len(machine.a) == len(machine.model.parameters)
+    places = np.random.default_rng(1).random((5000, 3))
+    found = machine.model.functions(places, machine.a)  # type: ignore[attr-defined]
+    sizes = np.sqrt((found**2).mean(axis=0)) / np.repeat([2e-6, 3e-6], 3)
+    assert sizes.min() > 0.4 and sizes.max() < 1.6
+
+
+def test_stated_errors_of_another_model() -> None:
+    settings = CoefficientSettings.model_validate(
+        {
+            "kind": "coefficients",
+            "values": {"EX y^2": "3 um", "EA z": "2 urad"},
+            "error_model": {"kind": "empirical", "terms": "quadratic"},
+        }
+    )
+    machine = true_machine(settings, MODEL, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    x, p = np.array([[0.3, 0.5, 0.2]]), np.array([[0.0, 0.0, -0.1]])
+    np.testing.assert_allclose(machine.model.error(x, machine.a, p), p + [[0.75e-6, 0.04e-6, 0.0]], atol=1e-18)
+
+
+def test_the_true_machine_is_of_the_estimated_model_by_default() -> None:
+    machine = true_machine(ZeroSettings(), MODEL, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    assert machine.model is MODEL and not machine.a.any()

@@ -17,6 +17,7 @@ DEFICIENCY = {
     **{f"6.2.2[n={n} NDEL={ndel}]": 0 for n in (5, 7, 10, 13, 17, 21) for ndel in (5, 7)},
     "6.2.2[n=13 NDEL=10]": 0,
     "6.2.2[grid n=7 NDEL=10]": 3,
+    **{f"6.2.6[n={n} {model}]": 0 for n in (5, 7) for model in ("kinematic", "empirical")},
 }
 
 

@@ -86,3 +86,12 @@ def test_u3_of_the_five_coefficient_tables() -> None:
         for label, statistic, printed in columns():
             if label == experiment.label and statistic == "average" and "NDEL=5" in label:
                 assert plan(experiment).quantities["U3"].average == pytest.approx(printed["U3"], rel=0.15)
+
+
+def test_empirical_errors_are_known_well_but_less_so_than_kinematic_ones() -> None:
+    """Section 6.2.6: what the report says of Table 12."""
+    found = {e.name: plan(e).quantities for e in load("designs/npl/6.2.6.yaml")}
+    for n in (5, 7):
+        for symbol in ("U1", "U2", "U4", "U6"):
+            ratio = found[f"n={n} empirical"][symbol].average / found[f"n={n} kinematic"][symbol].average
+            assert 1.0 < ratio < 2.0, (n, symbol)

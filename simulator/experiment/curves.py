@@ -1,0 +1,95 @@
+"""Measured error curves in CSV files: a position along the axis and functions by their ISO 230-1 names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+from ..machines.curves import NAMES, Points
+from ..machines.kinematic import TRANSLATIONS
+from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number
+from ..settings import hint, listing, shorten
+from .messages import ExperimentError, Message
+from .tables import _cells
+from .yamltree import Mark, read_text
+
+POSITION = "position"
+EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
+
+
+def read_curves(path: Path) -> dict[str, Points]:
+    """Read curves of one axis from a file whose first line names the columns, such as position_mm,EXX_um,EAX_urad.
+
+    :raises ExperimentError: everything that is wrong with the file at once.
+    """
+    file = str(path)
+    lines = [
+        (number, line)
+        for number, line in enumerate(read_text(path).splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")])
+    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1])
+    messages: list[Message] = []
+    rows: list[tuple[int, list[float]]] = []
+    for number, line in lines[1:]:
+        cells = _cells(line)
+        if cells is None or len(cells) != len(names):
+            text = f"{0 if cells is None else len(cells)} columns instead of {len(names)}; separate them by commas"
+            messages.append(Message(file, number, 1, "", text))
+            continue
+        row = []
+        for (column, cell), factor in zip(cells, factors, strict=True):
+            try:
+                row.append(float(exact_number(cell) * factor))
+            except QuantityError as error:
+                messages.append(Message(file, number, column, "", str(error)))
+        rows.append((number, row))
+    if messages:
+        raise ExperimentError(messages)
+    if len(rows) < 2:
+        raise ExperimentError([Message(file, lines[0][0], 1, "", "a curve needs two points at least; add rows")])
+    place = names.index(POSITION)
+    rows.sort(key=lambda row: row[1][place])
+    for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
+        if after[place] == before[place]:
+            text = "this position stands in the file twice; leave one of the rows out"
+            raise ExperimentError([Message(file, number, 1, "", text)])
+    positions = tuple(row[place] for _, row in rows)
+    return {
+        name: Points(positions, tuple(row[k] for _, row in rows)) for k, name in enumerate(names) if name != POSITION
+    }
+
+
+def _columns(mark: Mark, header: str) -> tuple[list[str], list[Fraction]]:
+    messages: list[Message] = []
+    names: list[str] = []
+    factors: list[Fraction] = []
+    for column, cell in _cells(header) or []:
+        place = Mark(mark.file, mark.line, column)
+        name, _, unit = cell.rpartition("_")
+        unit = unit.replace("µ", "u").replace("μ", "u")
+        if name != POSITION and name not in NAMES:
+            known = cell in (POSITION, *NAMES)
+            remedy = f"write it with its unit, as in {EXAMPLE}" if known else hint(name or cell, [POSITION, *NAMES])
+            problem = "has no unit" if known else "is no error of an axis"
+            messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
+            continue
+        units: Mapping[str, Fraction] = LENGTH_UNITS if name == POSITION or name[1] in TRANSLATIONS else ANGLE_UNITS
+        if unit not in units:
+            messages.append(place.message("", f'unknown unit in the column "{shorten(cell)}"; {hint(unit, units)}'))
+            continue
+        if name in names:
+            messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one of them'))
+        names.append(name)
+        factors.append(units[unit])
+    axes = sorted({name[2] for name in names if name != POSITION})
+    if not messages and (POSITION not in names or not axes):
+        messages.append(mark.message("", f"a position and at least one error are needed, as in {EXAMPLE}"))
+    if len(axes) > 1:
+        messages.append(mark.message("", f"errors of the axes {listing(axes)}; write one file for each axis"))
+    if messages:
+        raise ExperimentError(messages)
+    return names, factors

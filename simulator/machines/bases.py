@@ -1,0 +1,259 @@
+"""Univariate functions on [0, 1]: Chebyshev polynomials, monomials and B-splines behind one protocol.
+
+Every family contains 1 and t; the rest are interior functions, which vanish at both ends. An error function that is
+zero at 0 takes what vanishes there, one that is zero at both ends the interior functions alone: end conditions are
+met by construction. NPL Report CISE 15/98, section 2.1.1, has the families, section 2.6 why monomials will not do at
+high degrees.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.polynomial import chebyshev, polynomial
+
+from .protocol import Array
+
+
+@dataclass(frozen=True)
+class Quoted:
+    """Functions in the form the field quotes: `matrix` (names, functions) goes to the coefficients of `names`."""
+
+    names: tuple[str, ...]
+    matrix: Array
+
+
+class Basis(Protocol):
+    """Functions that vanish at 0, with `zero_at_one` those of them that vanish at 1 too."""
+
+    @property
+    def zero_at_one(self) -> bool: ...
+
+    @property
+    def size(self) -> int:
+        """Number of functions."""
+        ...
+
+    def values(self, t: Array) -> Array:
+        """Functions at t (m,), as (m, size)."""
+        ...
+
+    def interior(self) -> Basis:
+        """The interior functions of the family."""
+        ...
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """The functions by monomials of the variable or by B-splines, those left out that are zero throughout."""
+        ...
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        """The same for the whole family: 1, t and then the interior functions."""
+        ...
+
+
+def whole_values(basis: Basis, t: Array) -> Array:
+    """The whole family at t (m,): 1, t and the interior functions as columns.
+
+    >>> whole_values(Polynomial(3), np.array([0.5]))
+    array([[1.  , 0.5 , 0.25]])
+    """
+    return np.column_stack([np.ones_like(t), t, basis.interior().values(t)])
+
+
+def power(variable: str, exponent: int) -> str:
+    """Name of a monomial.
+
+    >>> power("t", 1), power("x", 2)
+    ('t^1', 'x^2')
+    """
+    return f"{variable}^{exponent}"
+
+
+@dataclass(frozen=True)
+class _Polynomials:
+    """Polynomials with `coefficients` coefficients, the constant counted."""
+
+    coefficients: int
+    zero_at_one: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of free coefficients."""
+        return max(self.coefficients - 1 - int(self.zero_at_one), 0)
+
+    def interior(self) -> Basis:
+        """The functions that vanish at both ends."""
+        whole: Basis = replace(self, zero_at_one=True)  # type: ignore[assignment]
+        return whole
+
+    @property
+    def monomials(self) -> Array:
+        raise NotImplementedError
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """Coefficients of t, t^2, ..."""
+        return Quoted(tuple(power(variable, k + 1) for k in range(len(self.monomials))), self.monomials)
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        """Coefficients of 1, t, t^2, ... for 1, t and the interior functions."""
+        inner = self.interior().quoted().matrix
+        matrix = np.zeros((max(self.coefficients, 2), 2 + inner.shape[1]))
+        matrix[0, 0] = matrix[1, 1] = 1.0
+        matrix[1 : len(inner) + 1, 2:] = inner
+        return Quoted(("", *(power(variable, k) for k in range(1, len(matrix)))), matrix)
+
+
+@dataclass(frozen=True)
+class Polynomial(_Polynomials):
+    """t T_k(2t - 1), or t (1 - t) T_k(2t - 1), with T_k the Chebyshev polynomials: stable at any degree.
+
+    >>> Polynomial(5).size, Polynomial(5, zero_at_one=True).size
+    (4, 3)
+    """
+
+    def values(self, t: Array) -> Array:
+        """Basis functions at t (m,), as (m, size)."""
+        envelope = t * (1.0 - t) if self.zero_at_one else t
+        if self.size == 0:
+            return np.zeros((len(t), 0))
+        return np.asarray(chebyshev.chebvander(2.0 * t - 1.0, self.size - 1) * envelope[:, None])
+
+    @cached_property
+    def monomials(self) -> Array:
+        """Matrix (coefficients - 1, size) from this basis to the monomials t, t^2, ... on [0, 1].
+
+        >>> Polynomial(3).monomials
+        array([[ 1., -1.],
+               [ 0.,  2.]])
+        """
+        envelope = [0.0, 1.0, -1.0] if self.zero_at_one else [0.0, 1.0]
+        matrix = np.zeros((max(self.coefficients - 1, 0), self.size))
+        for k in range(self.size):
+            in_s = chebyshev.cheb2poly([0.0] * k + [1.0])
+            in_t = np.array([0.0])
+            for power_, coefficient in enumerate(in_s):
+                in_t = polynomial.polyadd(in_t, coefficient * polynomial.polypow([-1.0, 2.0], power_))
+            product = polynomial.polymul(in_t, envelope)
+            matrix[: len(product) - 1, k] = product[1:]
+        return matrix
+
+
+@dataclass(frozen=True)
+class Monomial(_Polynomials):
+    """t^k from k = 1, or t^k (1 - t).
+
+    >>> Monomial(4).values(np.array([0.5])), Monomial(4, zero_at_one=True).values(np.array([0.5]))
+    (array([[0.5  , 0.25 , 0.125]]), array([[0.25 , 0.125]]))
+    """
+
+    def values(self, t: Array) -> Array:
+        """Basis functions at t (m,), as (m, size)."""
+        envelope = 1.0 - t if self.zero_at_one else np.ones_like(t)
+        return np.asarray(t[:, None] ** np.arange(1, self.size + 1) * envelope[:, None])
+
+    @cached_property
+    def monomials(self) -> Array:
+        """Matrix (coefficients - 1, size) from this basis to the monomials t, t^2, ... on [0, 1]."""
+        matrix = np.eye(max(self.coefficients - 1, 0), self.size)
+        if self.zero_at_one:
+            matrix -= np.eye(*matrix.shape, k=-1)
+        return matrix
+
+
+@dataclass(frozen=True)
+class Spline:
+    """Splines of an order (degree plus one, at least 2) with interior knots: t and the B-splines N_2 to N_last-1.
+
+    A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative less. Beyond [0, 1]
+    the polynomial of the last piece goes on.
+
+    >>> Spline(4, (0.5,)).size, Spline(4, (0.5,), zero_at_one=True).size
+    (4, 3)
+    """
+
+    order: int
+    knots: tuple[float, ...] = ()
+    zero_at_one: bool = False
+
+    def __post_init__(self) -> None:
+        if self.order < 2:
+            raise ValueError("a spline's order is 2 (broken lines) at least")
+        if any(not 0.0 < knot < 1.0 for knot in self.knots) or list(self.knots) != sorted(self.knots):
+            raise ValueError("interior knots are between 0 and 1, in ascending order")
+        if max(Counter(self.knots).values(), default=0) >= self.order:
+            raise ValueError(f"a knot may stand at one place {self.order - 1} times at most, one less than the order")
+
+    @property
+    def count(self) -> int:
+        """Number of B-splines, the first and the last included."""
+        return self.order + len(self.knots)
+
+    @property
+    def size(self) -> int:
+        """Number of functions."""
+        return self.count - 1 - int(self.zero_at_one)
+
+    @property
+    def _all_knots(self) -> Array:
+        return np.array([0.0] * self.order + list(self.knots) + [1.0] * self.order)
+
+    def values(self, t: Array) -> Array:
+        """Basis functions at t (m,), as (m, size)."""
+        # SciPy takes longer to import than most experiments to check.
+        from scipy.interpolate import BSpline
+
+        splines = BSpline(self._all_knots, np.eye(self.count), self.order - 1)(t)[:, 1:-1]
+        return np.asarray(splines if self.zero_at_one else np.column_stack([t, splines]))
+
+    def interior(self) -> Spline:
+        """The functions that vanish at both ends."""
+        return replace(self, zero_at_one=True)
+
+    @cached_property
+    def _abscissae(self) -> Array:
+        """Coefficients (count,) of t: means of order - 1 successive knots."""
+        knots = self._all_knots
+        return np.array([knots[j + 1 : j + self.order].mean() for j in range(self.count)])
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """Coefficients of the B-splines that are not zero by the end conditions."""
+        whole = self.quoted_whole(variable)
+        if self.zero_at_one:
+            return Quoted(whole.names[1:-1], whole.matrix[1:-1, 2:])
+        return Quoted(whole.names[1:], whole.matrix[1:, 1:])
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        """Coefficients of all B-splines for 1, t and the interior functions."""
+        matrix = np.zeros((self.count, self.count))
+        matrix[:, 0], matrix[:, 1] = 1.0, self._abscissae
+        matrix[1:-1, 2:] = np.eye(self.count - 2)
+        return Quoted(tuple(f"N{k + 1}({variable})" for k in range(self.count)), matrix)
+
+
+def spline_containing(parts: tuple[Basis, ...], raised: int = 0) -> Basis:
+    """The smallest family that contains the whole families of all `parts`, the last `raised` of them times t.
+
+    Polynomials stay Chebyshev polynomials; as soon as there is a spline, so is the result.
+
+    >>> spline_containing((Polynomial(5), Monomial(4))).coefficients
+    5
+    >>> spline_containing((Spline(3, (0.5,)), Polynomial(4)))
+    Spline(order=4, knots=(0.5, 0.5), zero_at_one=False)
+    """
+    degrees = []
+    for k, part in enumerate(parts):
+        order = part.order if isinstance(part, Spline) else max(getattr(part, "coefficients", 2), 2)
+        degrees.append(order + int(k >= len(parts) - raised))
+    order = max(degrees)
+    if not any(isinstance(part, Spline) and part.knots for part in parts):
+        return Spline(order) if any(isinstance(part, Spline) for part in parts) else Polynomial(order)
+    knots: Counter[float] = Counter()
+    for part in parts:
+        # A knot of multiplicity m leaves order - 1 - m derivatives continuous, with a factor t as well.
+        for knot, times in Counter(getattr(part, "knots", ())).items():
+            knots[knot] = max(knots[knot], order - part.order + times)  # type: ignore[attr-defined]
+    return Spline(order, tuple(sorted(knots.elements())))

@@ -1,0 +1,91 @@
+"""A machine with measured error curves: a kinematic model whose functions are the curves themselves.
+
+Values are taken as they are: nothing is subtracted, so that curves which are not zero at the lower corner, or
+straightness curves which are not zero at the far end, belong to another frame than the estimated models'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .arrangement import AXES, Arrangement
+from .bases import Basis, Quoted
+from .kinematic import ROTATIONS, TRANSLATIONS, ErrorFunction, KinematicModel
+from .protocol import Array
+
+Interpolation = Literal["linear", "cubic", "monotone"]
+NAMES = tuple(f"E{kind}{axis}" for axis in TRANSLATIONS for kind in (*TRANSLATIONS, *ROTATIONS))
+
+
+@dataclass(frozen=True)
+class Points:
+    """A measured curve: values, in metres or radians, at ascending positions along the axis in metres."""
+
+    positions: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One function, through values at ascending t; beyond its ends it keeps its end values.
+
+    >>> Curve((0.0, 1.0), (0.0, 2e-6), "linear").values(np.array([0.5, 1.2]))
+    array([[1.e-06],
+           [2.e-06]])
+    """
+
+    t: tuple[float, ...]
+    y: tuple[float, ...]
+    interpolation: Interpolation
+
+    @property
+    def zero_at_one(self) -> bool:
+        return False
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def values(self, t: Array) -> Array:
+        """The curve at t (m,), as (m, 1)."""
+        if self.interpolation == "linear" or len(self.t) < 3:
+            return np.interp(t, self.t, self.y)[:, None]
+        # SciPy takes longer to import than most experiments to check.
+        from scipy.interpolate import CubicSpline, PchipInterpolator
+
+        through = CubicSpline if self.interpolation == "cubic" else PchipInterpolator
+        return np.asarray(through(self.t, self.y)(np.clip(t, self.t[0], self.t[-1])))[:, None]
+
+    def interior(self) -> Basis:
+        raise TypeError("a measured curve is a single function")
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """The curve as it is."""
+        return Quoted(("as measured",), np.eye(1))
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        raise TypeError("a measured curve is a single function")
+
+
+def curves_model(
+    curves: Mapping[str, Points],
+    interpolation: Interpolation,
+    arrangement: Arrangement,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+    full_rotations: bool = False,
+) -> KinematicModel:
+    """The machine with the given curves by ISO 230-1 name, each multiplied by a parameter; other functions are zero."""
+    functions = []
+    for name, points in curves.items():
+        kind, axis = name[1], AXES.index(name[2].lower())
+        t = (np.array(points.positions) - lower[axis]) / (upper[axis] - lower[axis])
+        rotation = kind in ROTATIONS
+        component = (ROTATIONS if rotation else TRANSLATIONS).index(kind)
+        basis = Curve(tuple(t.tolist()), points.values, interpolation)
+        functions.append(ErrorFunction(name, axis, component, rotation, basis))
+    return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)

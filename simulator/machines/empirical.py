@@ -1,0 +1,194 @@
+"""The empirical error model: six functions of three variables, for displacement and rotation of the probe.
+
+Sources: NPL Report CISE 15/98, sections 2.1 and 2.4.1. A corrected point is x + e(x) + p + u(x) x p with the three
+positional functions e and the three rotational functions u, right-handed about the machine's axes and of opposite
+sign to those of the report. Unlike the kinematic model's, rotations move the probe's tip only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .kinematic import cross_matrices, rotation_and_derivatives
+from .protocol import Array, Line, Parameter, Reported, Unit
+from .terms import Terms
+
+FUNCTIONS = {
+    "EX": "error in X",
+    "EY": "error in Y",
+    "EZ": "error in Z",
+    "EA": "rotation about X",
+    "EB": "rotation about Y",
+    "EC": "rotation about Z",
+}
+
+Condition = tuple[str, tuple[float, float, float]]
+
+# The frame's origin is the lower corner, its x axis the machine's and its xy plane that of the machine's x and y axes;
+# the probe's orientation is the one it has at the lower corner. Corners by fractions of the volume.
+FRAME: tuple[Condition, ...] = (
+    *((name, (0.0, 0.0, 0.0)) for name in FUNCTIONS),
+    ("EY", (1.0, 0.0, 0.0)),
+    ("EZ", (1.0, 0.0, 0.0)),
+    ("EZ", (0.0, 1.0, 0.0)),
+)
+
+# Rotations move the tip of the probe alone. What they do is stated for an offset of this fraction of the volume.
+USUAL_OFFSET = 0.1
+
+# Where a function is looked at for its size and shape: lines parallel to the axes at these fractions.
+LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
+AXES = ("x", "y", "z")
+
+
+class FrameError(ValueError):
+    """The terms cannot be held at zero at a corner by leaving one of them out."""
+
+
+@dataclass(frozen=True)
+class EmpiricalModel:
+    """e(x, a, p) of six functions in the same `terms`, each with the `columns` of them that are free.
+
+    `lower` and `upper` (3,) bound the volume in metres; the functions depend on the place scaled to [0, 1] in it.
+    `full_rotations` turns the probe offset by rotation matrices instead of adding the cross product.
+    """
+
+    terms: Terms
+    columns: tuple[tuple[int, ...], ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    full_rotations: bool = False
+
+    @property
+    def dimension(self) -> int:
+        return 3
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        grid = np.linspace(0.0, 1.0, 9)
+        places = np.stack(np.meshgrid(grid, grid, grid, indexing="ij"), axis=-1).reshape(-1, 3)
+        peaks = np.abs(self.terms.values(places)).max(axis=0)
+        arm = USUAL_OFFSET * float(np.subtract(self.upper, self.lower).max())
+        names = self.terms.names
+        found = []
+        for k, (function, meaning) in enumerate(FUNCTIONS.items()):
+            unit: Unit = "rad" if k >= 3 else "m"
+            for column in self.columns[k]:
+                effect = float(peaks[column]) * (arm if k >= 3 else 1.0)
+                found.append(Parameter(f"{function} {names[column]}", unit, function, meaning, effect))
+        return tuple(found)
+
+    @cached_property
+    def slices(self) -> tuple[slice, ...]:
+        """Where each function's coefficients stand in a."""
+        ends = np.cumsum([0, *map(len, self.columns)])
+        return tuple(slice(int(start), int(end)) for start, end in zip(ends, ends[1:], strict=False))
+
+    @cached_property
+    def _chosen(self) -> tuple[list[int], ...]:
+        return tuple(map(list, self.columns))
+
+    def scaled(self, x: Array) -> Array:
+        """Places x (m, 3) scaled to [0, 1] over the volume."""
+        lower = np.asarray(self.lower)
+        return np.asarray((x - lower) / (np.asarray(self.upper) - lower))
+
+    def functions(self, x: Array, a: Array) -> Array:
+        """The six functions at x (m, 3), as (m, 6)."""
+        values = self.terms.values(self.scaled(x))
+        parts = [values[:, own] @ a[part] for own, part in zip(self._chosen, self.slices, strict=True)]
+        return np.stack(parts, axis=1)
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        found = self.functions(x, a)
+        if self.full_rotations:
+            return np.asarray(found[:, :3] + np.einsum("mij,mj->mi", rotation_and_derivatives(found[:, 3:])[0], p))
+        return np.asarray(found[:, :3] + p + np.cross(found[:, 3:], p))
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        values = self.terms.values(self.scaled(x))
+        if self.full_rotations:
+            angles = self.functions(x, a)[:, 3:]
+            by_angle = [np.einsum("mij,mj->mi", part, p) for part in rotation_and_derivatives(angles)[1]]
+            by_rotation = np.stack(by_angle, axis=2)
+        else:
+            by_rotation = cross_matrices(p)
+        result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(values, a, p))
+        for k, (own, part) in enumerate(zip(self._chosen, self.slices, strict=True)):
+            if k < 3:
+                result[:, k, part] = values[:, own]
+            else:
+                result[:, :, part] = by_rotation[:, :, k - 3, None] * values[:, None, own]
+        return result
+
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        """The function along lines parallel to the axes, those along the edges of the volume first."""
+        own = self._chosen[list(FUNCTIONS).index(function)]
+        pairs = [(one, two) for one in LEVELS for two in LEVELS]
+        pairs.sort(key=lambda pair: sum(level not in (0.0, 1.0) for level in pair))
+        words, places = [], []
+        for pair in pairs:
+            for axis in range(3):
+                others = [k for k in range(3) if k != axis]
+                at = " and ".join(f"{AXES[k]} {_level(level)}" for k, level in zip(others, pair, strict=True))
+                words.append(f"along {AXES[axis].upper()} at {at}")
+                line = np.zeros((len(t), 3))
+                line[:, axis], line[:, others] = t, pair
+                places.append(line)
+        values = self.terms.values(np.concatenate(places))[:, own].reshape(len(words), len(t), len(own))
+        return tuple(map(Line, words, values))
+
+    def reported(self) -> Reported:
+        """Coefficients of monomials where the terms are polynomials, otherwise the parameters themselves."""
+        quoted = self.terms.quoted()
+        names: list[str] = []
+        units: list[Unit] = []
+        blocks = []
+        for k, function in enumerate(FUNCTIONS):
+            block = quoted.matrix[:, self._chosen[k]]
+            used = np.flatnonzero(block.any(axis=1))
+            blocks.append(block[used])
+            names += [f"{function} {quoted.names[row]}" for row in used]
+            units += ["rad" if k >= 3 else "m"] * len(used)
+        matrix = np.zeros((len(names), len(self.parameters)))
+        row = 0
+        for block, part in zip(blocks, self.slices, strict=True):
+            matrix[row : row + len(block), part] = block
+            row += len(block)
+        return Reported(tuple(names), tuple(units), matrix)
+
+
+def empirical_model(
+    terms: Terms,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+    full_rotations: bool = False,
+    frame: Sequence[Condition] = FRAME,
+) -> EmpiricalModel:
+    """The model whose functions vanish where `frame` says: the terms that are not zero there are left out.
+
+    >>> from .bases import Polynomial
+    >>> from .terms import sums
+    >>> len(empirical_model(sums(Polynomial(3)), (0, 0, 0), (1, 1, 1)).parameters)
+    87
+    """
+    columns = []
+    for function in FUNCTIONS:
+        left = list(range(len(terms.names)))
+        for name, corner in frame:
+            if name == function:
+                at_corner = terms.values(np.array([corner]))[0, left]
+                touched = np.flatnonzero(np.abs(at_corner) > 1e-9)
+                if len(touched) > 1:
+                    raise FrameError(f"{len(touched)} terms of {function} are not zero at {corner}")
+                left = [column for k, column in enumerate(left) if k not in touched]
+        columns.append(tuple(left))
+    return EmpiricalModel(terms, tuple(columns), lower, upper, full_rotations)
+
+
+def _level(fraction: float) -> str:
+    return {0.0: "low", 0.5: "middle", 1.0: "high"}.get(fraction, f"{fraction:g}")

@@ -1,0 +1,172 @@
+"""Functions of three variables on [0, 1]^3, from which the empirical error model is built.
+
+Products of one univariate function along each axis: redundancy-free sums, quadratics and full tensor products; and
+radial basis functions. All but the last are NPL Report CISE 15/98, sections 2.1.2 and 5.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+
+from .bases import Basis, Monomial, Quoted, Spline, whole_values
+from .protocol import Array
+
+VARIABLES = ("x", "y", "z")
+
+
+class Terms(Protocol):
+    """Linearly independent functions of a place."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    def values(self, t: Array) -> Array:
+        """Functions at places t (m, 3), as (m, number of functions)."""
+        ...
+
+    def quoted(self) -> Quoted:
+        """The functions in the form the field quotes."""
+        ...
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of univariate functions: `factors` (terms, 3) index 1, t and the interior functions of each axis.
+
+    >>> sums(Spline(3)).names[:8]
+    ('1', 'x', 'y', 'z', 'x*y', 'x*z', 'y*z', 's1(x)')
+    """
+
+    axes: tuple[Basis, Basis, Basis]
+    factors: tuple[tuple[int, int, int], ...]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names such as 1, x*y and s2(x)*z, with s1, s2, ... the interior functions."""
+        written = []
+        for indices in self.factors:
+            parts = [
+                variable if index == 1 else f"s{index - 1}({variable})"
+                for variable, index in zip(VARIABLES, indices, strict=True)
+                if index
+            ]
+            # The function of higher degree first, as in s1(z)*x.
+            parts.sort(key=len, reverse=True)
+            written.append("*".join(parts) or "1")
+        return tuple(written)
+
+    @cached_property
+    def _by_axis(self) -> tuple[list[int], ...]:
+        return tuple([indices[axis] for indices in self.factors] for axis in range(3))
+
+    def values(self, t: Array) -> Array:
+        result = whole_values(self.axes[0], t[:, 0])[:, self._by_axis[0]]
+        for axis in (1, 2):
+            result *= whole_values(self.axes[axis], t[:, axis])[:, self._by_axis[axis]]
+        return np.asarray(result)
+
+    def quoted(self) -> Quoted:
+        """Coefficients of monomials; splines are quoted as they are, with t and 1 among them."""
+        if any(isinstance(axis, Spline) for axis in self.axes):
+            return Quoted(self.names, np.eye(len(self.names)))
+        by_axis = [axis.quoted_whole(variable) for axis, variable in zip(self.axes, VARIABLES, strict=True)]
+        rows: dict[str, Array] = {}
+        for powers in product(*(range(len(one.names)) for one in by_axis)):
+            row = np.array(
+                [
+                    np.prod([one.matrix[power, index] for one, power, index in zip(by_axis, powers, term, strict=True)])
+                    for term in self.factors
+                ]
+            )
+            if row.any():
+                names = [one.names[power].removesuffix("^1") for one, power in zip(by_axis, powers, strict=True)]
+                rows["*".join(filter(None, names)) or "1"] = row
+        return Quoted(tuple(rows), np.array(list(rows.values())))
+
+
+def sums(basis: Basis) -> Products:
+    """Sums of tensor products without redundancy: 1, x, y, z, xy, xz, yz and, for each interior function s,
+    s(x), s(x) y, s(x) z, and so for y and z.
+    """
+    inner = range(2, 2 + basis.interior().size)
+    factors = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        for index in inner:
+            for linear in (None, *others):
+                term = [0, 0, 0]
+                term[axis] = index
+                if linear is not None:
+                    term[linear] = 1
+                factors.append((term[0], term[1], term[2]))
+    return Products((basis, basis, basis), tuple(factors))
+
+
+def quadratic() -> Products:
+    """All polynomials of degree 2: 1, x, y, z, xy, xz, yz and s(x) = x - x^2, s(y), s(z)."""
+    basis = Monomial(3)
+    factors = [term for term in _triples(3) if sum(term) <= 2]
+    return Products((basis, basis, basis), tuple(sorted(factors, key=lambda term: (max(term), sum(term)))))
+
+
+def tensor(basis: Basis) -> Products:
+    """All products of a function of x, one of y and one of z."""
+    return Products((basis, basis, basis), tuple(_triples(2 + basis.interior().size)))
+
+
+def _triples(count: int) -> list[tuple[int, int, int]]:
+    return [(i, j, k) for i in range(count) for j in range(count) for k in range(count)]
+
+
+@dataclass(frozen=True)
+class Radial:
+    """Interpolants of multiquadrics sqrt(r^2 + constant^2) and a linear polynomial, by their values at centres.
+
+    The centres are a regular grid over the volume, corners included. A function's coefficients are its values at the
+    centres; the multiquadrics' own coefficients are orthogonal to linear polynomials, in the null space of those
+    conditions, so that linear functions come out exactly. Distances and `constant` are in fractions of the volume.
+
+    >>> Radial((2, 2, 2), 0.5).names[:2]
+    ('at (0, 0, 0)', 'at (0, 0, 1)')
+    """
+
+    grid: tuple[int, int, int]
+    constant: float
+
+    @cached_property
+    def centres(self) -> Array:
+        """Centres (n, 3)."""
+        axes = [np.linspace(0.0, 1.0, count) for count in self.grid]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names such as at (0, 0.5, 1)."""
+        return tuple("at ({})".format(", ".join(f"{value:.4g}" for value in centre)) for centre in self.centres)
+
+    def _functions(self, t: Array) -> tuple[Array, Array]:
+        distance = ((t[:, None, :] - self.centres) ** 2).sum(axis=2)
+        return np.sqrt(distance + self.constant**2), np.column_stack([np.ones(len(t)), t])
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """Coefficients of the multiquadrics (n, n) and of 1, x, y, z (4, n) for each value at a centre."""
+        kernel, linear = self._functions(self.centres)
+        q, r = np.linalg.qr(linear, mode="complete")
+        null = q[:, 4:]
+        radial = null @ np.linalg.solve(null.T @ kernel @ null, null.T)
+        return radial, np.linalg.solve(r[:4], q[:, :4].T @ (np.eye(len(kernel)) - kernel @ radial))
+
+    def values(self, t: Array) -> Array:
+        kernel, linear = self._functions(t)
+        radial, polynomial = self._weights
+        return np.asarray(kernel @ radial + linear @ polynomial)
+
+    def quoted(self) -> Quoted:
+        """The values at the centres, as they are."""
+        return Quoted(self.names, np.eye(len(self.names)))

@@ -1,0 +1,106 @@
+"""NPL Report CISE 15/98, section 5: exact readings of one machine, fitted with the model of the same or another.
+
+The report's sums of squares are in square metres, with weight 1 for a reading; those here are brought to that form.
+Its readings are exact to about a nanometre only, those here to rounding, so that sums of squares end lower.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from analysis.study import Fit, check, fit
+from simulator.experiment.load import load
+from simulator.generate import exact_readings, on_true_machine
+from simulator.layout import lay_out
+from simulator.machines.truth import true_machine
+from simulator.readings import ObservedReadings
+
+
+@cache
+def fitted(name: str, variant: str) -> Fit:
+    experiment = {e.name: e for e in load(Path(f"designs/npl/{name}.yaml"))}[variant]
+    design = lay_out(experiment)
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    machine = true_machine(experiment.true_machine, design.model, *corners)
+    _, x = exact_readings(*on_true_machine(design, machine))
+    return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
+
+
+def steps(found: Fit) -> list[float]:
+    return [iteration.step for iteration in found.solution.iterations[1:]]
+
+
+def sums_of_squares(found: Fit) -> list[float]:
+    """In square metres."""
+    scale = float(found.design.repeatability[0]) ** 2
+    return [scale * iteration.sum_of_squares for iteration in found.solution.iterations]
+
+
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [("5.2", "kinematic fit"), ("5.4", "kinematic machine, kinematic fit"), ("5.2", "empirical fit")],
+)
+def test_a_fit_that_contains_the_machine_converges_in_three_iterations(name: str, variant: str) -> None:
+    """Tables 1 and 3: steps of about 1e-4, 1e-8 and 1e-13, and readings met exactly."""
+    found = fitted(name, variant)
+    assert found.verdict.deficiency == 0 and found.solution.status == "converged"
+    first, second, third, *rest = steps(found)
+    assert 3e-5 < first < 1e-3
+    assert 1e-10 < second < 1e-7
+    assert third < 1e-11
+    assert not rest
+    at_first, *_, at_last = sums_of_squares(found)
+    assert 1e-9 < at_first < 1e-7
+    assert at_last < 1e-22
+
+
+@pytest.mark.parametrize(("name", "variant"), [("5.3", "kinematic fit"), ("5.4", "empirical machine, kinematic fit")])
+def test_a_kinematic_fit_cannot_follow_an_empirical_machine(name: str, variant: str) -> None:
+    """Tables 2 and 4: it converges all the same, with a sum of squares orders of magnitude above what exact
+    readings leave. Table 4 ends at 2.6e-10 m^2.
+    """
+    found = fitted(name, variant)
+    assert found.solution.status == "converged"
+    last = sums_of_squares(found)[-1]
+    assert 1e-11 < last < 1e-8
+    # Anybody would notice: the sum of squares is far above the degrees of freedom, about which it should be.
+    assert found.solution.factor.sum_of_squares > 10 * found.degrees_of_freedom
+
+
+def test_an_empirical_fit_follows_an_empirical_machine() -> None:
+    """Table 2."""
+    found = fitted("5.3", "empirical fit")
+    assert found.solution.status == "converged" and len(steps(found)) <= 3
+    assert sums_of_squares(found)[-1] < 1e-22
+
+
+NAMED = re.compile(r"E[XYZABC] \((error in|rotation about) [XYZ], .*along [XYZ] at")
+
+
+def test_an_empirical_fit_of_sparse_readings_is_recognised_as_deficient() -> None:
+    """Section 5.4: planned, on a machine without errors, twelve directions are wholly open."""
+    for experiment in load(Path("designs/npl/5.4.yaml")):
+        verdict = check(experiment).verdict
+        assert verdict.as_expected
+        if experiment.name is not None and experiment.name.endswith("empirical fit"):
+            assert verdict.deficiency == len(verdict.null) == 12 and verdict.gap > 1e8
+            assert all(NAMED.search(str(direction)) for direction in verdict.null)
+
+
+@pytest.mark.parametrize("machine", ["kinematic", "empirical"])
+def test_what_the_sparse_readings_leave_open_is_named_after_a_fit_too(machine: str) -> None:
+    """Tables 3 and 4: steps that stay at 1e-3. The machine's errors tilt the twelve open directions just so much out of
+    the way that they are seen through products of errors; the iteration wanders along them.
+    """
+    found = fitted("5.4", f"{machine} machine, empirical fit")
+    verdict = found.verdict
+    assert verdict.deficiency == 0 and len(verdict.weak) == 12
+    assert verdict.singular_values[-12] < 1e-3 < 1e-2 < verdict.singular_values[-13]
+    assert all(NAMED.search(str(direction)) and "known only to" in str(direction) for direction in verdict.weak)
+    first, second, *_ = steps(found)
+    assert second > 1e-4 and second / first > 0.1
+    assert sums_of_squares(found)[1] < 1e-15
