@@ -52,7 +52,7 @@ class ArtefactPart:
 
 @dataclass(frozen=True)
 class PositionPart:
-    """A position's share: its shift in metres, its turn in radians, and their axes in words where there is one."""
+    """A position's or a probe's share: its shift in metres, its turn in radians, and their axes in words if any."""
 
     name: str
     shift: float
@@ -74,6 +74,7 @@ class Direction:
     artefacts: tuple[ArtefactPart, ...]
     positions: tuple[PositionPart, ...]
     standard_deviation: float = float("inf")
+    probes: tuple[PositionPart, ...] = ()
 
     def __str__(self) -> str:
         return in_words(self)
@@ -156,7 +157,8 @@ def weak_directions(
     for column in np.flatnonzero(effect > limit)[::-1]:
         root = found.root[:, column]
         description = _describe(design, layout, root, np.zeros_like(design.balls))
-        directions.append(Direction(description.functions, (), description.positions, float(effect[column])))
+        size = float(effect[column])
+        directions.append(Direction(description.functions, (), description.positions, size, description.probes))
     return tuple(directions)
 
 
@@ -200,7 +202,12 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
             touched = tuple(design.ball_names[b] for b in members[moved > 0.1 * moved.max()])
             words = deformation(design.balls[members], balls[members])
             artefacts.append(ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched))
-    return Direction(functions, tuple(artefacts), tuple(positions))
+    probes = []
+    for k, columns in enumerate(layout.offset_columns):
+        values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
+        if np.abs(values).max() > NEGLIGIBLE * largest:
+            probes.append(PositionPart(design.probe_names[k], float(np.linalg.norm(values)), 0.0))
+    return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes))
 
 
 def _single_axis(vector: Array, word: str) -> str:
@@ -306,6 +313,8 @@ def in_words(direction: Direction) -> str:
         told = [_position_words(part) for part in direction.positions[:6]]
         more = len(direction.positions) - len(told)
         parts.append("moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else ""))
+    if direction.probes:
+        parts.append("offsets of probes: " + ", ".join(_position_words(part) for part in direction.probes[:6]))
     if np.isinf(direction.standard_deviation):
         end = "change together without changing any observation" if len(parts) > 1 else "changes no observation"
     else:

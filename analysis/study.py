@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from simulator.design import Design, nominal_state
+from simulator.design import Design, nominal_state, probe_offsets
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import Solution, gauss_newton
@@ -212,6 +212,12 @@ def _estimates(
             if column >= 0:
                 unit: Unit = "m" if j < design.dimension else "rad"
                 add(f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
+
+    of_offsets = spread.of_shared(own[layout.model.stop :])
+    for probe, axis in np.argwhere(layout.offset_columns >= 0):
+        column = layout.offset_columns[probe, axis]
+        value = probe_offsets(design, state)[probe, axis]
+        add(layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
 
     of_balls = spread.of_balls()
     for ball in design.plate_balls:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simulator.design import Design, State
+from simulator.design import Design, State, probe_offsets
 from simulator.estimation.covariance import Covariance, blank
+from simulator.estimation.observations import offset_sensitivity
 from simulator.estimation.parameters import SharedLayout
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction
@@ -163,10 +164,15 @@ def point_pairs(
     limit: LengthFunction | None = None,
 ) -> tuple[Array, PairSummary]:
     """U4 (points, d) and U6 at the design's evaluation points."""
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+    probe = design.point_probe
+    offsets = np.broadcast_to(probe_offsets(design, state)[probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, state.a, offsets)
     of_shared = np.zeros((*jacobian.shape[:2], len(layout)))
     of_shared[:, :, layout.model] = jacobian
+    estimated = layout.offset_columns[probe] >= 0
+    if estimated.any():
+        by_offset = offset_sensitivity(design.model, design.points, state.a, offsets)
+        of_shared[:, :, layout.offset_columns[probe][estimated]] = by_offset[:, :, estimated]
     spread, null = of_shared @ found.shared, of_shared @ found.shared_null
     values = np.sqrt((spread**2).sum(axis=2))
     size = np.sqrt(((of_shared * found.scale) ** 2).sum(axis=2))

@@ -20,19 +20,25 @@ def pose_size(dimension: int) -> int:
 
 @dataclass(frozen=True)
 class Readings:
-    """Which ball is read in which position with which probe, and how often; all arrays (m,)."""
+    """Which ball is read in which position with which probe, and how often; all arrays (m,).
+
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None where all
+    have the machine's repeatability.
+    """
 
     ball: Integers
     position: Integers
     probe: Integers
     repeats: Integers
+    uncertainty: Array | None = None
 
     def __len__(self) -> int:
         return len(self.ball)
 
     def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
         """The readings at the given indices."""
-        return Readings(self.ball[chosen], self.position[chosen], self.probe[chosen], self.repeats[chosen])
+        uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
+        return Readings(self.ball[chosen], self.position[chosen], self.probe[chosen], self.repeats[chosen], uncertainty)
 
     def expanded(self) -> Readings:
         """One row for each repeat."""
@@ -93,6 +99,34 @@ class Lengths:
 
 
 @dataclass(frozen=True)
+class Priors:
+    """What is known beforehand of shared parameters; arrays (m,), metres, radians or ratios.
+
+    Each row is about a pose parameter (`position` and `component`, by place among origin and rotation), about a probe
+    offset (`probe` and `component`), or about a linear function of the model's parameters, `by_model` (m, n);
+    indices that do not apply are -1. Origins and offsets are told as co-ordinates, pose angles as deviations
+    from the nominal pose.
+    """
+
+    names: tuple[str, ...]
+    position: Integers
+    probe: Integers
+    component: Integers
+    by_model: Array
+    value: Array
+    uncertainty: Array
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def no_priors() -> Priors:
+    """Nothing known beforehand."""
+    none, empty = np.zeros(0, np.int64), np.zeros(0)
+    return Priors((), none, none, none, np.zeros((0, 0)), empty, empty)
+
+
+@dataclass(frozen=True)
 class Design:
     """What an experiment consists of, in SI units and integer indices.
 
@@ -101,7 +135,7 @@ class Design:
     marking the pose parameters (origin, then rotation about the machine's axes) that fix a frame or that
     turn an artefact of collinear balls about its own axis.
     Balls and positions of length standards stand in the same lists; `is_plate` (artefacts,) tells which
-    artefacts have parameters.
+    artefacts have parameters. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none is.
     """
 
     model: ErrorModel
@@ -126,6 +160,8 @@ class Design:
     lengths: Lengths
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
     point_probe: int = 0
+    priors: Priors = field(default_factory=no_priors)
+    free_offsets: NDArray[np.bool_] | None = None
 
     @property
     def dimension(self) -> int:
@@ -150,13 +186,15 @@ class Design:
     def observations(self) -> int:
         """Number of scalar observations: co-ordinates of all readings of plates, and calibration items."""
         count = int(self.readings.repeats[self.plate_readings].sum())
-        return self.dimension * count + len(self.distances) + len(self.coordinates) + len(self.lengths)
+        calibration = len(self.distances) + len(self.coordinates) + len(self.lengths)
+        return self.dimension * count + calibration + len(self.priors)
 
     @property
     def parameter_count(self) -> int:
-        """Number of free parameters: balls, poses less what is held, and the error model's."""
+        """Number of free parameters: balls, poses less what is held, the error model's, and free probe offsets."""
         poses = int((~self.held[self.plate_positions]).sum())
-        return self.dimension * len(self.plate_balls) + poses + len(self.model.parameters)
+        offsets = 0 if self.free_offsets is None else int(self.free_offsets.sum())
+        return self.dimension * len(self.plate_balls) + poses + len(self.model.parameters) + offsets
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
@@ -167,12 +205,28 @@ class Design:
 
 @dataclass(frozen=True)
 class State:
-    """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a` (parameters,)."""
+    """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a` (parameters,).
+
+    `probes` (l, d) are the probe offsets, None where they are those of the design.
+    """
 
     balls: Array
     rotations: Array
     origins: Array
     a: Array
+    probes: Array | None = None
+
+
+def probe_offsets(design: Design, state: State) -> Array:
+    """Offsets (l, d) of all probes at `state`."""
+    return design.probes if state.probes is None else state.probes
+
+
+def reading_uncertainties(design: Design, readings: Readings) -> Array:
+    """Standard uncertainties (m, d) of each co-ordinate of a single one of each reading's repeats, in metres."""
+    if readings.uncertainty is not None:
+        return readings.uncertainty
+    return np.broadcast_to(design.repeatability, (len(readings), design.dimension))
 
 
 def nominal_state(design: Design) -> State:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .design import Design, Readings, State, locations, nominal_state
-from .estimation.observations import distance_rows
+from .design import Design, Priors, Readings, State, locations, nominal_state, probe_offsets, reading_uncertainties
+from .estimation.observations import distance_rows, prior_values
 from .machines.protocol import Array, ErrorModel
 from .machines.truth import TrueMachine
 
@@ -44,14 +44,14 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
     readings = design.readings.expanded()
-    p = design.probes[readings.probe]
+    p = probe_offsets(design, truth)[readings.probe]
     return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
 
 
 def noisy_readings(design: Design, truth: State, generator: np.random.Generator) -> tuple[Readings, Array]:
-    """The same with normal noise of the design's repeatability added to each co-ordinate."""
+    """The same with normal noise of the readings' standard uncertainties added to each co-ordinate."""
     readings, x = exact_readings(design, truth)
-    return readings, x + generator.standard_normal(x.shape) * design.repeatability
+    return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(design, readings)
 
 
 def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
@@ -89,7 +89,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
 
 
 def noisy_certificate(design: Design, truth: State, generator: np.random.Generator) -> Design:
-    """The design with calibration values drawn about those of the true artefacts."""
+    """The design with calibration values, and priors, drawn about those of the truth."""
     distances, coordinates, lengths = design.distances, design.coordinates, design.lengths
     difference = truth.balls[distances.first] - truth.balls[distances.second]
     difference *= np.arange(design.dimension) < distances.dimensions[:, None]
@@ -105,4 +105,14 @@ def noisy_certificate(design: Design, truth: State, generator: np.random.Generat
             value=true_coordinate + coordinates.uncertainty * generator.standard_normal(len(coordinates)),
         ),
         lengths=replace(lengths, value=lengths.value + lengths.uncertainty * generator.standard_normal(len(lengths))),
+        priors=_drawn(design, truth, generator),
     )
+
+
+def _drawn(design: Design, truth: State, generator: np.random.Generator) -> Priors:
+    """Priors with values drawn about those of the truth."""
+    priors = design.priors
+    if not len(priors):
+        return priors
+    noise = priors.uncertainty * generator.standard_normal(len(priors))
+    return replace(priors, value=prior_values(design, truth) + noise)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import Coordinates, Design, Distances, Lengths, Readings, pose_size
-from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment
+from .design import Coordinates, Design, Distances, Lengths, Priors, Readings, pose_size
+from .experiment.messages import ExperimentError
+from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior
+from .experiment.yamltree import Mark
 from .machines.protocol import Array
 from .machines.settings import build_error_model
 
@@ -48,6 +50,7 @@ def lay_out(experiment: Experiment) -> Design:
     points = experiment.evaluation.points
     if not len(points):
         points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
+    held = _held(readings, balls, ball_artefact, position_artefact, rotations, coordinates, d)
     return Design(
         model=model,
         lower=lower,
@@ -64,13 +67,55 @@ def lay_out(experiment: Experiment) -> Design:
         position_artefact=position_artefact,
         rotations=rotations,
         origins=origins,
-        held=_held(readings, balls, ball_artefact, position_artefact, rotations, coordinates, d),
+        held=held,
         readings=readings,
         distances=distances,
         coordinates=coordinates,
         lengths=lengths,
         points=points,
         point_probe=probe_index[experiment.evaluation.probe],
+        priors=_priors(experiment, held, len(model.parameters)),
+        free_offsets=_free_offsets(experiment),
+    )
+
+
+def _free_offsets(experiment: Experiment) -> NDArray[np.bool_] | None:
+    """Which probe offsets are parameters (l, d)."""
+    if not experiment.offset_uncertainties:
+        return None
+    free = [name in experiment.offset_uncertainties for name in experiment.probes]
+    return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
+
+
+def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) -> Priors:
+    """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
+
+    :raises ExperimentError: a prior is about a pose parameter that is held.
+    """
+    given = list(experiment.priors)
+    places = [place.name for place in experiment.positions]
+    messages = []
+    for i, prior in enumerate(given):
+        if prior.position is not None and held[places.index(prior.position), prior.component]:
+            text = f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other positions'
+            messages.append(prior.mark.message(f"priors[{i}].parameter", text))
+    if messages:
+        raise ExperimentError(messages)
+    nowhere = Mark(str(experiment.source), 0, 0)
+    for name, uncertainty in experiment.offset_uncertainties.items():
+        for axis in np.flatnonzero(np.isfinite(uncertainty)):
+            value, u = float(experiment.probes[name][axis]), float(uncertainty[axis])
+            label = f"probe {name}: offset {'xyz'[axis]}"
+            given.append(Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere))
+    probes = list(experiment.probes)
+    return Priors(
+        tuple(prior.name for prior in given),
+        np.array([-1 if p.position is None else places.index(p.position) for p in given], np.int64),
+        np.array([-1 if p.probe is None else probes.index(p.probe) for p in given], np.int64),
+        np.array([p.component for p in given], np.int64),
+        np.array([p.by_model for p in given], float).reshape(len(given), parameters),
+        np.array([p.value for p in given], float),
+        np.array([p.standard_uncertainty for p in given], float),
     )
 
 
@@ -83,19 +128,26 @@ def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
 def _readings(experiment: Experiment, first_ball: dict[str, int], probe_index: dict[str, int]) -> Readings:
     """All readings in the order of the file, the same one named twice merged into one with more repeats."""
     rows = []
+    uncertainties = [experiment.machine.repeatability]
     for k, place in enumerate(experiment.positions):
         for group in place.readings:
             balls = first_ball[place.artefact] + group.ball_indices
+            # Readings of the same ball with different uncertainties stay apart.
+            kind = 0
+            if group.standard_uncertainty is not None:
+                kind = len(uncertainties)
+                uncertainties.append(group.standard_uncertainty)
             for name in group.probes:
-                columns = np.full((len(balls), 4), (0, k, probe_index[name], group.repeats), np.int64)
+                columns = np.full((len(balls), 5), (0, k, probe_index[name], kind, group.repeats), np.int64)
                 columns[:, 0] = balls
                 rows.append(columns)
     table = np.concatenate(rows)
-    unique, first, inverse = np.unique(table[:, :3], axis=0, return_index=True, return_inverse=True)
-    repeats = np.bincount(inverse.ravel(), weights=table[:, 3], minlength=len(unique)).astype(np.int64)
+    unique, first, inverse = np.unique(table[:, :4], axis=0, return_index=True, return_inverse=True)
+    repeats = np.bincount(inverse.ravel(), weights=table[:, 4], minlength=len(unique)).astype(np.int64)
     order = np.argsort(first, kind="stable")
-    ball, position, probe = unique[order].T
-    return Readings(ball, position, probe, repeats[order])
+    ball, position, probe, kind_of = unique[order].T
+    uncertainty = np.array(uncertainties)[kind_of] if len(uncertainties) > 1 else None
+    return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
 def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordinates:

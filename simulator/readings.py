@@ -12,9 +12,10 @@ import numpy as np
 
 from .design import Design, Integers, Readings
 from .experiment.messages import ExperimentError, Message
-from .experiment.tables import Row, read_table
-from .experiment.yamltree import read_text
+from .experiment.tables import Row, column_names, read_table
+from .experiment.yamltree import Mark
 from .machines.protocol import Array
+from .misreading_messages import refuse_misreadings
 from .settings import hint, listing
 
 AXES = ("x", "y", "z")
@@ -25,12 +26,14 @@ class ObservedReadings:
     """A design whose readings are those of a file, with their scale readings x (readings, d) in metres.
 
     `missing` names planned readings that the file lacks, `unplanned` those in the file that the design did not foresee.
+    `marks` tell where each reading stands; of the mean of several, where the first does.
     """
 
     design: Design
     x: Array
     missing: tuple[str, ...]
     unplanned: tuple[str, ...]
+    marks: tuple[Mark, ...] = ()
 
 
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
@@ -47,30 +50,43 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
 def read_readings(path: Path, design: Design) -> ObservedReadings:
     """Readings of a file as observations of a design.
 
-    The probe's column may be left out where there is one probe only. A reading that stands in the file several
-    times counts as often.
+    The probe's column may be left out where there is one probe only. An optional column u, with a unit as in u_um,
+    states the standard uncertainty of each co-ordinate of a reading; without it a reading has the uncertainty that
+    the design plans for it, and one that is not planned the machine's repeatability. A reading that stands in the
+    file several times counts as often.
 
-    :raises ExperimentError: a wrong table, or names that the design does not know; all of them at once.
+    :raises ExperimentError: a wrong table, names that the design does not know, or readings that cannot be of the
+        ball they name (`estimation.misreadings`); all of a kind at once.
     """
     texts = ["position", "ball", "probe"]
-    if len(design.probe_names) == 1 and "probe" not in read_text(path).partition("\n")[0]:
+    columns, d = column_names(path), design.dimension
+    if len(design.probe_names) == 1 and "probe" not in columns:
         texts.remove("probe")
     messages: list[Message] = []
-    rows = read_table(path, texts, AXES[: design.dimension], problems=messages)
+    rows = read_table(path, texts, AXES[:d], ["u"], problems=messages)
     index, unknown = _indices(rows, design)
+    lengths = np.array([row.lengths for row in rows])
+    if "u" in columns:
+        text = "a standard uncertainty must be above zero; correct it, or leave the column out"
+        messages += [row.mark.message("", text) for row in rows if row.lengths[d] <= 0.0]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
-    x = np.array([row.lengths for row in rows])
+    x, stated = lengths[:, :d], lengths[:, d]
     _refuse_far_outside(rows, x, design)
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
-    missing, unplanned = _compare(design, readings)
+    uncertainty = np.repeat(stated[:, None], d, axis=1) if "u" in columns else _planned_uncertainty(design, readings)
+    readings = replace(readings, uncertainty=uncertainty)
+    missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread):
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
         raise ExperimentError(
             [Message(str(path), 1, 1, "", f"no reading of the balls {names}; read each at least once")]
         )
-    return _combine_standards(design, readings, x, missing, unplanned)
+    marks = tuple(row.mark for row in rows)
+    observed = _combine_standards(design, readings, x, missing, unplanned, marks)
+    refuse_misreadings(observed.design, observed.x, observed.marks)
+    return observed
 
 
 def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Message]]:
@@ -117,28 +133,43 @@ def _key(readings: Readings) -> list[tuple[int, int, int]]:
     return [(row[0], row[1], row[2]) for row in table.tolist()]
 
 
-def _compare(design: Design, readings: Readings) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
+    """Standard uncertainties (m, d) that the design plans for the readings, None where it plans none in particular."""
+    planned = design.readings
+    if planned.uncertainty is None:
+        return None
+    of_key = dict(zip(_key(planned), planned.uncertainty, strict=True))
+    return np.array([of_key.get(key, design.repeatability) for key in _key(readings)])
+
+
+def _compare(design: Design, readings: Readings, lines: list[int]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, found = _key(design.readings.expanded()), _key(readings)
 
     def name(key: tuple[int, int, int]) -> str:
         position, ball, probe = key
         return f"{design.position_names[position]}: ball {design.ball_label(ball)} with {design.probe_names[probe]}"
 
-    def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> tuple[str, ...]:
+    def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> list[int]:
         left = Counter(others)
-        names = []
-        for key in these:
+        surplus = []
+        for i, key in enumerate(these):
             if left[key]:
                 left[key] -= 1
             else:
-                names.append(name(key))
-        return tuple(names)
+                surplus.append(i)
+        return surplus
 
-    return without(planned, found), without(found, planned)
+    missing = tuple(name(planned[i]) for i in without(planned, found))
+    return missing, tuple(f"{name(found[i])} (line {lines[i]})" for i in without(found, planned))
 
 
 def _combine_standards(
-    design: Design, readings: Readings, x: Array, missing: tuple[str, ...], unplanned: tuple[str, ...]
+    design: Design,
+    readings: Readings,
+    x: Array,
+    missing: tuple[str, ...],
+    unplanned: tuple[str, ...],
+    marks: tuple[Mark, ...],
 ) -> ObservedReadings:
     """Take the mean of what a length standard's repeats read, and let its lengths point to it.
 
@@ -172,5 +203,11 @@ def _combine_standards(
     )
     chosen = np.concatenate([plate, first])
     combined = replace(readings.select(chosen), repeats=np.concatenate([np.ones(len(plate), np.int64), repeats]))
+    if readings.uncertainty is not None:
+        variance = readings.uncertainty**2
+        # The mean is a plain one, whatever the uncertainties of its parts.
+        of_means = np.sqrt([variance[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
+        combined = replace(combined, uncertainty=np.concatenate([readings.uncertainty[plate], of_means]))
     observed = replace(design, readings=combined, lengths=lengths)
-    return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned)
+    chosen_marks = tuple(marks[i] for i in chosen)
+    return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned, chosen_marks)

@@ -5,8 +5,14 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .common import add_file, add_json
+from .compare import add_pairs
+
+if TYPE_CHECKING:
+    from simulator.experiment.model import Experiment
+    from simulator.readings import ObservedReadings
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -27,6 +33,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--monomials", action="store_true", help="report error functions by the coefficients of t, t^2, ... on [0, 1]"
     )
+    parser.add_argument(
+        "--estimator",
+        choices=("full", "distances", "cresto", "kruth"),
+        default="full",
+        help="full (default), or one that uses distances alone and estimates the machine's parameters only",
+    )
+    add_pairs(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -46,6 +59,8 @@ def run(options: Namespace) -> int:
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
         if names:
             print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
+    if options.estimator != "full":
+        return _run_rival(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
     if options.json:
         print_json([fit_data(result)])
@@ -65,5 +80,24 @@ def run(options: Namespace) -> int:
     if not result.verdict.as_expected:
         expected = result.verdict.expected or 0
         print(f"rank deficiency {result.verdict.deficiency} where the file expects {expected}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _run_rival(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:
+    """Fit with an estimator of distances; 1 if it did not converge or leaves parameters open."""
+    from ..estimators import fit_rival, rival_fit_data, rival_fit_lines
+    from .common import print_json
+
+    result = fit_rival(experiment, observed, options.estimator, options.pairs, options.across_probes, options.monomials)
+    if options.json:
+        print_json([rival_fit_data(result)])
+    else:
+        print("\n".join(rival_fit_lines(result)))
+    if result.solution.status != "converged":
+        print(f"the estimate has {result.solution.status}; see the record of iterations", file=sys.stderr)
+        return 1
+    if result.solution.deficiency:
+        print(f"rank deficiency {result.solution.deficiency}: what is undetermined is left out", file=sys.stderr)
         return 1
     return 0

@@ -18,7 +18,14 @@ import numpy as np
 from ..design import Design, Integers, State
 from ..machines.protocol import Array
 from ..threads import single_threaded
-from .observations import coordinate_rows, distance_rows, length_rows, reading_blocks
+from .observations import (
+    coordinate_rows,
+    distance_rows,
+    length_offset_rows,
+    length_rows,
+    prior_rows,
+    reading_blocks,
+)
 from .parameters import SharedLayout
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
@@ -84,9 +91,16 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     if len(design.lengths):
         residual, derivative = length_rows(design, state, x)
         rows = np.zeros((len(residual), s + 1))
+        if design.free_offsets is not None:
+            rows[:, :-1] = length_offset_rows(design, layout, state, x)
         rows[:, layout.model], rows[:, -1] = derivative, residual
         total += float(residual @ residual)
         shared = np.concatenate([shared, rows])
+
+    if len(design.priors):
+        residual, derivative = prior_rows(design, layout, state)
+        total += float(residual @ residual)
+        shared = np.concatenate([shared, np.column_stack([derivative, residual])])
 
     is_kept = np.isin(balls, kept)
     kept = balls[is_kept]
@@ -181,6 +195,8 @@ def _batches(
             index = chosen[which.ravel()]
             rows_of = reading_blocks(design, state, readings.select(index), None if x is None else x[index])
             columns = layout.pose_columns[readings.position[index]]
+            if rows_of.by_offset is not None:
+                columns = np.concatenate([columns, layout.offset_columns[readings.probe[index]]], axis=1)
             _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout.model, present)
         if c:
             member = np.arange(c) < extra[batch][:, None]
@@ -200,7 +216,10 @@ def _fill(by_ball, rest, blocks, columns, model, present) -> None:  # type: igno
     flat = rest.reshape(b, m, d, -1)
     ball, place = np.nonzero(present)
     used = columns.reshape(b, m, -1)[ball, place]
-    by_pose = blocks.by_pose.reshape(b, m, d, -1)[ball, place]
+    by_column = blocks.by_pose
+    if blocks.by_offset is not None:
+        by_column = np.concatenate([by_column, blocks.by_offset], axis=2)
+    by_pose = by_column.reshape(b, m, d, -1)[ball, place]
     for j in range(columns.shape[1]):
         free = used[:, j] >= 0
         flat[ball[free], place[free], :, used[free, j]] = by_pose[free, :, j]

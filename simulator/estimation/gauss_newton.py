@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..design import Design, State
+from ..design import Design, State, probe_offsets
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from .covariance import Spectrum, _solve_balls, no_spectrum, spectrum
@@ -77,7 +77,7 @@ def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSe
         shared, balls = newton_step(design, factor, found)
         size = max(float(np.abs(shared / layout.scale).max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
         length = float(np.sqrt(shared @ shared + (balls**2).sum()))
-        state = moved(design, state, layout.pose_columns, shared, balls, layout.model)
+        state = moved(design, state, layout.pose_columns, shared, balls, layout.model, layout.offset_columns)
         rounding = size > 0.5 * previous and size < 1e-9
         if size < settings.smallest_step or rounding:
             status = "converged"
@@ -110,14 +110,27 @@ def _shared_step(factor: Factor, found: Spectrum) -> Array:
     return np.asarray(-(found.root @ (left.T @ factor.side)))
 
 
-def moved(design: Design, state: State, pose_columns: np.ndarray, shared: Array, balls: Array, model: slice) -> State:
+def moved(
+    design: Design,
+    state: State,
+    pose_columns: np.ndarray,
+    shared: Array,
+    balls: Array,
+    model: slice,
+    offset_columns: np.ndarray | None = None,
+) -> State:
     """The state after a step; rotations are turned about the machine's axes and stay orthogonal."""
     d = design.dimension
     poses = np.where(pose_columns >= 0, shared[np.maximum(pose_columns, 0)], 0.0)
     turn = rotation_from_vector(poses[:, d:])
+    probes = state.probes
+    if offset_columns is not None and design.free_offsets is not None:
+        step = np.where(offset_columns >= 0, shared[np.maximum(offset_columns, 0)], 0.0)
+        probes = probe_offsets(design, state) + step
     return State(
         state.balls + balls,
         turn @ state.rotations,
         state.origins + poses[:, :d],
         state.a + shared[model],
+        probes,
     )

@@ -29,6 +29,17 @@ def initial_state(design: Design, x: Array) -> State:
     for artefact in np.flatnonzero(design.is_plate):
         members = np.flatnonzero(design.ball_artefact == artefact)
         places = [int(k) for k in np.flatnonzero(design.position_artefact == artefact)]
+        if len(members) == 1:
+            # A single ball has a place in each position and no turn.
+            arm = np.einsum("kij,j->ki", rotations[places], balls[members[0]])
+            there = seen[places, members[0]]
+            origins[places] = np.where(np.isnan(there), origins[places], there - arm)
+            held = [k for k in places if design.held[k, :d].all()]
+            if held:
+                origins[held] = design.origins[held]
+                first = rotations[held[0]].T @ (seen[held[0], members[0]] - origins[held[0]])
+                balls[members[0]] = np.where(np.isnan(first), balls[members[0]], first)
+            continue
         shape, poses = _assemble(seen[places][:, members], design.balls[members], d)
         turn, shift = _into_frame(design, shape, poses, places, members)
         balls[members] = np.where(np.isnan(shape), design.balls[members], shape @ turn.T + shift)

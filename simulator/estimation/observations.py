@@ -11,18 +11,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design, Readings, State, locations, pose_size
-from ..machines.protocol import Array
+from ..design import Design, Readings, State, locations, pose_size, probe_offsets, reading_uncertainties
+from ..geometry.motions import vector_from_rotation, vector_rate
+from ..machines.protocol import Array, ErrorModel
+from .parameters import SharedLayout
+
+# Metres: of the size of probe offsets.
+OFFSET_STEP = 0.1
 
 
 @dataclass(frozen=True)
 class ReadingBlocks:
-    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m, d, n)."""
+    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m, d, n).
+
+    `by_offset` (m, d, d) is the derivative by the probe's offset, None where no offset is a parameter.
+    """
 
     residual: Array
     by_ball: Array
     by_pose: Array
     by_model: Array
+    by_offset: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -35,7 +44,21 @@ class BallRows:
 
 def expected_readings(design: Design, state: State, readings: Readings) -> Array:
     """Scale readings (m, d) of a machine without errors, true location less probe offset."""
-    return locations(design, state, readings) - design.probes[readings.probe]
+    return locations(design, state, readings) - probe_offsets(design, state)[readings.probe]
+
+
+def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
+    """Derivative (m, d, d) of the error by the probe offset: identity plus what the machine's rotations add.
+
+    A rotation acts on the offset linearly, so that a central difference over a whole machine arm is exact to rounding
+    for every model of rigid axes.
+    """
+    columns = []
+    for axis in range(x.shape[1]):
+        step = np.zeros(x.shape[1])
+        step[axis] = OFFSET_STEP
+        columns.append((model.error(x, a, p + step) - model.error(x, a, p - step)) / (2.0 * OFFSET_STEP))
+    return np.stack(columns, axis=2)
 
 
 def rotation_sensitivity(arm: Array) -> Array:
@@ -56,13 +79,13 @@ def rotation_sensitivity(arm: Array) -> Array:
 
 def reading_weights(design: Design, readings: Readings) -> Array:
     """Reciprocal standard uncertainties (m, d) of the mean of each reading's repeats."""
-    return np.asarray(np.sqrt(readings.repeats)[:, None] / design.repeatability)
+    return np.asarray(np.sqrt(readings.repeats)[:, None] / reading_uncertainties(design, readings))
 
 
 def reading_blocks(design: Design, state: State, readings: Readings, x: Array | None) -> ReadingBlocks:
     """Rows of readings of plates, with scale readings x (m, d), or error-free ones where x is None."""
     d = design.dimension
-    p = design.probes[readings.probe]
+    p = probe_offsets(design, state)[readings.probe]
     rotation = state.rotations[readings.position]
     arm = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
     true = arm + state.origins[readings.position]
@@ -77,7 +100,10 @@ def reading_blocks(design: Design, state: State, readings: Readings, x: Array | 
     by_pose = np.zeros((len(x), d, pose_size(d)), np.result_type(arm, float))
     by_pose[:, range(d), range(d)] = -weight
     by_pose[:, :, d:] = -weight[:, :, None] * rotation_sensitivity(arm)
-    return ReadingBlocks(residual, -weight[:, :, None] * rotation, by_pose, by_model)
+    by_offset = None
+    if design.free_offsets is not None:
+        by_offset = weight[:, :, None] * offset_sensitivity(design.model, x, state.a, p)
+    return ReadingBlocks(residual, -weight[:, :, None] * rotation, by_pose, by_model, by_offset)
 
 
 def coordinate_rows(design: Design, state: State) -> BallRows:
@@ -104,15 +130,37 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
     `x` (readings, d) holds the scale readings of all readings, or is None for an error-free machine; the
     length between corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
     """
+    residual, unit, ends, weight = _length_residuals(design, state, x)
+    jacobians = [design.model.jacobian(points, state.a, p) for points, p in ends]
+    return residual, np.einsum("md,mdn->mn", unit, jacobians[0] - jacobians[1]) * weight[:, None]
+
+
+def length_offset_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
+    """Derivative (m, s) of the same residuals by the shared parameters, those of the probe offsets only."""
     given = design.lengths
-    corrected, jacobian, noise = [], [], []
+    _, unit, ends, weight = _length_residuals(design, state, x)
+    rows = np.zeros((len(given), len(layout) + 1))
+    for sign, chosen, (points, p) in zip((1.0, -1.0), (given.first, given.second), ends, strict=True):
+        by_offset = np.einsum("md,mdj->mj", unit, offset_sensitivity(design.model, points, state.a, p))
+        # Held offsets go to the extra column.
+        columns = layout.offset_columns[design.readings.probe[chosen]]
+        np.add.at(rows, (np.arange(len(given))[:, None], columns), sign * weight[:, None] * by_offset)
+    return rows[:, :-1]
+
+
+def _length_residuals(
+    design: Design, state: State, x: Array | None
+) -> tuple[Array, Array, list[tuple[Array, Array]], Array]:
+    """Residuals (m,), directions (m, d), points and offsets of both ends, and weights (m,) of known lengths."""
+    given = design.lengths
+    corrected, ends, noise = [], [], []
     for chosen in (given.first, given.second):
         readings = design.readings.select(chosen)
-        p = design.probes[readings.probe]
+        p = probe_offsets(design, state)[readings.probe]
         points = expected_readings(design, state, readings) if x is None else x[chosen]
         corrected.append(points + (p if x is None else design.model.error(points, state.a, p)))
-        jacobian.append(design.model.jacobian(points, state.a, p))
-        noise.append(design.repeatability**2 / readings.repeats[:, None])
+        ends.append((points, p))
+        noise.append(reading_weights(design, readings) ** -2)
     difference = corrected[0] - corrected[1]
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected[:, None], given.direction, unit)
@@ -120,5 +168,42 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
     # Along the nominal direction, so that weights stay what they are while parameters change.
     scatter = np.einsum("md,md->m", given.direction**2, noise[0] + noise[1]) * given.with_repeatability
     weight = 1.0 / np.sqrt(given.uncertainty**2 + scatter)
-    derivative = np.einsum("md,mdn->mn", unit, jacobian[0] - jacobian[1]) * weight[:, None]
-    return weight * (length - given.value), derivative
+    return weight * (length - given.value), unit, ends, weight
+
+
+def prior_values(design: Design, state: State) -> Array:
+    """Values (m,) at `state` of what the design's priors are about."""
+    given = design.priors
+    of_poses = _pose_values(design, state)[given.position, given.component]
+    axis = np.minimum(given.component, design.dimension - 1)
+    of_probes = probe_offsets(design, state)[given.probe, axis]
+    of_model = given.by_model @ state.a if len(given) else np.zeros(0)
+    return np.where(given.position >= 0, of_poses, np.where(given.probe >= 0, of_probes, of_model))
+
+
+def _pose_values(design: Design, state: State) -> Array:
+    """Origins and rotations against the nominal pose (k, pose size)."""
+    turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
+    return np.concatenate([state.origins, turned], axis=1)
+
+
+def prior_rows(design: Design, layout: SharedLayout, state: State) -> tuple[Array, Array]:
+    """Rows of what is known beforehand: residual (m,) and derivative by the shared parameters (m, s)."""
+    given, d = design.priors, design.dimension
+    derivative = np.zeros((len(given), len(layout)))
+    if not len(given):
+        return np.zeros(0), derivative
+    derivative[:, layout.model] = given.by_model
+    rows = np.flatnonzero(given.probe >= 0)
+    derivative[rows, layout.offset_columns[given.probe[rows], given.component[rows]]] = 1.0
+    rows = np.flatnonzero((given.position >= 0) & (given.component < d))
+    derivative[rows, layout.pose_columns[given.position[rows], given.component[rows]]] = 1.0
+    rows = np.flatnonzero((given.position >= 0) & (given.component >= d))
+    place = given.position[rows]
+    rate = vector_rate(_pose_values(design, state)[place, d:])[np.arange(len(rows)), given.component[rows] - d]
+    columns = layout.pose_columns[place, d:]
+    # What is held does not move.
+    row, turn = np.nonzero(columns >= 0)
+    derivative[rows[row], columns[row, turn]] = rate[row, turn]
+    weight = 1.0 / given.uncertainty
+    return weight * (prior_values(design, state) - given.value), weight[:, None] * derivative

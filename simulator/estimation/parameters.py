@@ -27,17 +27,18 @@ def pose_parameter_names(dimension: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class SharedLayout:
-    """Columns of the shared parameters: the free parameters of every pose, then the error model's.
+    """Columns of the shared parameters: the free ones of every pose, the error model's, the free probe offsets.
 
     `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or belongs to a
-    length standard. `scale` (columns,) is the size of each parameter, in its own unit, that moves a point
-    somewhere by about one metre.
+    length standard, and `offset_columns` (l, d) the same for probe offsets. `scale` (columns,) is the size of each
+    parameter, in its own unit, that moves a point somewhere by about one metre.
     """
 
     parameters: tuple[Parameter, ...]
     pose_columns: Integers
     model: slice
     scale: Array
+    offset_columns: Integers
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -74,5 +75,12 @@ def shared_layout(design: Design) -> SharedLayout:
             )
     start = len(parameters)
     parameters += design.model.parameters
+    model = slice(start, len(parameters))
+    offsets = np.full(design.probes.shape, -1, np.int64)
+    for probe, axis in np.argwhere(design.free_offsets) if design.free_offsets is not None else ():
+        offsets[probe, axis] = len(parameters)
+        name, letter = design.probe_names[probe], AXIS_NAMES[axis]
+        meaning = f"offset {letter} of probe {name}"
+        parameters.append(Parameter(f"probe {name}: offset {letter}", "m", "offset", meaning))
     scale = np.array([1.0 / p.effect for p in parameters])
-    return SharedLayout(tuple(parameters), columns, slice(start, len(parameters)), scale)
+    return SharedLayout(tuple(parameters), columns, model, scale, offsets)

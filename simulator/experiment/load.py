@@ -11,8 +11,9 @@ from .machine import resolve_evaluation, resolve_machine
 from .messages import ExperimentError, Message
 from .model import Experiment
 from .placements import resolve_position
+from .priors import resolve_priors
 from .problems import Problems, written_count
-from .references import resolve_probes, resolve_references
+from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import in_variants, variant_trees
 from .yamltree import Mapping, Node, read_tree
@@ -82,6 +83,8 @@ def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None
         if calibration is not None:
             calibrations.append(calibration)
             check_calibration_read(calibration, ("calibration", i), positions, position_count, references)
+    priors = resolve_priors(sections, machine, positions, references)
+    offset_uncertainties = resolve_offset_uncertainties(sections, references)
     evaluation = resolve_evaluation(sections, machine, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
@@ -103,6 +106,8 @@ def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None
         sigma=sections.get("sigma"),
         expected_rank_deficiency=sections.get("expected_rank_deficiency"),
         seed=sections.get("seed"),
+        priors=priors,
+        offset_uncertainties=offset_uncertainties,
     )
     return experiment, []
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..quantities import LengthFunction
+from .yamltree import Mark
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -44,12 +45,14 @@ class ReadingGroup:
     """Balls read with the same probes: each ball with each probe, ``repeats`` times.
 
     ``probes``: names. ``balls``: names, ``ball_indices``: (k,) the same as indices into the layout.
+    ``standard_uncertainty``: (d,) metres of each reading, None where it is the machine's repeatability.
     """
 
     probes: tuple[str, ...]
     balls: tuple[str, ...]
     ball_indices: Indices
     repeats: int
+    standard_uncertainty: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +108,25 @@ Calibration = DistanceCalibration | CoordinateCalibration
 
 
 @dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known beforehand of a parameter, in metres, radians or a ratio.
+
+    ``position`` and ``component``: a pose parameter, by its place among origin and rotation. ``probe`` and
+    ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of the error model's
+    parameters. ``mark``: where it is stated.
+    """
+
+    name: str
+    position: str | None
+    probe: str | None
+    component: int
+    by_model: Floats
+    value: float
+    standard_uncertainty: float
+    mark: Mark
+
+
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, and the probe."""
 
@@ -118,7 +140,8 @@ class Experiment:
 
     ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres. ``layouts``:
     name of an artefact → its balls. ``target_accuracy`` and ``expected_rank_deficiency`` are None where
-    nothing was stated.
+    nothing was stated. ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
+    by the probe's name, infinite where the offset is unknown; other offsets are as stated.
     """
 
     title: str
@@ -138,6 +161,8 @@ class Experiment:
     sigma: Literal["estimated", "given"]
     expected_rank_deficiency: int | None
     seed: int
+    priors: tuple[Prior, ...] = ()
+    offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:

@@ -10,11 +10,11 @@ from ..geometry.artefacts import BallLayout
 from ..geometry.positions import IN_PLANE_AXES, Axis, FreePlacement, PlanePlacement, Pose, nominal_pose
 from .messages import Steps
 from .model import Position, ReadingGroup
-from .references import References
-from .sections import PositionSettings
+from .references import References, lengths_per_axis
+from .sections import PositionSettings, ReadingSettings
 
 PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
-READING_KEYS = ("probes", "balls", "repeats")
+READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 
 
 def resolve_position(settings: PositionSettings, steps: Steps, references: References) -> Position | None:
@@ -35,7 +35,14 @@ def _readings(
     settings: PositionSettings, steps: Steps, layout: BallLayout | None, references: References
 ) -> tuple[ReadingGroup, ...] | None:
     if settings.readings is None:
-        group = _group(settings.probes, settings.balls or "all", settings.repeats or 1, steps, layout, references)
+        # What was validated with the position is not validated again.
+        only = ReadingSettings.model_construct(
+            probes=settings.probes,
+            balls=settings.balls or "all",
+            repeats=settings.repeats or 1,
+            standard_uncertainty=settings.standard_uncertainty,
+        )
+        group = _group(only, steps, layout, references)
         return (group,) if group else None
     complete = True
     for key in READING_KEYS:
@@ -46,33 +53,29 @@ def _readings(
                 of_key=True,
             )
             complete = False
-    groups = [
-        _group(group.probes, group.balls, group.repeats, (*steps, "readings", i), layout, references)
-        for i, group in enumerate(settings.readings)
-    ]
+    groups = [_group(group, (*steps, "readings", i), layout, references) for i, group in enumerate(settings.readings)]
     found = tuple(group for group in groups if group is not None)
     return found if complete and len(found) == len(groups) else None
 
 
 def _group(
-    probes: tuple[str, ...] | None,
-    balls: Literal["all"] | tuple[str, ...],
-    repeats: int,
-    steps: Steps,
-    layout: BallLayout | None,
-    references: References,
+    settings: ReadingSettings, steps: Steps, layout: BallLayout | None, references: References
 ) -> ReadingGroup | None:
-    probe_names = references.probe_names(probes, steps)
+    balls = settings.balls
+    probe_names = references.probe_names(settings.probes, steps)
+    uncertainty, is_right = lengths_per_axis(
+        settings.standard_uncertainty, (*steps, "standard_uncertainty"), references
+    )
     if layout is None:
         return None
     names = layout.names if balls == "all" else balls
     indices = (
         np.arange(len(layout.names)) if balls == "all" else references.ball_indices(names, layout, (*steps, "balls"))
     )
-    if probe_names is None or indices is None:
+    if probe_names is None or indices is None or not is_right:
         return None
     indices.setflags(write=False)
-    return ReadingGroup(probe_names, tuple(names), indices, repeats)
+    return ReadingGroup(probe_names, tuple(names), indices, settings.repeats, uncertainty)
 
 
 def _placement(

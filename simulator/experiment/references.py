@@ -15,6 +15,7 @@ from ..settings import hint, listing
 from .messages import ExperimentError, Steps
 from .model import Floats, Indices
 from .problems import Problems, written, written_keys, written_text
+from .sections import ProbeSettings
 from .structure import Sections
 from .tables import read_table
 from .yamltree import Mapping, Node
@@ -135,7 +136,8 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Floa
             problems.add(("probes",), text)
         return {DEFAULT_PROBE: frozen(np.zeros(dimension))} if dimension == 2 else {}
     offsets = {}
-    for name, offset in sections.entries("probes").items():
+    for name, settings in sections.entries("probes").items():
+        offset = settings.offset if isinstance(settings, ProbeSettings) else settings
         if references.require(
             dimension in (None, len(offset)),
             ("probes", name),
@@ -143,6 +145,44 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Floa
         ):
             offsets[str(name)] = frozen(offset)
     return offsets
+
+
+def resolve_offset_uncertainties(sections: Sections, references: References) -> dict[str, Floats]:
+    """Return standard uncertainties (d,) of the offsets that are estimated, infinite where they are unknown."""
+    problems, dimension = references.problems, references.dimension
+    listed = {str(name): s for name, s in sections.entries("probes").items() if isinstance(s, ProbeSettings)}
+    named = [name for name, settings in listed.items() if settings.reference]
+    for name in named[1:]:
+        problems.add(("probes", name, "reference"), f'"{named[0]}" is the reference already; remove one of the two')
+    reference = named[0] if named else references.probes[0] if references.probes else ""
+    found: dict[str, Floats] = {}
+    for name, settings in listed.items():
+        steps: Steps = ("probes", name)
+        stated = settings.standard_uncertainty
+        if settings.unknown and stated is not None:
+            problems.add((*steps, "unknown"), 'does not go with "standard_uncertainty"; remove one of the two', True)
+        if settings.reference and (settings.unknown or stated is not None):
+            key = "unknown" if settings.unknown else "standard_uncertainty"
+            problems.add((*steps, key), "the offset of the reference is held as stated; remove it", True)
+        uncertainty, is_right = lengths_per_axis(stated, (*steps, "standard_uncertainty"), references)
+        if settings.unknown and dimension is not None:
+            uncertainty = frozen([np.inf] * dimension)
+        if uncertainty is not None and is_right and name != reference:
+            found[name] = uncertainty
+    return found
+
+
+def lengths_per_axis(stated: Any, steps: Steps, references: References) -> tuple[Floats | None, bool]:
+    """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is right."""
+    dimension = references.dimension
+    if stated is None or dimension is None:
+        return None, True
+    if isinstance(stated, float):
+        return frozen([stated] * dimension), True
+    listed = stated if isinstance(stated, tuple) else (stated.x, stated.y, stated.z)
+    given = tuple(length for length in listed if length is not None)
+    text = f"has {len(given)} axes, but the experiment has {dimension}; give one length for all, or {dimension}"
+    return frozen(given), references.require(len(given) == dimension, steps, text)
 
 
 def frozen(values: Any) -> Floats:

@@ -68,6 +68,14 @@ class SomeAxisLengthsSettings(Settings):
 Edges = Annotated[tuple[PositiveLength, ...], Field(min_length=2, max_length=3)]
 
 
+LengthPerAxis = Annotated[
+    Annotated[PositiveLength, Tag("<one>")]
+    | Annotated[Edges, Tag("<list>")]
+    | Annotated[AxisLengthsSettings, Tag("<mapping>")],
+    FORM,
+]
+
+
 class MachineSettings(Settings):
     """The machine: where it can measure and how well it repeats."""
 
@@ -77,12 +85,9 @@ class MachineSettings(Settings):
         | Annotated[VolumeSettings, Tag("<one>")],
         FORM,
     ] = Field(description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]; two axes: 2-D")
-    repeatability: Annotated[
-        Annotated[PositiveLength, Tag("<one>")]
-        | Annotated[Edges, Tag("<list>")]
-        | Annotated[AxisLengthsSettings, Tag("<mapping>")],
-        FORM,
-    ] = Field(description="standard uncertainty of a reading: for every co-ordinate, or one per axis")
+    repeatability: LengthPerAxis = Field(
+        description="standard uncertainty of a reading: for every co-ordinate, or one per axis"
+    )
 
 
 class InPlaneSettings(Settings):
@@ -114,6 +119,9 @@ class ReadingSettings(Settings):
     probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")
     balls: BallSelection = Field("all", description="all, or a list of balls")
     repeats: Count = Field(1, description="how often every ball is read with every probe")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None, description="of each of these readings, one length or per axis; default: machine.repeatability"
+    )
 
 
 class PositionSettings(Settings):
@@ -132,8 +140,11 @@ class PositionSettings(Settings):
     probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")
     balls: BallSelection | None = Field(None, description="all (default), or a list of balls")
     repeats: Count | None = Field(None, description="how often every ball is read with every probe; default 1")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None, description="of each reading there, one length or per axis; default: machine.repeatability"
+    )
     readings: Annotated[tuple[ReadingSettings, ...], Field(min_length=1)] | None = Field(
-        None, description="groups of readings, instead of probes, balls and repeats"
+        None, description="groups of readings, instead of probes, balls, repeats and standard_uncertainty"
     )
 
 
@@ -201,6 +212,40 @@ class CoordinatesSettings(Settings):
 CalibrationSettings = Annotated[DistancesSettings | CoordinatesSettings, Field(discriminator="kind")]
 
 
+class PriorSettings(Settings):
+    """What is known beforehand of a parameter."""
+
+    parameter: Text = Field(
+        description="name as fit reports it, such as EXX[1], EXX t^2 or z low: rotation x; or an error function such "
+        "as EAX, for each of its coefficients"
+    )
+    value: Text | None = Field(
+        None, description="value with unit; default 0, of a position's origin the nominal co-ordinate"
+    )
+    standard_uncertainty: Text = Field(description="standard uncertainty of the value, with unit")
+
+
+class ProbeSettings(Settings):
+    """A probe whose offset is estimated."""
+
+    offset: Coordinates = Field(description="offset from the machine's reference point, as far as it is known")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None, description="of the stated offset, one length or per axis; the offset is then estimated"
+    )
+    unknown: bool = Field(False, description="whether the offset is estimated without being known beforehand")
+    reference: bool = Field(
+        False, description="whether this probe's offset is held, which says what others are relative to; default: first"
+    )
+
+
+AnyProbe = Annotated[
+    Annotated[Coordinates, Tag("<list>")]
+    | Annotated[ProbeSettings, Tag("<mapping>")]
+    | Annotated[Coordinates, Tag("<one>")],
+    FORM,
+]
+
+
 class PointsSettings(Settings):
     """Evaluation points that are not listed: drawn at random, or read from a file."""
 
@@ -235,8 +280,10 @@ class ExperimentSettings(Settings):
     true_machine: TrueMachineSettings = Field(
         default_factory=ZeroSettings, description="the errors that simulated readings have; default zero"
     )
-    probes: Annotated[dict[Name, Coordinates], Field(min_length=1)] | None = Field(
-        None, description="name → offset of the probe from the machine's reference point; optional in 2-D"
+    probes: Annotated[dict[Name, AnyProbe], Field(min_length=1)] | None = Field(
+        None,
+        description="name → offset of the probe from the machine's reference point, or {offset: …, "
+        "standard_uncertainty: …} where it is estimated; optional in 2-D",
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
         description="name → artefact: grid, square, balls or two_spheres"
@@ -246,6 +293,9 @@ class ExperimentSettings(Settings):
     )
     calibration: tuple[CalibrationSettings, ...] = Field(
         (), description="what is known of the artefacts: distances, coordinates; may be empty"
+    )
+    priors: Annotated[tuple[PriorSettings, ...], Field(min_length=1)] | None = Field(
+        None, description="what is known beforehand of machine errors and poses"
     )
     evaluation: EvaluationSettings | None = Field(None, description="where the machine's uncertainty is evaluated")
     target_accuracy: LengthFunction | None = Field(

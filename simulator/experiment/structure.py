@@ -8,20 +8,21 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from ..geometry.artefacts import AnyArtefactSettings, Coordinates
+from ..geometry.artefacts import AnyArtefactSettings
 from ..settings import describe, hint, nearest
 from .messages import Steps
 from .problems import Problems
-from .sections import CalibrationSettings, ExperimentSettings, PositionSettings
+from .sections import AnyProbe, CalibrationSettings, ExperimentSettings, PositionSettings, PriorSettings
 from .wording import explain
 from .yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
 ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
-    "probes": (Mapping, Coordinates),
+    "probes": (Mapping, AnyProbe),
     "artefacts": (Mapping, AnyArtefactSettings),
     "positions": (Sequence, PositionSettings),
     "calibration": (Sequence, CalibrationSettings),
+    "priors": (Sequence, PriorSettings),
 }
 
 

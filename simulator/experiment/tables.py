@@ -59,8 +59,7 @@ def read_table(
         mark = Mark(file, number, 1)
         cells = _cells(line)
         if cells is None or len(cells) != len(places):
-            what = "a quotation mark too many" if cells is None else f"{len(cells)} columns instead of {len(places)}"
-            messages.append(mark.message("", f"{what}; write one line per row, its columns separated by commas"))
+            messages.append(mark.message("", _wrong_count(line, cells, len(places))))
             continue
         by_name = {name: cells[i] for i, name in enumerate(places)}
         row_lengths = []
@@ -69,7 +68,7 @@ def read_table(
             try:
                 row_lengths.append(float(exact_number(cell) * factors.get(name, Fraction(1))))
             except QuantityError as error:
-                messages.append(Mark(file, number, column).message("", str(error)))
+                messages.append(Mark(file, number, column).message("", _wrong_number(cell, name) or str(error)))
                 row_lengths.append(float("nan"))
         for name in texts:
             if not by_name[name][1]:
@@ -82,6 +81,38 @@ def read_table(
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
+
+
+def column_names(path: Path) -> tuple[str, ...]:
+    """Names of a table's columns without their units; none where the file has no line.
+
+    :raises ExperimentError: the file cannot be read.
+    """
+    lines = (line for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#"))
+    cells = _cells(next(lines, "")) or []
+    return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
+
+
+def _wrong_number(cell: str, name: str) -> str:
+    """Say what is wrong with a cell that is nearly a number, or nothing."""
+    if not cell:
+        return f"no {name}; write a number, or remove the line"
+    if re.fullmatch(r"[+-]?[0-9]+,[0-9]+", cell):
+        return f'"{cell}" has a decimal comma; write {cell.replace(",", ".")}'
+    return ""
+
+
+def _wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -> str:
+    """Say what is wrong with a line that does not have as many cells as there are columns."""
+    if cells is None:
+        return "a quotation mark too many; write one line per row, its columns separated by commas"
+    what = f"{len(cells)} columns instead of {expected}"
+    digits = [bool(re.fullmatch(r"[+-]?[0-9]+", text)) for _, text in cells]
+    if len(cells) > expected and any(a and b for a, b in zip(digits, digits[1:], strict=False)):
+        return f"{what}; if a comma is meant as the decimal point, write a point, as in 500.0003"
+    if len(cells) == 1 and re.search("[;\t]", line):
+        return f"{what}; separate them by commas"
+    return f"{what}; write one line per row, its columns separated by commas"
 
 
 def _columns(

@@ -19,7 +19,7 @@ from ..settings import Settings, listing
 MOST_BALLS = 40_000
 COINCIDENT = 1e-9
 
-PairSet = Literal["corner sides", "corner diagonals", "corners", "neighbours", "all"]
+PairSet = Literal["corner sides", "corner diagonals", "corners", "neighbours", "braced", "all"]
 Pairs = tuple[tuple[int, int], ...]
 
 
@@ -203,11 +203,22 @@ class TwoSpheresSettings(ArtefactSettings):
         )
 
 
+class SphereSettings(ArtefactSettings):
+    """A single ball, as the reference sphere that probes are qualified with; named 1."""
+
+    kind: Literal["sphere"] = Field(description="a single ball, as the reference sphere of probes")
+
+    def layout(self) -> BallLayout:
+        """Return one ball at the origin of its own frame."""
+        return BallLayout(("1",), _frozen([(0.0, 0.0, 0.0)]))
+
+
 ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
     "grid": GridSettings,
     "square": SquareSettings,
     "balls": BallsSettings,
     "two_spheres": TwoSpheresSettings,
+    "sphere": SphereSettings,
 }
 
 if TYPE_CHECKING:
@@ -239,15 +250,23 @@ def _rectangle(places: list[tuple[int, int]], shape: tuple[int, int], size: tupl
         for neighbour in ((row, column + 1), (row + 1, column))
         if neighbour in index
     )
+    sets: dict[str, Pairs] = {
+        "corner sides": sides,
+        "corner diagonals": diagonals,
+        "corners": sides + diagonals,
+        "neighbours": neighbours,
+    }
+    if len(places) == columns * rows:
+        # From the upper left to the lower right; with these the net of distances is rigid in its plane.
+        braces = tuple(
+            (index[row + 1, column], index[row, column + 1]) for row in range(rows - 1) for column in range(columns - 1)
+        )
+        every = neighbours + braces + sides + diagonals
+        sets["braced"] = tuple(dict.fromkeys((min(pair), max(pair)) for pair in every))
     return BallLayout(
         tuple(f"r{row + 1}c{column + 1}" for row, column in places),
         _frozen(coordinates),
-        {
-            "corner sides": sides,
-            "corner diagonals": diagonals,
-            "corners": sides + diagonals,
-            "neighbours": neighbours,
-        },
+        sets,
         (lower_left, lower_right, upper_left, upper_right),
     )
 

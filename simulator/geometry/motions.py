@@ -49,6 +49,22 @@ def vector_from_rotation(rotation: Array) -> Array:
     return np.asarray(0.5 * double_sine / np.sinc(angle / np.pi)[:, None])
 
 
+def vector_rate(vector: Array) -> Array:
+    """Derivative (m, q, q) of `vector_from_rotation` by a further small turn about the machine's axes."""
+    m, q = vector.shape
+    if q == 1:
+        return np.ones((m, 1, 1))
+    angle = np.sqrt((vector**2).sum(axis=1))
+    half = 0.5 * np.where(angle > 1e-4, angle, 1e-4)
+    # (1 - (t/2) cot(t/2)) / t^2, which is 1/12 for small t.
+    second = np.where(angle > 1e-4, (1.0 - half / np.tan(half)) / (4.0 * half**2), 1.0 / 12.0)
+    cross = np.zeros((m, 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2] = -vector[:, 2], vector[:, 1]
+    cross[:, 1, 0], cross[:, 1, 2] = vector[:, 2], -vector[:, 0]
+    cross[:, 2, 0], cross[:, 2, 1] = -vector[:, 1], vector[:, 0]
+    return np.asarray(np.eye(3) - 0.5 * cross + second[:, None, None] * (cross @ cross))
+
+
 def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
     """Rotation (d, d) and origin (d,) that bring points `source` (n, d) closest to `target` (n, d).
 

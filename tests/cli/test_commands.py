@@ -185,7 +185,11 @@ def test_a_wrong_reading_is_warned_of_and_named(capsys: pytest.CaptureFixture[st
     assert f"{cells[0]}" in capsys.readouterr().out.partition("largest residuals")[2]
 
 
-def test_nothing_is_made_of_a_failed_estimate(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_nothing_is_made_of_a_failed_estimate(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Readings as wrong as these are refused before.
+    monkeypatch.setattr("simulator.readings.refuse_misreadings", lambda *_: None)
     readings, lines = quickstart_readings(tmp_path)
     readings.write_text("\n".join([lines[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in lines[1:])]), "utf-8")
     capsys.readouterr()

@@ -74,6 +74,9 @@ calibration:
     balls: [r3c3, r1c1]
     standard_uncertainty: {x: 0.2 um, z: 0.3 um}
     values: certificate.csv
+priors:
+  - {parameter: EAX, standard_uncertainty: 5 urad}
+  - {parameter: "tilted: origin x", value: 101 mm, standard_uncertainty: 1 mm}
 evaluation:
   points: {random: 200, seed: 1}
   probe: side

@@ -141,7 +141,7 @@ MACHINE = [
 ARTEFACTS = [
     ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
     ("kind: grid, ", "", [
-        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres']),
+        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere']),
     ("balls: [3, 3]", "balls: [3]", [
         "8:30: artefacts.plate.balls: has 1 entry; 2 are needed (number of columns, number of rows)"]),
     ("balls: [3, 3]", "balls: [3, 1]", [
@@ -233,7 +233,7 @@ POSITIONS = [
 CALIBRATION = [
     (SIDES, "pairs: corner, standard_uncertainty: 0 um", [
         '14:47: calibration[0].pairs: unknown value "corner"; did you mean "corners"? '
-        "allowed: corner sides, corner diagonals, corners, neighbours, all",
+        "allowed: corner sides, corner diagonals, corners, neighbours, braced, all",
         '14:77: calibration[0].standard_uncertainty: "0 um" must be above zero; give a small one, '
         'such as 1 nm',
     ]),

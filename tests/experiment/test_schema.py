@@ -113,6 +113,7 @@ def test_defaults_can_be_written_in_a_file() -> None:
     for part in parts(schema()):
         if "default" in part and isinstance(part.get("type"), str):
             types = {"string": str, "integer": int, "number": float, "array": list, "object": dict}
+            types["boolean"] = bool
             assert isinstance(part["default"], types[part["type"]])
 
 

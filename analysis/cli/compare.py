@@ -1,0 +1,114 @@
+"""`ballplate compare`: how far a distances-only estimator is from the full one."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentTypeError, Namespace
+
+from .common import add_file, add_json
+
+PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "braced", "all")
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser = commands.add_parser(
+        "compare",
+        help="compare a rival estimator with the full one on synthetic data",
+        description="Estimate synthetic data sets of the file's true machine with the full estimator and with one that "
+        "uses distances alone, and tell how far the distances that both correct are apart (NPL Report CISE 15/98, "
+        "section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
+    )
+    add_file(parser, several=True)
+    parser.add_argument("--trials", metavar="N", type=_count, default=100, help="number of data sets; default 100")
+    parser.add_argument(
+        "--estimator", choices=("distances", "cresto", "kruth"), default="distances", help="default: distances"
+    )
+    add_pairs(parser)
+    parser.add_argument("--seed", type=_seed, help="seed of the data sets, instead of the file's")
+    parser.add_argument("--points", metavar="N", type=_count, default=200, help="pairs of points; default 200")
+    for key, words in (("rms", "root mean square"), ("maximum", "largest difference")):
+        parser.add_argument(
+            f"--published-{key}",
+            metavar="LENGTH",
+            type=_length,
+            help=f"a published {words} to place, such as '0.35 um'",
+        )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
+    """Add the choice of the pairs of balls whose distances a rival estimator uses."""
+    parser.add_argument(
+        "--pairs",
+        choices=PAIR_SETS,
+        help="pairs of balls whose distances are used; default: braced for grids (neighbours along rows, columns and "
+        "one diagonal, and all corners), otherwise all",
+    )
+    parser.add_argument(
+        "--across-probes",
+        action="store_true",
+        help="use distances between balls read with different probes in the same position, too",
+    )
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise ValueError
+    return count
+
+
+def _seed(text: str) -> int:
+    seed = int(text)
+    if seed < 0:
+        raise ValueError
+    return seed
+
+
+def _length(text: str) -> float:
+    from simulator.quantities import QuantityError, parse_length
+
+    try:
+        return parse_length(text)
+    except QuantityError as error:
+        raise ArgumentTypeError(str(error)) from None
+
+
+def run(options: Namespace) -> int:
+    """Compare the estimators for all experiments of the files; 1 if an estimate did not converge."""
+    from ..estimators import compare_estimators, comparison_data, comparison_lines
+    from .common import experiments, print_json
+
+    published = {"rms": options.published_rms, "maximum": options.published_maximum}
+    found = []
+    for experiment in experiments(options):
+        comparison = compare_estimators(
+            experiment,
+            options.trials,
+            options.estimator,
+            options.pairs,
+            options.across_probes,
+            options.seed,
+            options.points,
+            _progress(experiment.label, options.trials),
+        )
+        found.append(comparison)
+        if not options.json:
+            print("\n".join([*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)]), flush=True)
+    if options.json:
+        print_json([comparison_data(comparison, published) for comparison in found])
+    return 0 if not any(comparison.failed for comparison in found) else 1
+
+
+def _progress(label: str, trials: int):  # type: ignore[no-untyped-def]
+    """Tell the data sets done: in place on a terminal, otherwise a line for every tenth part."""
+    on_terminal = sys.stderr.isatty()
+
+    def tell(done: int) -> None:
+        if on_terminal:
+            print(f"\r{label}: {done} of {trials} data sets", end="\n" if done == trials else "", file=sys.stderr)
+        elif done == trials or done * 10 // trials > (done - 1) * 10 // trials:
+            print(f"{label}: {done} of {trials} data sets", file=sys.stderr, flush=True)
+
+    return tell

@@ -1,0 +1,271 @@
+"""The rival estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as in section 6.2.7."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from simulator.design import Design, Integers, State
+from simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
+from simulator.estimation.initial import initial_state
+from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Experiment
+from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
+from simulator.geometry.artefacts import pairs
+from simulator.layout import lay_out
+from simulator.machines.protocol import Array
+from simulator.machines.truth import true_machine
+from simulator.readings import ObservedReadings
+
+from .study import ParameterEstimate
+from .tables import SHOWN, aligned, number
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+
+# Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth of that.
+ENOUGH = GaussNewtonSettings(smallest_step=1e-8)
+
+
+@dataclass(frozen=True)
+class RivalFit:
+    """Estimates of the machine's parameters by a rival estimator from `pairs` pairs of balls, without uncertainties."""
+
+    label: str
+    title: str
+    solution: RivalSolution
+    pairs: int
+    estimates: tuple[ParameterEstimate, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic data sets.
+
+    For each data set on which both converged: root mean square `rms` and largest absolute value `maximum` (m,),
+    in metres, of the differences at `points` random pairs of points. `failed` lists the other data sets, from 0.
+    """
+
+    label: str
+    title: str
+    estimator: RivalName
+    trials: int
+    pairs: int
+    across_probes: bool
+    points: int
+    rms: Array
+    maximum: Array
+    failed: tuple[int, ...]
+
+
+def ball_pairs(experiment: Experiment, design: Design, name: str | None = None) -> Integers:
+    """Pairs (p, 2) of balls of all plates: of the named set or, without a name, `braced` where that is defined.
+
+    :raises ExperimentError: an artefact has no such set.
+    """
+    found, first = [np.zeros((0, 2), np.int64)], 0
+    for artefact, layout in experiment.layouts.items():
+        if experiment.artefacts[artefact].role == "plate":
+            chosen = name or ("braced" if "braced" in layout.pair_sets else "all")
+            try:
+                found.append(pairs(layout, chosen) + first)
+            except ValueError as error:
+                raise ExperimentError(
+                    [Message(str(experiment.source), 0, 0, f"artefacts.{artefact}", str(error))]
+                ) from None
+        first += len(layout.names)
+    return np.concatenate(found)
+
+
+def fit_rival(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    estimator: RivalName,
+    pair_set: str | None = None,
+    across_probes: bool = False,
+    monomials: bool = False,
+) -> RivalFit:
+    """Estimate machine errors from the distances of readings.
+
+    Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of t, t^2, ...
+    """
+    design = observed.design
+    chosen = ball_pairs(experiment, design, pair_set)
+    solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
+    parameters = design.model.parameters
+    names, units, matrix = [p.name for p in parameters], [p.unit for p in parameters], np.eye(len(parameters))
+    if monomials:
+        reported = design.model.reported()
+        names, units, matrix = list(reported.names), list(reported.units), reported.matrix
+    effect = np.array([1.0 / p.effect for p in parameters])
+    size = 1e-6 * np.sqrt(((matrix * effect) ** 2).sum(axis=1))
+    open_ = np.sqrt(((matrix @ solution.null) ** 2).sum(axis=1)) > 1e-7 * size
+    values = np.where(open_, np.nan, matrix @ solution.a)
+    estimates = tuple(
+        ParameterEstimate(name, float(value), np.nan, unit)
+        for name, value, unit in zip(names, values, units, strict=True)
+    )
+    return RivalFit(experiment.label, experiment.title, solution, len(chosen), estimates)
+
+
+def compare_estimators(
+    experiment: Experiment,
+    trials: int,
+    estimator: RivalName = "distances",
+    pair_set: str | None = None,
+    across_probes: bool = False,
+    seed: int | None = None,
+    points: int = 200,
+    progress: Callable[[int], None] | None = None,
+) -> Comparison:
+    """Compare a rival with the full estimator on readings of the file's true machine.
+
+    Each data set has noise, a certificate and `points` random pairs of points in the volume of its own, all drawn
+    from `seed` (default: the file's) and its number, so that more data sets only add to those before. Points are
+    corrected with the probe of the file's evaluation. `progress` is told the number of data sets done.
+    """
+    design = lay_out(experiment)
+    chosen = ball_pairs(experiment, design, pair_set)
+    corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
+    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    seed = experiment.seed if seed is None else seed
+    rms, maximum, failed = [], [], []
+    for trial in range(trials):
+        generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
+        both = _both_estimates(design, on_truth, truth, chosen, estimator, across_probes, generator)
+        if both is None:
+            failed.append(trial)
+        else:
+            ends = design.lower + (design.upper - design.lower) * generator.random((2, points, design.dimension))
+            difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
+            rms.append(float(np.sqrt((difference**2).mean())))
+            maximum.append(float(np.abs(difference).max()))
+        if progress:
+            progress(trial + 1)
+    return Comparison(
+        experiment.label,
+        experiment.title,
+        estimator,
+        trials,
+        len(chosen),
+        across_probes,
+        points,
+        np.array(rms),
+        np.array(maximum),
+        tuple(failed),
+    )
+
+
+def _both_estimates(
+    design: Design,
+    on_truth: Design,
+    truth: State,
+    chosen: Integers,
+    estimator: RivalName,
+    across_probes: bool,
+    generator: np.random.Generator,
+) -> tuple[Array, Array] | None:
+    """Parameters by the full and by the rival estimator from one data set; None where one did not converge."""
+    drawn = noisy_certificate(design, truth, generator)
+    readings, x = noisy_readings(on_truth, truth, generator)
+    drawn = replace(drawn, readings=readings)
+    full = gauss_newton(drawn, x, initial_state(drawn, x), ENOUGH)
+    rival = rival_estimate(drawn, x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
+    if full.status != "converged" or rival.status != "converged":
+        return None
+    return full.state.a, rival.a
+
+
+def _distances(design: Design, a: Array, ends: Array) -> Array:
+    """Distances (m,) between corrected points of scale readings `ends` (2, m, d)."""
+    offsets = np.broadcast_to(design.probes[design.point_probe], ends.shape[1:])
+    corrected = [x + design.model.error(x, a, offsets) for x in ends]
+    return np.asarray(np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1)))
+
+
+def share_below(values: Array, published: float) -> float:
+    """Share of the values that are below a published one: where it stands in their distribution."""
+    return float((values < published).mean()) if len(values) else float("nan")
+
+
+def rival_fit_lines(fit: RivalFit) -> list[str]:
+    """A rival's fit as lines of text: iterations and the machine's parameters."""
+    record = fit.solution.iterations
+    rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
+    lines = [
+        f"{fit.label}: {fit.title}",
+        f"estimator {fit.solution.estimator}: {fit.pairs} pairs of balls, {fit.solution.observations} terms; {rank}",
+        f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g} (its terms "
+        "are not independent, so that it estimates no sigma and the values have no uncertainty here)",
+        "",
+    ]
+    rows = [["iteration", "step", "S^2"]]
+    rows += [[str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
+    lines += [*aligned(rows, [True, True, True]), ""]
+    rows = [["parameter", "value", "unit"]]
+    rows += [[e.name, number(1e6 * e.value, 6), SHOWN[e.unit]] for e in fit.estimates]
+    return lines + aligned(rows, [False, True, False])
+
+
+def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
+    """A rival's fit as plain data in metres and radians; what is undetermined is None."""
+    return {
+        "experiment": fit.label,
+        "title": fit.title,
+        "estimator": fit.solution.estimator,
+        "pairs": fit.pairs,
+        "observations": fit.solution.observations,
+        "rank_deficiency": fit.solution.deficiency,
+        "status": fit.solution.status,
+        "iterations": [{"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations],
+        "estimates": {e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit} for e in fit.estimates},
+    }
+
+
+def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
+    """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum") stand in them."""
+    across = ", across probes" if found.across_probes else ""
+    lines = [
+        f"{found.label}: {found.title}",
+        f"estimator {found.estimator} ({found.pairs} pairs of balls{across}) against the full one: corrected distances "
+        f"of {found.points} random pairs of points in each of {found.trials} data sets, differences in um",
+    ]
+    if found.failed:
+        lines.append(f"not converged: {len(found.failed)} data sets, numbers {', '.join(map(str, found.failed[:20]))}")
+    if not len(found.rms):
+        return lines
+    rows = [["", "least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest", "published", "below it"]]
+    for words, key, values in (("root mean square", "rms", found.rms), ("largest", "maximum", found.maximum)):
+        value = published.get(key)
+        placed = ["", ""] if value is None else [number(1e6 * value), f"{100 * share_below(values, value):.0f} %"]
+        rows.append([words, *(number(1e6 * q) for q in np.quantile(values, QUANTILES)), *placed])
+    if all(value is None for value in published.values()):
+        rows = [row[:-2] for row in rows]
+    return lines + aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+
+
+def comparison_data(found: Comparison, published: dict[str, float | None]) -> dict[str, Any]:
+    """A comparison as plain data in metres."""
+    data: dict[str, Any] = {
+        "experiment": found.label,
+        "title": found.title,
+        "estimator": found.estimator,
+        "trials": found.trials,
+        "pairs": found.pairs,
+        "across_probes": found.across_probes,
+        "points": found.points,
+        "not_converged": list(found.failed),
+    }
+    for key, values in (("rms", found.rms), ("maximum", found.maximum)):
+        quantiles = list(np.quantile(values, QUANTILES)) if len(values) else []
+        data[key] = {
+            "quantiles": {str(q): float(value) for q, value in zip(QUANTILES, quantiles, strict=False)},
+            "values": [float(value) for value in values],
+        }
+        value = published.get(key)
+        if value is not None:
+            data[key] |= {"published": value, "share_below_published": share_below(values, value)}
+    return data

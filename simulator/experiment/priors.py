@@ -1,0 +1,88 @@
+"""From the settings of priors to what they say about poses and machine errors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..estimation.parameters import AXIS_NAMES, pose_parameter_names
+from ..machines.protocol import ErrorModel, Unit
+from ..machines.settings import build_error_model, dimension_of
+from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
+from ..settings import hint, shorten
+from .messages import Steps
+from .model import Machine, Position, Prior
+from .references import References
+from .sections import PriorSettings
+from .structure import Sections
+from .yamltree import mark_of
+
+PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
+
+
+def resolve_priors(
+    sections: Sections, machine: Machine | None, positions: dict[int, Position], references: References
+) -> tuple[Prior, ...]:
+    """Return what is known beforehand; what is wrong goes to the problems."""
+    settings = sections.get("error_model")
+    if settings is None or machine is None or dimension_of(settings) != machine.dimension:
+        return ()
+    lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
+    known = _known(build_error_model(settings, lower, upper), positions, references)
+    found: list[Prior] = []
+    for i, entry in sections.entries("priors").items():
+        found += _prior(entry, ("priors", int(i)), known, references)
+    return tuple(found)
+
+
+# What a name stands for: name of the parameter, position, probe, component, row over the model, unit, nominal value.
+_Known = tuple[str, str | None, str | None, int, tuple[float, ...], Unit, float]
+
+
+def _known(model: ErrorModel, positions: dict[int, Position], references: References) -> dict[str, tuple[_Known, ...]]:
+    """Every name that a prior may have, and the parameters it stands for."""
+    known: dict[str, tuple[_Known, ...]] = {}
+    own = np.eye(len(model.parameters))
+    for row, parameter in zip(own, model.parameters, strict=True):
+        one: _Known = (parameter.name, None, None, -1, tuple(row), parameter.unit, 0.0)
+        known[parameter.name] = (one,)
+        if parameter.function != parameter.name:
+            known[parameter.function] = (*known.get(parameter.function, ()), one)
+    reported = model.reported()
+    for name, unit, row in zip(reported.names, reported.units, reported.matrix, strict=True):
+        known.setdefault(name, ((name, None, None, -1, tuple(row), unit, 0.0),))
+    for position in positions.values():
+        if references.artefacts[position.artefact].role != "plate":
+            continue
+        for k, word in enumerate(pose_parameter_names(model.dimension)):
+            name = f"{position.name}: {word}"
+            unit, nominal = ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
+            known[name] = ((name, position.name, None, k, (0.0,) * len(own), unit, nominal),)
+    return known
+
+
+def _prior(
+    settings: PriorSettings, steps: Steps, known: dict[str, tuple[_Known, ...]], references: References
+) -> list[Prior]:
+    problems, name = references.problems, settings.parameter
+    if name not in known:
+        advice = hint(name, known)
+        if ": " in name and name.endswith(tuple(f": {axis}" for axis in AXIS_NAMES)):
+            advice = "of ball co-ordinates state a calibration of kind: coordinates"
+        elif name.startswith("probe "):
+            advice = "of probe offsets state the standard_uncertainty with the probe"
+        problems.add((*steps, "parameter"), f'unknown parameter "{shorten(name)}"; {advice}')
+        return []
+    mark = mark_of(problems.root, (*steps, "parameter"))
+    found = []
+    for full, position, probe, component, row, unit, nominal in known[name]:
+        parse, values = PARSERS[unit], []
+        for key, text in (("value", settings.value), ("standard_uncertainty", settings.standard_uncertainty)):
+            try:
+                values.append(nominal if text is None else parse(text))
+            except QuantityError as error:
+                problems.add((*steps, key), str(error))
+        if len(values) == 2:
+            if values[1] <= 0.0:
+                problems.add((*steps, "standard_uncertainty"), "must be above zero; correct it, or remove the prior")
+            found.append(Prior(full, position, probe, component, np.array(row), values[0], values[1], mark))
+    return found

@@ -1,0 +1,89 @@
+"""Says which lines of a file of readings cannot be right, and what they probably are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .design import Design
+from .estimation.misreadings import WrongPosition, WrongReading, find_misreadings
+from .experiment.messages import ExperimentError, Message
+from .experiment.yamltree import Mark
+from .machines.protocol import Array
+from .quantities import format_length
+
+
+def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
+    """Refuse readings that cannot be of the ball, or with the probe, that they are said to be of.
+
+    `marks` tell where each of the design's readings stands. The rule is that of `estimation.misreadings`.
+
+    :raises ExperimentError: some readings are wrong; names all of them.
+    """
+    positions, readings = find_misreadings(design, x)
+    messages = [_of_position(design, wrong, marks) for wrong in positions]
+    told: set[int] = set()
+    for wrong in readings:
+        if wrong.reading not in told:
+            messages.append(_of_reading(design, wrong, marks))
+            told |= {wrong.reading, wrong.partner}
+    if messages:
+        raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
+
+
+def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) -> Message:
+    first = marks[int(np.flatnonzero(design.readings.position == wrong.position)[0])]
+    name = design.position_names[wrong.position]
+    artefact = design.artefact_names[design.position_artefact[wrong.position]]
+    if wrong.turned:
+        text = (
+            f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the names of the balls "
+            "that are read there, or the turn that the experiment file states for the position"
+        )
+    else:
+        text = (
+            f"position {name}: only {wrong.agreeing} of {wrong.count} readings fit the {artefact} in any one pose; "
+            "correct the names of the balls that are read there, or the artefact"
+        )
+    return first.message("", text)
+
+
+def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> Message:
+    readings, i = design.readings, wrong.reading
+    ball = design.ball_label(int(readings.ball[i]))
+    position = design.position_names[readings.position[i]]
+    far = _shown(float(np.sqrt(wrong.misfit @ wrong.misfit)))
+    if wrong.undecided:
+        elsewhere = design.position_names[readings.position[wrong.partner]]
+        text = (
+            f"ball {ball} in position {position} stands {far} from where it stands in position {elsewhere}, "
+            f"line {marks[wrong.partner].line}; correct or remove one of the two lines"
+        )
+    elif wrong.other_ball >= 0:
+        other = design.ball_label(wrong.other_ball)
+        text = f"ball {ball} in position {position} stands where ball {other} should be; "
+        if wrong.partner >= 0:
+            text += f"swap the names of the balls in lines {marks[i].line} and {marks[wrong.partner].line}"
+        else:
+            text += "correct its name, or remove the line"
+    elif wrong.other_probe >= 0:
+        probe, other = design.probe_names[readings.probe[i]], design.probe_names[wrong.other_probe]
+        text = f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the name of the probe"
+    else:
+        along = ", ".join(
+            f"{axis} {'+' if part > 0 else ''}{_shown(float(part))}"
+            for axis, part in zip("xyz", wrong.misfit, strict=False)
+            if abs(part) > 0.01 * np.abs(wrong.misfit).max()
+        )
+        text = f"ball {ball} in position {position} is {far} from where it should be ({along}); correct or remove it"
+    return marks[i].message("", text)
+
+
+def _shown(length: float) -> str:
+    """A length to three digits.
+
+    >>> _shown(0.0123456)
+    '12.3 mm'
+    """
+    return format_length(float(f"{length:.3g}"))

@@ -1,0 +1,262 @@
+"""Prior information and probe offsets as parameters, against dense differences and by what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.study import check, fit, plan
+from simulator.design import Design, State, nominal_state
+from simulator.estimation.covariance import covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.gauss_newton import gauss_newton, moved
+from simulator.estimation.initial import initial_state
+from simulator.estimation.observations import (
+    coordinate_rows,
+    distance_rows,
+    length_rows,
+    prior_rows,
+    reading_blocks,
+)
+from simulator.estimation.parameters import shared_layout
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError
+from simulator.generate import exact_readings, noisy_certificate, noisy_readings
+from simulator.layout import lay_out
+from simulator.machines.truth import true_parameters
+from simulator.readings import read_readings, write_readings
+
+TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+PRIORS = """\
+priors:
+  - {parameter: EAX, standard_uncertainty: 5 urad}
+  - {parameter: "EXX[2]", value: 1 um, standard_uncertainty: 0.3 um}
+  - {parameter: EYY t^2, standard_uncertainty: 3 um}
+  - {parameter: "x low: rotation y", value: 3 mrad, standard_uncertainty: 10 urad}
+  - {parameter: "y high: origin z", standard_uncertainty: 4 um}
+"""
+UNKNOWN = (
+    TEXT.replace("right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}")
+    .replace("left: [-50 mm, 0 mm, 0 mm]", "left: {offset: [-50 mm, 0 mm, 0 mm], standard_uncertainty: 3 um}")
+    .replace("back: [0 mm, 50 mm, 0 mm]", "back: {offset: [0 mm, 50 mm, 0 mm], unknown: true}")
+    .replace("front: [0 mm, -50 mm, 0 mm]", "front: {offset: [0 mm, -50 mm, 0 mm], unknown: true}")
+)
+SPHERE = (
+    UNKNOWN.replace("artefacts:\n", "artefacts:\n  reference: {kind: sphere}\n")
+    .replace(
+        "positions:\n",
+        "positions:\n  - {name: qualification, artefact: reference, pose: {origin: [800 mm, 100 mm, 100 mm]}, "
+        "probes: [down, right, left, back, front], repeats: 3}\n",
+    )
+    .replace("{name: z", "{artefact: plate, name: z")
+    .replace("{name: x", "{artefact: plate, name: x")
+    .replace("{name: y", "{artefact: plate, name: y")
+    .replace("kind: distances\n", "kind: distances\n    artefact: plate\n")
+)
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        path = tmp_path / "e.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def with_bar(text: str) -> str:
+    bar = "  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n"
+    place = "  - {name: bar, artefact: bar, pose: {origin: [300 mm, 300 mm, 300 mm]}, probes: [left, back]}\n"
+    known = "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.2 um}\n"
+    text = text.replace("artefacts:\n", "artefacts:\n" + bar).replace(
+        "\n# What is known of", place + "\n# What is known of"
+    )
+    return text.replace("calibration:\n", "calibration:\n" + known)
+
+
+def all_residuals(design: Design, state: State, x: np.ndarray) -> np.ndarray:
+    chosen = design.plate_readings
+    blocks = reading_blocks(design, state, design.readings.select(chosen), x[chosen])
+    return np.concatenate(
+        [
+            blocks.residual.ravel(),
+            distance_rows(design, state).residual,
+            coordinate_rows(design, state).residual,
+            length_rows(design, state, x)[0],
+            prior_rows(design, shared_layout(design), state)[0],
+        ]
+    )
+
+
+def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path]) -> None:
+    text = (
+        with_bar(SPHERE).replace("balls: [5, 5]", "balls: [3, 3]").replace("cal_coefficients: 5", "cal_coefficients: 3")
+    )
+    design = lay_out(load(written(text.replace("n_coefficients: 5", "n_coefficients: 3") + PRIORS))[0])
+    layout = shared_layout(design)
+    generator = np.random.default_rng(4)
+    shared = 1e-3 * generator.standard_normal(len(layout))
+    balls = 1e-3 * generator.standard_normal(design.balls.shape) * design.is_plate[design.ball_artefact][:, None]
+    arguments = (layout.pose_columns, shared, balls, layout.model, layout.offset_columns)
+    state = moved(design, nominal_state(design), *arguments)
+    _, x = exact_readings(
+        replace(design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))),
+        nominal_state(design),
+    )
+
+    members = design.plate_balls
+    count = len(layout)
+
+    def residual(step: np.ndarray) -> np.ndarray:
+        of_balls = np.zeros(design.balls.shape)
+        of_balls[members] = step[count:].reshape(-1, 3)
+        there = moved(design, state, layout.pose_columns, step[:count], of_balls, layout.model, layout.offset_columns)
+        return all_residuals(design, there, x)
+
+    size = np.concatenate([np.minimum(layout.scale, 1.0), np.ones(3 * len(members))]) * 1e-4
+    columns = [(residual(s) - residual(-s)) / (2 * h) for s, h in zip(np.diag(size), size, strict=True)]
+    dense = np.stack(columns, axis=1)
+    factor = eliminate(design, layout, state, x)
+    now = residual(np.zeros(len(size)))
+    assert factor.sum_of_squares == pytest.approx(now @ now, rel=1e-12)
+    scaled = dense * size
+    expected = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)))[:count] * size[:count]
+    found = covariance(design, factor, spectrum(factor)).of_shared(np.eye(count))
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_a_prior_adds_what_the_readings_leave_open(written: Callable[[str], Path]) -> None:
+    """Six directions are open on 4 x 4 balls with seven coefficients; weak knowledge of the machine closes them."""
+    text = TEXT.replace("balls: [5, 5]", "balls: [4, 4]").replace(
+        "position_coefficients: 5", "position_coefficients: 7"
+    )
+    assert check(load(written(text))[0]).verdict.deficiency == 6
+    functions = [f"E{c}{a}" for a in "XYZ" for c in "XYZ"]
+    stated = "".join(f"  - {{parameter: {name}, standard_uncertainty: 20 um}}\n" for name in functions)
+    found = check(load(written(f"{text}priors:\n{stated}"))[0]).verdict
+    assert found.deficiency == 0
+    assert found.observations == 6 * 16 * 3 + 4 * 16 * 3 + 4 + 51
+
+
+def test_a_strict_prior_fixes_its_parameter(written: Callable[[str], Path], tmp_path: Path) -> None:
+    experiment = load(
+        written(
+            TEXT + PRIORS.replace("3 mrad, standard_uncertainty: 10 urad", "30 urad, standard_uncertainty: 0.001 urad")
+        )
+    )[0]
+    design = lay_out(experiment)
+    state = replace(nominal_state(design), a=true_parameters(experiment.true_machine, design.model))
+    readings, x = noisy_readings(design, state, np.random.default_rng(1))
+    with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
+        write_readings(stream, design, readings, x)
+    found = fit(experiment, read_readings(tmp_path / "r.csv", design), "given")
+    estimates = {e.name: e for e in found.estimates}
+    held = estimates["x low: rotation y"]
+    assert held.value == pytest.approx(30e-6, abs=3e-9) and held.standard_uncertainty < 1.001e-9
+    assert estimates["EXX[2]"].standard_uncertainty < 0.3e-6
+
+
+@pytest.mark.parametrize(
+    ("prior", "message"),
+    [
+        ("{parameter: EAZX, standard_uncertainty: 5 urad}", 'unknown parameter "EAZX"; did you mean "E'),
+        ("{parameter: EAX, standard_uncertainty: 5 um}", "priors[0].standard_uncertainty: "),
+        ("{parameter: EAX, standard_uncertainty: 0 urad}", "must be above zero"),
+        ("{parameter: 'z lo: origin x', standard_uncertainty: 1 um}", 'did you mean "z low: origin x"?'),
+        ("{parameter: 'r1c1: x', standard_uncertainty: 1 um}", "state a calibration of kind: coordinates"),
+        ("{parameter: 'probe left: offset x', standard_uncertainty: 1 um}", "state the standard_uncertainty with the"),
+    ],
+)
+def test_messages(written: Callable[[str], Path], prior: str, message: str) -> None:
+    with pytest.raises(ExperimentError) as caught:
+        load(written(f"{TEXT}priors:\n  - {prior}\n"))
+    assert message in str(caught.value) and "priors[0]" in str(caught.value)
+
+
+def test_a_held_pose_has_no_prior(written: Callable[[str], Path]) -> None:
+    text = TEXT + "priors:\n  - {parameter: 'z low: origin x', standard_uncertainty: 1 um}\n"
+    with pytest.raises(ExperimentError, match=r'"z low: origin x" is held, to fix the frame'):
+        lay_out(load(written(text))[0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("unknown: true}", "unknown: true, standard_uncertainty: 1 um}", "does not go with"),
+        ("unknown: true}", "unknown: true, reference: true}", "the offset of the reference is held"),
+    ],
+)
+def test_messages_about_probes(written: Callable[[str], Path], old: str, new: str, message: str) -> None:
+    with pytest.raises(ExperimentError, match=message):
+        load(written(UNKNOWN.replace(old, new)))
+
+
+def test_unknown_offsets_need_the_sphere(written: Callable[[str], Path]) -> None:
+    """Without it the probes of each side move with the positions that they read; the verdict names them."""
+    without = check(load(written(UNKNOWN.replace(", standard_uncertainty: 3 um", ", unknown: true")))[0]).verdict
+    assert without.deficiency == 6
+    assert {part.name for direction in without.null for part in direction.probes} == {"right", "left", "back", "front"}
+    assert any("offsets of probes: " in str(direction) for direction in without.null)
+    assert check(load(written(SPHERE))[0]).verdict.deficiency == 0
+
+
+def test_offsets_cost_accuracy_and_qualification_gives_it_back(written: Callable[[str], Path]) -> None:
+    known = plan(load("designs/quickstart.yaml")[0]).quantities["U6"].average
+    qualified = plan(load(written(SPHERE))[0]).quantities["U6"].average
+    often = plan(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0]).quantities["U6"].average
+    assert known < often < qualified
+
+
+def test_offsets_come_back(written: Callable[[str], Path], tmp_path: Path) -> None:
+    experiment = load(written(SPHERE))[0]
+    design = lay_out(experiment)
+    shift = 1e-4 * np.random.default_rng(5).standard_normal((5, 3))
+    shift[0] = 0.0
+    truth = replace(
+        nominal_state(design),
+        a=true_parameters(experiment.true_machine, design.model),
+        probes=design.probes + shift,
+    )
+    # The certificate of probe "left" must be right for exact data to fit exactly.
+    priors = design.priors
+    design = replace(design, priors=replace(priors, value=truth.probes[priors.probe, priors.component]))
+    readings, x = exact_readings(design, truth)
+    with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
+        write_readings(stream, design, readings, x)
+    found = fit(experiment, read_readings(tmp_path / "r.csv", design))
+    assert found.solution.status == "converged" and found.solution.factor.sum_of_squares < 1e-12
+    np.testing.assert_allclose(found.solution.state.probes, truth.probes, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.solution.state.a, truth.a, rtol=0, atol=1e-12)
+    estimates = {e.name: e.value for e in found.estimates}
+    assert estimates["probe left: offset x"] == pytest.approx(-0.05 + shift[2, 0], abs=1e-12)
+    assert "probe down: offset x" not in estimates
+    assert len(estimates) == design.parameter_count
+
+
+def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path]) -> None:
+    """S^2 has as many degrees of freedom as stated, priors and offsets included."""
+    experiment = load(written(SPHERE + PRIORS.replace("3 mrad, standard", "10 urad, standard")))[0]
+    drawn = lay_out(experiment)
+    freedom = drawn.observations - drawn.parameter_count
+    truth = replace(nominal_state(drawn), a=true_parameters(experiment.true_machine, drawn.model), probes=drawn.probes)
+    sums, deviations = [], []
+    for seed in range(25):
+        generator = np.random.default_rng(seed)
+        design = noisy_certificate(drawn, truth, generator)
+        readings, x = noisy_readings(design, truth, generator)
+        design = replace(design, readings=readings)
+        found = gauss_newton(design, x, initial_state(design, x))
+        assert found.status == "converged"
+        sums.append(found.factor.sum_of_squares)
+        layout = shared_layout(design)
+        spread = covariance(design, found.factor, found.spectrum).of_shared(np.eye(len(layout)))
+        columns = layout.offset_columns[1:]
+        assert found.state.probes is not None
+        deviations.append((found.state.probes - drawn.probes)[1:] / spread[columns])
+    assert np.mean(sums) == pytest.approx(freedom, abs=4 * np.sqrt(2 * freedom / len(sums)))
+    assert 0.7 < np.std(deviations) < 1.3
