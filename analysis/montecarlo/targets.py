@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simulator.design import Integers
+from simulator.design import Integers, probe_offsets
 from simulator.estimation.covariance import Covariance, covariance
+from simulator.estimation.observations import offset_sensitivity
 from simulator.geometry.motions import vector_from_rotation
 from simulator.machines.protocol import Array
 from simulator.montecarlo.reference import Reference
@@ -49,15 +50,23 @@ def targets(shared: Reference) -> tuple[Target, ...]:
         if len(own) > 1:
             result.append(_ball_distances(shared, found, own))
     if len(design.points):
-        offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+        probe, layout = design.point_probe, shared.factor.layout
+        offsets = np.broadcast_to(probe_offsets(design, start)[probe], design.points.shape)
+        true_offsets = np.broadcast_to(probe_offsets(design, truth.state)[probe], design.points.shape)
         corrected = design.points + design.model.error(design.points, start.a, offsets)
-        true = design.points + truth.model.error(design.points, truth.state.a, offsets)
+        true = design.points + truth.model.error(design.points, truth.state.a, true_offsets)
         jacobian = design.model.jacobian(design.points, start.a, offsets)
-        spread = jacobian @ found.shared[shared.factor.layout.model]
+        by_offset = offset_sensitivity(design.model, design.points, start.a, offsets)
+        free = layout.offset_columns[probe] >= 0
+        spread = jacobian @ found.shared[layout.model]
+        spread += by_offset[:, :, free] @ found.shared[layout.offset_columns[probe][free]]
 
         def moved(replicates: Deviations) -> Array:
             none = np.zeros((len(replicates.a), design.dimension, len(design.points)))
-            return shared.points.change(none, replicates.a)
+            if not free.any():
+                return shared.points.change(none, replicates.a)
+            moved_probe = np.broadcast_to(replicates.offsets[:, probe, :, None], none.shape)
+            return shared.points.change(none, replicates.a, moved_probe)
 
         def errors(replicates: Deviations) -> Array:
             return moved(replicates).swapaxes(1, 2).reshape(-1, design.points.size)

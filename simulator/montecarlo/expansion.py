@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..design import Integers
+from ..estimation.observations import OFFSET_STEP, offset_sensitivity
 from ..machines.protocol import Array, ErrorModel
 
 # Half the distance, in metres, between the readings whose difference gives a derivative.
@@ -18,16 +19,20 @@ STEP = 1e-4
 class LocalModel(Protocol):
     """How the correction at m readings changes with the readings and with the model's parameters.
 
-    For b replicates `moved` (b, d, m) is what each reading differs by and `step` (b, n) what the parameters differ by;
-    without a step it is zero.
+    For b replicates `moved` (b, d, m) is what each reading differs by, `offsets` (b, d, m) what its probe's offset
+    differs by where offsets are parameters, and `step` (b, n) what the parameters differ by; without a step it is zero.
     """
 
-    def change(self, moved: Array, step: Array | None) -> Array:
+    def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
         """Change of the correction (b, d, m)."""
         ...
 
-    def gather(self, moved: Array, step: Array | None, pull: Array) -> Array:
+    def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         """The derivative by the parameters, transposed, times `pull` (b, d, m): (b, n)."""
+        ...
+
+    def gather_offsets(self, step: Array | None, pull: Array) -> Array:
+        """The derivative by each reading's probe offset, transposed, times `pull` (b, d, m): (b, d, m)."""
         ...
 
 
@@ -35,47 +40,63 @@ class LocalModel(Protocol):
 class Expansion:
     """A model that is linear in its parameters and smooth in the readings: matrix products serve all replicates.
 
-    For each component: `columns` the parameters that matter, `by_parameters` (columns, m), `by_reading` (axes, m),
-    and for each axis `mixed_columns` and `mixed` (columns, m), the derivative of `by_parameters` by the reading. A
-    product of two small changes needs no more digits than single precision has.
+    For each component: `columns` the parameters that matter, `by_parameters` (columns, m), `by_place` (axes, m), and
+    for each axis `mixed_columns` and `mixed` (columns, m), the derivative of `by_parameters` by the place. The axes are
+    those of the reading and then, if they are parameters, those of the probe offset. A product of two small changes
+    needs no more digits than single precision has.
     """
 
     size: int
     columns: tuple[Integers, ...]
     by_parameters: tuple[Array, ...]
-    by_reading: tuple[Array, ...]
+    by_place: tuple[Array, ...]
     mixed_columns: tuple[tuple[Integers, ...], ...]
     mixed: tuple[tuple[NDArray[np.float32], ...], ...]
 
-    def change(self, moved: Array, step: Array | None) -> Array:
+    def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
         found = np.empty_like(moved)
         single = None if step is None else step.astype(np.float32)
-        for i, by_reading in enumerate(self.by_reading):
+        places = _places(moved, offsets)
+        for i in range(len(self.columns)):
             total = found[:, i]
             if step is None:
-                np.multiply(by_reading[0], moved[:, 0], out=total)
+                np.multiply(self.by_place[i][0], moved[:, 0], out=total)
             else:
                 np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=total)
-            for axis, along in enumerate(by_reading):
-                if step is None and axis == 0:
-                    continue
-                slope: Array = along
-                if single is not None and len(self.mixed_columns[i][axis]):
-                    slope = slope + single[:, self.mixed_columns[i][axis]] @ self.mixed[i][axis]
-                total += slope * moved[:, axis]
+            for axis, place in enumerate(places):
+                if step is not None or axis > 0:
+                    total += self._slope(i, axis, single) * place
         return found
 
-    def gather(self, moved: Array, step: Array | None, pull: Array) -> Array:
+    def _slope(self, i: int, axis: int, single: NDArray[np.float32] | None) -> Array:
+        """Derivative of component i by a place, (m,) or (b, m)."""
+        slope: Array = self.by_place[i][axis]
+        if single is not None and len(self.mixed_columns[i][axis]):
+            slope = slope + single[:, self.mixed_columns[i][axis]] @ self.mixed[i][axis]
+        return slope
+
+    def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         found = np.zeros((len(pull), self.size))
+        places = _places(moved, offsets)
         for i, columns in enumerate(self.columns):
             found[:, columns] += pull[:, i] @ self.by_parameters[i].T
             if step is None:
                 continue
-            for axis, mixed in enumerate(self.mixed[i]):
+            for axis, place in enumerate(places):
+                mixed = self.mixed[i][axis]
                 if len(mixed):
                     both = np.empty(pull[:, i].shape, np.float32)
-                    np.multiply(moved[:, axis], pull[:, i], out=both, casting="same_kind")
+                    np.multiply(place, pull[:, i], out=both, casting="same_kind")
                     found[:, self.mixed_columns[i][axis]] += both @ mixed.T
+        return found
+
+    def gather_offsets(self, step: Array | None, pull: Array) -> Array:
+        found = np.zeros_like(pull)
+        single = None if step is None else step.astype(np.float32)
+        d = pull.shape[1]
+        for i in range(d):
+            for axis in range(d):
+                found[:, axis] += self._slope(i, d + axis, single) * pull[:, i]
         return found
 
 
@@ -92,45 +113,63 @@ class Direct:
     def _parameters(self, step: Array | None, k: int) -> Array:
         return self.a if step is None else self.a + step[k]
 
-    def change(self, moved: Array, step: Array | None) -> Array:
+    def _probe(self, offsets: Array | None, k: int) -> Array:
+        return self.p if offsets is None else self.p + offsets[k].T
+
+    def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
         found = np.empty_like(moved)
         for k in range(len(moved)):
-            error = self.model.error(self.x + moved[k].T, self._parameters(step, k), self.p)
+            error = self.model.error(self.x + moved[k].T, self._parameters(step, k), self._probe(offsets, k))
             found[k] = (error - self.value).T
         return found
 
-    def gather(self, moved: Array, step: Array | None, pull: Array) -> Array:
+    def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         found = np.empty((len(pull), len(self.a)))
         for k in range(len(pull)):
-            jacobian = self.model.jacobian(self.x + moved[k].T, self._parameters(step, k), self.p)
+            probe = self._probe(offsets, k)
+            jacobian = self.model.jacobian(self.x + moved[k].T, self._parameters(step, k), probe)
             found[k] = np.einsum("mdn,dm->n", jacobian, pull[k])
         return found
 
+    def gather_offsets(self, step: Array | None, pull: Array) -> Array:
+        found = np.empty_like(pull)
+        for k in range(len(pull)):
+            by_offset = offset_sensitivity(self.model, self.x, self._parameters(step, k), self.p)
+            found[k] = np.einsum("mij,im->jm", by_offset, pull[k])
+        return found
 
-def expand(model: ErrorModel, x: Array, a: Array, p: Array) -> Expansion:
-    """Expand a model about readings x (m, d), parameters a (n,) and probe offsets p (m, d)."""
+
+def _places(moved: Array, offsets: Array | None) -> list[Array]:
+    """What readings, and offsets if they are parameters, differ by: an array (b, m) for each axis."""
+    both = [moved] if offsets is None else [moved, offsets]
+    return [one[:, axis] for one in both for axis in range(one.shape[1])]
+
+
+def expand(model: ErrorModel, x: Array, a: Array, p: Array, with_offsets: bool = False) -> Expansion:
+    """Expand a model about readings x (m, d), parameters a (n,) and, if asked for, probe offsets p (m, d)."""
     d = x.shape[1]
     jacobian = model.jacobian(x, a, p)
-    by_reading, mixed = [], []
-    for axis in range(d):
-        shift = np.zeros(d)
-        shift[axis] = STEP
-        by_reading.append((model.error(x + shift, a, p) - model.error(x - shift, a, p)) / (2 * STEP))
-        mixed.append((model.jacobian(x + shift, a, p) - model.jacobian(x - shift, a, p)) / (2 * STEP))
+    by_place, mixed = [], []
+    for axis in range(2 * d if with_offsets else d):
+        # Offsets act linearly, so that a step of their own size is exact to rounding.
+        step = STEP if axis < d else OFFSET_STEP
+        shift = np.zeros((2, d))
+        shift[axis // d, axis % d] = step
+        above, below = (x + shift[0], a, p + shift[1]), (x - shift[0], a, p - shift[1])
+        by_place.append((model.error(*above) - model.error(*below)) / (2 * step))
+        mixed.append((model.jacobian(*above) - model.jacobian(*below)) / (2 * step))
     # Differences leave rounding where the derivative is zero.
     floor = 1e-9 * max((float(np.abs(one).max(initial=0.0)) for one in mixed), default=0.0)
     columns = tuple(np.flatnonzero(jacobian[:, i].any(axis=0)) for i in range(d))
-    mixed_columns = tuple(
-        tuple(np.flatnonzero((np.abs(mixed[axis][:, i]) > floor).any(axis=0)) for axis in range(d)) for i in range(d)
-    )
+    used = [[np.flatnonzero((np.abs(one[:, i]) > floor).any(axis=0)) for one in mixed] for i in range(d)]
     return Expansion(
         size=len(a),
         columns=columns,
         by_parameters=tuple(np.ascontiguousarray(jacobian[:, i, columns[i]].T) for i in range(d)),
-        by_reading=tuple(np.stack([one[:, i] for one in by_reading]) for i in range(d)),
-        mixed_columns=mixed_columns,
+        by_place=tuple(np.stack([one[:, i] for one in by_place]) for i in range(d)),
+        mixed_columns=tuple(map(tuple, used)),
         mixed=tuple(
-            tuple(np.ascontiguousarray(mixed[axis][:, i, mixed_columns[i][axis]].T, np.float32) for axis in range(d))
+            tuple(np.ascontiguousarray(one[:, i, used[i][axis]].T, np.float32) for axis, one in enumerate(mixed))
             for i in range(d)
         ),
     )

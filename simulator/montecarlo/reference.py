@@ -7,12 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, Integers, State, nominal_state
+from ..design import Design, Integers, Priors, State, nominal_state, probe_offsets
 from ..estimation.covariance import Spectrum, spectrum
 from ..estimation.elimination import Factor, eliminate
 from ..estimation.gauss_newton import gauss_newton
 from ..estimation.initial import initial_state
-from ..estimation.observations import reading_blocks, reading_weights
+from ..estimation.observations import (
+    prior_rows,
+    prior_values,
+    reading_blocks,
+    reading_weights,
+)
 from ..estimation.parameters import shared_layout
 from ..generate import scale_readings
 from ..machines.protocol import Array, ErrorModel
@@ -43,7 +48,8 @@ class Group:
     """Readings `rows` of one position in which no ball occurs twice, at the reference.
 
     `ball` are their m balls, a slice where they follow one another, `arm` (d, m) the balls turned into the machine's
-    axes, `residual` (d, m) in metres and `weight` (d, m).
+    axes, `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None where no probe's offset is a
+    parameter.
     """
 
     rows: slice
@@ -53,6 +59,7 @@ class Group:
     residual: Array
     weight: Array
     model: LocalModel
+    probe: Integers | None
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,8 @@ class Reference:
     The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
     the model at the first and the second ends of the length standards' lengths, with `end_noise` (2, d, m) and
     `end_difference` (m, d), their difference at the reference; `points` is the model at the evaluation points.
-    `start` is the estimate from readings without noise.
+    `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of priors about the truth. `start` is the estimate
+    from readings without noise.
     """
 
     design: Design
@@ -76,6 +84,8 @@ class Reference:
     end_noise: Array
     end_difference: Array
     points: LocalModel
+    prior_residual: Array
+    prior_derivative: Array
     exact: Array
 
     @property
@@ -101,13 +111,15 @@ def reference(design: Design, truth: Truth) -> Reference:
     if drawn.deficiency:
         raise NoReferenceError(f"the design is rank deficient by {drawn.deficiency}")
     readings = observed.readings
-    p = observed.probes[readings.probe]
+    p = probe_offsets(observed, truth.state)[readings.probe]
     turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
     exact = scale_readings(truth.model, turned + truth.state.origins[readings.position], truth.state.a, p)
+    observed = replace(observed, priors=_true_priors(observed, truth))
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
     if solution.status != "converged":
         raise NoReferenceError(f"the estimate from readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
+    p = probe_offsets(observed, start)[readings.probe]
     local = _local_models(observed, solution.spectrum, solution.factor.layout.model, start, exact)
     blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
     weight = reading_weights(observed, readings.select(plates))
@@ -124,6 +136,7 @@ def reference(design: Design, truth: Truth) -> Reference:
                 np.ascontiguousarray((blocks.residual / weight)[chosen].T),
                 np.ascontiguousarray(weight[chosen].T),
                 local(exact[plates[chosen]], p[plates[chosen]]),
+                None if observed.free_offsets is None else rows.probe,
             )
         )
         at += len(chosen)
@@ -134,6 +147,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     corrected = exact[both] + np.stack(
         [observed.model.error(exact[k], start.a, p[k]) for k in both] if len(given) else [exact[k] for k in both]
     )
+    evaluated = probe_offsets(observed, start)
     return Reference(
         observed,
         truth,
@@ -145,9 +159,22 @@ def reference(design: Design, truth: Truth) -> Reference:
         ends,
         np.stack([(1.0 / reading_weights(observed, readings.select(k))).T for k in both]),
         corrected[0] - corrected[1],
-        local(observed.points, np.broadcast_to(observed.probes[observed.point_probe], observed.points.shape)),
+        local(observed.points, np.broadcast_to(evaluated[observed.point_probe], observed.points.shape)),
+        *prior_rows(observed, solution.factor.layout, start),
         exact,
     )
+
+
+def _true_priors(design: Design, truth: Truth) -> Priors:
+    """Priors about the truth; those about an error model that is not the true machine's stay what they are."""
+    priors = design.priors
+    if not len(priors):
+        return priors
+    if truth.model == design.model:
+        return replace(priors, value=prior_values(design, truth.state))
+    none = replace(truth.state, a=np.zeros(priors.by_model.shape[1]))
+    of_model = (priors.position < 0) & (priors.probe < 0)
+    return replace(priors, value=np.where(of_model, priors.value, prior_values(design, none)))
 
 
 def _observed(design: Design) -> Design:
@@ -193,17 +220,18 @@ def _local_models(
     design: Design, found: Spectrum, columns: slice, start: State, exact: Array
 ) -> Callable[[Array, Array], LocalModel]:
     """A function from readings (m, d) and probe offsets (m, d) to the model there: expanded where that is faithful."""
-    model, p = design.model, design.probes[design.readings.probe]
+    model, p = design.model, probe_offsets(design, start)[design.readings.probe]
 
     def direct(x: Array, p: Array) -> LocalModel:
         return Direct(model, x, start.a, p, model.error(x, start.a, p))
 
     def expanded(x: Array, p: Array) -> LocalModel:
-        return expand(model, x, start.a, p)
+        return expand(model, x, start.a, p, design.free_offsets is not None)
 
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = 1.0 / reading_weights(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, found.root.shape[1])) @ found.root[columns].T
-    difference = expanded(exact, p).change(moved, step) - direct(exact, p).change(moved, step)
+    offsets = None if design.free_offsets is None else 1e-6 * generator.standard_normal(moved.shape)
+    difference = expanded(exact, p).change(moved, step, offsets) - direct(exact, p).change(moved, step, offsets)
     return expanded if bool((np.abs(difference) <= FAITHFUL * noise).all()) else direct

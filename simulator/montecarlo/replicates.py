@@ -18,6 +18,7 @@ import numpy as np
 from ..design import Integers
 from ..estimation.covariance import _solve_balls
 from ..estimation.elimination import Factor
+from ..estimation.parameters import SharedLayout
 from ..machines.protocol import Array
 from ..threads import single_threaded
 from .reference import Group, Reference
@@ -28,8 +29,8 @@ BATCH = 64
 # Passes after which a replicate counts as not converged.
 PASSES = 20
 
-# A replicate has converged when its step is below this fraction of its first, which is as long as its errors are: what
-# passes of such a pace leave to the next one is far below anything that statistics of replicates could show.
+# A replicate has converged when its step is below this fraction of its first, which is as long as its errors are. Each
+# pass shortens it a hundredfold at least, so that a few millionths of the errors are left at the most.
 SMALLEST_STEP = 1e-4
 
 
@@ -37,14 +38,16 @@ SMALLEST_STEP = 1e-4
 class Deviations:
     """What b replicates differ by from the reference.
 
-    `balls` (b, d, n), `rotations` (b, k, pose size - d) as vectors about the machine's axes, `origins` (b, k, d) and
-    `a` (b, n).
+    `balls` (b, d, n), `rotations` (b, k, pose size - d) as vectors about the machine's axes, `origins` (b, k, d), `a`
+    (b, n) and `offsets` of probes (b, l, d). `shared` (b, s) are the sums of all steps of the shared parameters.
     """
 
     balls: Array
     rotations: Array
     origins: Array
     a: Array
+    offsets: Array
+    shared: Array
 
 
 @dataclass(frozen=True)
@@ -61,12 +64,13 @@ class Estimates:
 @dataclass(frozen=True)
 class Draw:
     """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the certificates' distances, co-ordinates
-    and lengths (b, m), and of the readings of the lengths' two ends (b, d, m)."""
+    and lengths (b, m), of priors (b, m), and of the readings of the lengths' two ends (b, d, m)."""
 
     moved: Array
     distances: Array
     coordinates: Array
     lengths: Array
+    priors: Array
     ends: tuple[Array, Array]
 
 
@@ -83,7 +87,8 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     distances = certificate(design.distances.uncertainty)
     coordinates = certificate(design.coordinates.uncertainty)
     lengths = certificate(design.lengths.uncertainty)
-    return Draw(moved, distances, coordinates, lengths, _drawn_ends(shared, generator))
+    priors = certificate(design.priors.uncertainty)
+    return Draw(moved, distances, coordinates, lengths, priors, _drawn_ends(shared, generator))
 
 
 def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
@@ -100,7 +105,7 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
     """Estimates of the `BATCH` replicates of one batch."""
     drawn = draw(shared, seed, batch)
     design, layout = shared.design, shared.factor.layout
-    columns = layout.pose_columns
+    columns, offset = layout.pose_columns, layout.offset_columns
     n, d = design.balls.shape
     k, turns = columns.shape[0], columns.shape[1] - d
     at = Deviations(
@@ -108,6 +113,8 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
         np.zeros((BATCH, k, turns)),
         np.zeros((BATCH, k, d)),
         np.zeros((BATCH, len(shared.start.a))),
+        np.zeros((BATCH, *design.probes.shape)),
+        np.zeros((BATCH, len(layout))),
     )
     passes, converged = np.zeros(BATCH, np.int64), np.zeros(BATCH, bool)
     squares, first = np.full(BATCH, np.nan), np.zeros(BATCH)
@@ -125,6 +132,8 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
                 at.rotations + turn + 0.5 * _bracket(turn, at.rotations),
                 at.origins + poses[:, :, :d],
                 at.a + common[:, layout.model],
+                at.offsets + np.where(offset >= 0, common[:, np.maximum(offset, 0)], 0.0),
+                at.shared + common,
             )
             # S^2 after the step, which the quadratic that the factor stands for foretells to its own accuracy.
             after = now + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
@@ -165,11 +174,18 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) ->
         by_pose[:, k, :d] -= pull.sum(axis=2)
         by_pose[:, k, d:] -= _moment(pull @ arm.swapaxes(-1, -2))
         by_ball[:, :, group.ball] -= np.swapaxes(rotation, -1, -2) @ pull
-        by_shared[:, layout.model] += group.model.gather(moved, step, pull)
+        by_shared[:, layout.model] += group.model.gather(moved, step, pull, _offsets(at, group.probe))
+        if group.probe is not None:
+            _add_by_offset(by_shared, layout, group.probe, group.model.gather_offsets(step, pull))
     position, parameter = np.nonzero(layout.pose_columns >= 0)
     by_shared[:, layout.pose_columns[position, parameter]] += by_pose[:, position, parameter]
     _certificates(shared, drawn, at.balls, squares, by_ball)
-    _lengths(shared, drawn, step, squares, by_shared)
+    _lengths(shared, drawn, at, is_start, squares, by_shared)
+    if drawn.priors.shape[1]:
+        weight = 1.0 / shared.design.priors.uncertainty
+        residual = shared.prior_residual + at.shared @ shared.prior_derivative.T - weight * drawn.priors
+        squares += (residual**2).sum(axis=1)
+        by_shared += residual @ shared.prior_derivative
     return squares, by_ball, by_shared
 
 
@@ -180,7 +196,7 @@ def _pull(shared: Reference, group: Group, moved: Array, at: Deviations, is_star
     if is_start:
         residual += group.model.change(moved, None)
     else:
-        residual += group.model.change(moved, at.a)
+        residual += group.model.change(moved, at.a, _offsets(at, group.probe))
         displaced = shared.start.rotations[group.position] @ at.balls[:, :, group.ball]
         # Turned less straight, so that the small difference of two large vectors is never formed.
         displaced += _turn_less_one(at.rotations[:, group.position]) @ (group.arm + displaced)
@@ -258,14 +274,31 @@ def _certificates(shared: Reference, drawn: Draw, balls: Array, squares: Array, 
         by_ball += certified.reshape(*start.balls.shape, BATCH).transpose(2, 1, 0)
 
 
-def _lengths(shared: Reference, drawn: Draw, step: Array | None, squares: Array, by_shared: Array) -> None:
+def _add_by_offset(by_shared: Array, layout: SharedLayout, probe: Integers, gradient: Array) -> None:
+    """Add a gradient (b, d, m) by the offsets of the probes (m,) that readings were made with."""
+    for k in np.unique(probe):
+        columns = layout.offset_columns[k]
+        free = columns >= 0
+        by_shared[:, columns[free]] += gradient[:, :, probe == k].sum(axis=2)[:, free]
+
+
+def _offsets(at: Deviations, probe: Integers | None) -> Array | None:
+    """What the offsets of the probes (m,) differ by, (b, d, m), where they are parameters."""
+    return None if probe is None else at.offsets[:, probe].swapaxes(1, 2)
+
+
+def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squares: Array, by_shared: Array) -> None:
     """Add the part of length standards read in the volume."""
+    step = None if is_start else at.a
     given = shared.design.lengths
     if shared.ends is None:
         return
     first, second = shared.ends
+    design, ends = shared.design, drawn.ends
+    probes = [None if design.free_offsets is None else design.readings.probe[k] for k in (given.first, given.second)]
+    offsets = [_offsets(at, probe) for probe in probes]
     difference = shared.end_difference.T + (
-        drawn.ends[0] + first.change(drawn.ends[0], step) - drawn.ends[1] - second.change(drawn.ends[1], step)
+        ends[0] + first.change(ends[0], step, offsets[0]) - ends[1] - second.change(ends[1], step, offsets[1])
     )
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected, given.direction.T, unit)
@@ -275,8 +308,11 @@ def _lengths(shared: Reference, drawn: Draw, step: Array | None, squares: Array,
     residual = weight * (length - given.value - drawn.lengths)
     squares += (residual**2).sum(axis=1)
     pull = unit * (weight * residual)[:, None]
-    model = shared.factor.layout.model
-    by_shared[:, model] += first.gather(drawn.ends[0], step, pull) - second.gather(drawn.ends[1], step, pull)
+    layout = shared.factor.layout
+    for sign, end, moved, probe, moved_probe in zip((1.0, -1.0), shared.ends, ends, probes, offsets, strict=True):
+        by_shared[:, layout.model] += sign * end.gather(moved, step, pull, moved_probe)
+        if probe is not None:
+            _add_by_offset(by_shared, layout, probe, sign * end.gather_offsets(step, pull))
 
 
 def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:

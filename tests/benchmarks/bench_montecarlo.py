@@ -5,8 +5,8 @@ Run with
     python -m pytest tests/benchmarks/bench_montecarlo.py
 
 Experiment 6.2.1 of NPL Report CISE 15/98 on grids of n x n balls, on a machine with errors of some micrometres. SciPy's
-least_squares is given the same residuals and derivatives, and its answers must agree with ours to a millionth of what
-replicates differ by. Whole runs are timed on two processes that are there already, everything else in this one.
+least_squares is given the same residuals and derivatives, and its answers must agree with ours to a few millionths of
+what replicates differ by. Whole runs are timed on two processes that are there already, everything else in this one.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ def test_thousand_replicates(n: int, singles: int) -> None:
         state = by_scipy(shared, k)
         seconds.append(time.perf_counter() - start)
         ours = shared.start.a + found.found.a[:, k]
-        assert np.abs(ours - state.a).max() < 1e-6 * found.found.a.std(axis=1).max()
+        assert np.abs(ours - state.a).max() < 5e-6 * found.found.a.std(axis=1).max()
         balls = shared.start.balls + found.found.balls[:, :, k].T
-        assert np.abs(balls - state.balls).max() < 1e-6 * found.found.balls.std(axis=2).max()
+        assert np.abs(balls - state.balls).max() < 5e-6 * found.found.balls.std(axis=2).max()
     times = 1000 * min(seconds) / (both * 1000 / (batches * BATCH))
     rate = product_rate(shared)
     LINES.append(
@@ -211,7 +211,7 @@ def test_memory_does_not_grow_with_replicates() -> None:
 def test_table(capsys: pytest.CaptureFixture[str]) -> None:
     with capsys.disabled():
         print(
-            "\n\n| n | readings | 1000 in one process, s | in two, s | with statistics, s | SciPy, one, s | times faster | "
+            "\n\n| n | readings | one process, s | two, s | and statistics, s | SciPy, one, s | ratio | of dgemm, % |"
         )
         print("\n".join(LINES))
 

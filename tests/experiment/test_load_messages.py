@@ -88,9 +88,12 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: 9}", [
         "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
     ("error_model: {kind: kinematic}",
-     "error_model: {kind: kinematic}\ntrue_machine: {kind: random, error_model: {kind: metric}}", [
-         '6:50: true_machine.error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; '
+     "error_model: {kind: kinematic}\ntrue_machine: {kind: random, position: 1 um, error_model: {kind: metric}}", [
+         '6:66: true_machine.error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; '
          "change one of the two"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: {kind: random}", [
+        "6:15: true_machine: without sizes it is a machine without errors; "
+        "give position: 2 um, rotation: 4 urad, or both"]),
     ("error_model: {kind: kinematic}",
      "error_model: {kind: kinematic}\ntrue_machine: {kind: coefficients, values: {EX x^3: 1 um, EY x^2: 1 um}, "
      "error_model: {kind: empirical, terms: quadratic}}", [

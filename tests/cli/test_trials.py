@@ -1,0 +1,143 @@
+"""Monte Carlo from the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from analysis.cli import main
+from analysis.cli.progress import ProgressBar
+
+QUICKSTART = "designs/quickstart.yaml"
+
+
+def run(*arguments: str | Path) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+def test_trials_stand_beside_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", QUICKSTART, "--trials", "100", "--workers", "1") == 0
+    out, err = capsys.readouterr()
+    assert "U6  distances between corrected points" in out
+    assert "Monte Carlo: 100 data sets of the true machine, seed 1" in out
+    assert "S^2 is" in out and "Too optimistic" not in out
+    assert err == ""
+
+
+def test_trials_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", QUICKSTART, "--trials", "100", "--seed", "4", "--workers", "1", "--json") == 0
+    first = capsys.readouterr().out
+    assert run("run", QUICKSTART, "--trials", "100", "--seed", "4", "--workers", "2", "--json") == 0
+    assert capsys.readouterr().out == first
+    found = json.loads(first)["monte_carlo"]
+    assert (found["trials"], found["seed"], found["not_converged"], found["interrupted"]) == (100, 4, [], False)
+    for one in found["quantities"].values():
+        assert 0.8 < one["spread_ratio"]["value"] < 1.2 and one["spread_ratio"]["standard_error"] > 0
+        assert 0.85 < one["coverage_sigma_estimated"]["value"] < 1.0
+
+
+def test_a_run_until_it_is_accurate(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", QUICKSTART, "--until", "3%", "--workers", "1", "--json") == 0
+    found = json.loads(capsys.readouterr().out)["monte_carlo"]
+    assert found["trials"] == 512
+    for one in found["quantities"].values():
+        assert one["spread_ratio"]["standard_error"] <= 0.03 * one["spread_ratio"]["value"]
+
+
+def test_a_deficient_design_is_told_why_not(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", "designs/npl/6.1.1.yaml", "--variant", "B", "--trials", "10") == 0
+    assert "no Monte Carlo: the design is rank deficient by 2" in capsys.readouterr().out
+
+
+def test_a_true_machine_too_wild_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    text = Path(QUICKSTART).read_text(encoding="utf-8")
+    wild = tmp_path / "wild.yaml"
+    head, tail = text.split("true_machine:")
+    tail = tail.partition("\n\n")[2]
+    wild.write_text(
+        f"{head}true_machine: {{kind: random, position: 30 m, rotation: 3 rad}}\n\n{tail}", encoding="utf-8"
+    )
+    assert run("run", wild, "--trials", "10") == 0
+    assert "no Monte Carlo: the errors of the true machine are too large" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--trials", "0"],
+        ["--trials", "many"],
+        ["--until", "1"],
+        ["--until", "0%"],
+        ["--workers", "-1"],
+        ["--seed", "x"],
+    ],
+)
+def test_wrong_options(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run("run", QUICKSTART, *options)
+    assert caught.value.code == 2
+    err = capsys.readouterr().err
+    assert f'"{options[1]}"' in err and "invalid _" not in err
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_an_interruption_reports_what_is_done(workers: str) -> None:
+    arguments = ["run", QUICKSTART, "--trials", "1000000", "--workers", workers, "--json"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "analysis.cli", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
+    )
+    assert process.stderr is not None
+    # The first line of progress says that something is done.
+    line = process.stderr.readline()
+    assert "/1000000 data sets" in line
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    found = json.loads(out)["monte_carlo"]
+    assert found["interrupted"] and found["trials"] >= 512
+    assert "interrupted: the figures are those of the data sets done so far" in err and "Traceback" not in err
+
+
+class Terminal:
+    """Standard error as a terminal of some width."""
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def write(self, text: str) -> None:
+        self.text += text
+
+    def flush(self) -> None:
+        pass
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("width", [20, 60, 200])
+def test_the_bar_fits_the_terminal(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("COLUMNS", str(width))
+    bar = ProgressBar("data sets")
+    bar.last = bar.started = time.monotonic() - 20
+    bar.show(512, 2048, "accurate to 1.5 %")
+    shown = terminal.text.removeprefix("\r\x1b[K")
+    assert len(shown) < width
+    if width == 200:
+        assert shown.count("#") == pytest.approx(shown.count(".") / 3, rel=0.1)
+        assert "512/2048 data sets, 25.6/s, 1 min 0 s left, accurate to 1.5 %" in shown
+    bar.close()
+    assert terminal.text.endswith("\r\x1b[K")
