@@ -101,13 +101,13 @@ def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: 
     quantities = []
     for aim in aims:
         change = aim.change(found.found)[used]
-        scatter = change / aim.uncertainty
+        scatter = change * (1.0 / aim.uncertainty)
         error = scatter + aim.base / aim.uncertainty
         size = np.abs(error)
         numbers = np.stack(
             [
-                (scatter**2).mean(axis=1),
-                (error**2).mean(axis=1),
+                np.einsum("bq,bq->b", scatter, scatter) / scatter.shape[1],
+                np.einsum("bq,bq->b", error, error) / error.shape[1],
                 (size <= limits.known).mean(axis=1),
                 (size <= limits.estimated * sigma[:, None]).mean(axis=1),
             ]
@@ -116,7 +116,7 @@ def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: 
         quantities.append(
             QuantityTally(
                 absolute.sum(axis=0),
-                (absolute**2).sum(axis=0),
+                np.einsum("bq,bq->q", absolute, absolute),
                 numbers.sum(axis=1),
                 (numbers**2).sum(axis=1),
             )

@@ -17,7 +17,7 @@ from simulator.montecarlo.replicates import Deviations
 from simulator.threads import single_threaded
 
 # Distances that are followed through all replicates; a sample of the pairs where there are more.
-MOST_PAIRS = 4000
+MOST_PAIRS = 1000
 
 
 @dataclass(frozen=True)
@@ -143,11 +143,15 @@ def _distances(
 
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
-        difference = displaced[:, :, first] - displaced[:, :, second]
-        along = (between.T * difference).sum(axis=1)
-        total = np.sqrt(((between.T + difference) ** 2).sum(axis=1))
-        # The difference of two lengths without the loss of digits that subtracting them would bring.
-        return np.asarray((2.0 * along + (difference**2).sum(axis=1)) / (total + length))
+        # The square of the new length less that of the old, without the loss of digits that subtracting would bring.
+        gained = np.zeros((len(displaced), len(first)))
+        for axis in range(displaced.shape[1]):
+            difference = displaced[:, axis, first]
+            difference -= displaced[:, axis, second]
+            part = difference + 2.0 * between[:, axis]
+            part *= difference
+            gained += part
+        return np.asarray(gained / (np.sqrt(length**2 + gained) + length))
 
     return Target(symbol, length - true_length, np.sqrt(variance), ("m",) * len(first), change, sampled)
 

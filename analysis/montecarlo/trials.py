@@ -16,7 +16,7 @@ from .tally import Tally, tally
 from .targets import Target, targets
 
 # Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
-BATCHES = 8
+BATCHES = 4
 
 # Replicates of a run that is to go on until its figures are accurate, at the most.
 MOST_TRIALS = 1_000_000

@@ -12,6 +12,8 @@ from ..design import Integers
 from ..estimation.observations import OFFSET_STEP, offset_sensitivity
 from ..machines.protocol import Array, ErrorModel
 
+Single = NDArray[np.float32]
+
 # Half the distance, in metres, between the readings whose difference gives a derivative.
 STEP = 1e-4
 
@@ -41,62 +43,53 @@ class Expansion:
     """A model that is linear in its parameters and smooth in the readings: matrix products serve all replicates.
 
     For each component: `columns` the parameters that matter, `by_parameters` (columns, m), `by_place` (axes, m), and
-    for each axis `mixed_columns` and `mixed` (columns, m), the derivative of `by_parameters` by the place. The axes are
-    those of the reading and then, if they are parameters, those of the probe offset. A product of two small changes
-    needs no more digits than single precision has.
+    `mixed_columns` with `mixed` (columns, axes x m), the derivative of `by_parameters` by the place. The axes are those
+    of the reading and then, if they are parameters, those of the probe offset. What a place contributes is a small
+    part of the whole and needs no more digits than single precision has.
     """
 
     size: int
     columns: tuple[Integers, ...]
     by_parameters: tuple[Array, ...]
-    by_place: tuple[Array, ...]
-    mixed_columns: tuple[tuple[Integers, ...], ...]
-    mixed: tuple[tuple[NDArray[np.float32], ...], ...]
+    by_place: tuple[Single, ...]
+    mixed_columns: tuple[Integers, ...]
+    mixed: tuple[Single, ...]
 
     def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
         found = np.empty_like(moved)
-        single = None if step is None else step.astype(np.float32)
         places = _places(moved, offsets)
         for i in range(len(self.columns)):
-            total = found[:, i]
             if step is None:
-                np.multiply(self.by_place[i][0], moved[:, 0], out=total)
-            else:
-                np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=total)
-            for axis, place in enumerate(places):
-                if step is not None or axis > 0:
-                    total += self._slope(i, axis, single) * place
+                np.einsum("am,bam->bm", self.by_place[i], places, out=found[:, i], casting="same_kind")
+                continue
+            np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=found[:, i])
+            found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
         return found
 
-    def _slope(self, i: int, axis: int, single: NDArray[np.float32] | None) -> Array:
-        """Derivative of component i by a place, (m,) or (b, m)."""
-        slope: Array = self.by_place[i][axis]
-        if single is not None and len(self.mixed_columns[i][axis]):
-            slope = slope + single[:, self.mixed_columns[i][axis]] @ self.mixed[i][axis]
-        return slope
+    def _slopes(self, i: int, step: Array) -> Single:
+        """Derivatives (b, axes, m) of component i by the places."""
+        slopes = step[:, self.mixed_columns[i]].astype(np.float32) @ self.mixed[i]
+        slopes = slopes.reshape(len(step), *self.by_place[i].shape)
+        slopes += self.by_place[i]
+        return slopes
 
     def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         found = np.zeros((len(pull), self.size))
-        places = _places(moved, offsets)
         for i, columns in enumerate(self.columns):
             found[:, columns] += pull[:, i] @ self.by_parameters[i].T
-            if step is None:
-                continue
-            for axis, place in enumerate(places):
-                mixed = self.mixed[i][axis]
-                if len(mixed):
-                    both = np.empty(pull[:, i].shape, np.float32)
-                    np.multiply(place, pull[:, i], out=both, casting="same_kind")
-                    found[:, self.mixed_columns[i][axis]] += both @ mixed.T
+        if step is not None:
+            places, single = _places(moved, offsets), pull.astype(np.float32)
+            for i, columns in enumerate(self.mixed_columns):
+                both = (places * single[:, i, None]).reshape(len(pull), -1)
+                found[:, columns] += both @ self.mixed[i].T
         return found
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
         found = np.zeros_like(pull)
-        single = None if step is None else step.astype(np.float32)
         d = pull.shape[1]
         for i in range(d):
-            for axis in range(d):
-                found[:, axis] += self._slope(i, d + axis, single) * pull[:, i]
+            slopes = self.by_place[i][None] if step is None else self._slopes(i, step)
+            found += slopes[:, d:] * pull[:, i, None]
         return found
 
 
@@ -139,10 +132,11 @@ class Direct:
         return found
 
 
-def _places(moved: Array, offsets: Array | None) -> list[Array]:
-    """What readings, and offsets if they are parameters, differ by: an array (b, m) for each axis."""
-    both = [moved] if offsets is None else [moved, offsets]
-    return [one[:, axis] for one in both for axis in range(one.shape[1])]
+def _places(moved: Array, offsets: Array | None) -> Single:
+    """What readings, and offsets if they are parameters, differ by, (b, axes, m)."""
+    if offsets is None:
+        return moved.astype(np.float32)
+    return np.concatenate([moved, offsets], axis=1, dtype=np.float32)
 
 
 def expand(model: ErrorModel, x: Array, a: Array, p: Array, with_offsets: bool = False) -> Expansion:
@@ -160,16 +154,19 @@ def expand(model: ErrorModel, x: Array, a: Array, p: Array, with_offsets: bool =
         mixed.append((model.jacobian(*above) - model.jacobian(*below)) / (2 * step))
     # Differences leave rounding where the derivative is zero.
     floor = 1e-9 * max((float(np.abs(one).max(initial=0.0)) for one in mixed), default=0.0)
+    together = np.stack(mixed, axis=3)
     columns = tuple(np.flatnonzero(jacobian[:, i].any(axis=0)) for i in range(d))
-    used = [[np.flatnonzero((np.abs(one[:, i]) > floor).any(axis=0)) for one in mixed] for i in range(d)]
+    used = tuple(np.flatnonzero((np.abs(together[:, i]) > floor).any(axis=(0, 2))) for i in range(d))
     return Expansion(
         size=len(a),
         columns=columns,
         by_parameters=tuple(np.ascontiguousarray(jacobian[:, i, columns[i]].T) for i in range(d)),
-        by_place=tuple(np.stack([one[:, i] for one in by_place]) for i in range(d)),
-        mixed_columns=tuple(map(tuple, used)),
+        by_place=tuple(np.stack([one[:, i] for one in by_place]).astype(np.float32) for i in range(d)),
+        mixed_columns=used,
         mixed=tuple(
-            tuple(np.ascontiguousarray(one[:, i, used[i][axis]].T, np.float32) for axis, one in enumerate(mixed))
+            np.ascontiguousarray(together[:, i, used[i]].transpose(1, 2, 0), np.float32).reshape(
+                len(used[i]), len(mixed) * len(x)
+            )
             for i in range(d)
         ),
     )

@@ -24,7 +24,7 @@ from ..threads import single_threaded
 from .reference import Group, Reference
 
 # Replicates of a batch. The size of a matrix product decides the last bits of its result: it must be constant.
-BATCH = 64
+BATCH = 128
 
 # Passes after which a replicate counts as not converged.
 PASSES = 20
