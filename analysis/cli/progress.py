@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass, field
 
 # Seconds between two reports.
-OFTEN, SELDOM = 0.1, 10.0
+OFTEN, SELDOM = 0.1, 5.0
 
 
 @dataclass

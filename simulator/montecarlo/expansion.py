@@ -44,8 +44,8 @@ class Expansion:
 
     For each component: `columns` the parameters that matter, `by_parameters` (columns, m), `by_place` (axes, m), and
     `mixed_columns` with `mixed` (columns, axes x m), the derivative of `by_parameters` by the place. The axes are those
-    of the reading and then, if they are parameters, those of the probe offset. What a place contributes is a small
-    part of the whole and needs no more digits than single precision has.
+    of the reading and then, if they are parameters, those of the probe offset, less the offset itself. What a place
+    contributes otherwise is a small part of the whole and needs no more digits than single precision has.
     """
 
     size: int
@@ -57,13 +57,19 @@ class Expansion:
 
     def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
         found = np.empty_like(moved)
+        if step is not None and offsets is None and len(self.by_place[0]) > moved.shape[1]:
+            offsets = np.zeros_like(moved)
         places = _places(moved, offsets)
         for i in range(len(self.columns)):
             if step is None:
-                np.einsum("am,bam->bm", self.by_place[i], places, out=found[:, i], casting="same_kind")
+                np.einsum(
+                    "am,bam->bm", self.by_place[i][: places.shape[1]], places, out=found[:, i], casting="same_kind"
+                )
                 continue
             np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=found[:, i])
             found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
+        if offsets is not None:
+            found += offsets
         return found
 
     def _slopes(self, i: int, step: Array) -> Single:
@@ -85,8 +91,7 @@ class Expansion:
         return found
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
-        found = np.zeros_like(pull)
-        d = pull.shape[1]
+        found, d = pull.copy(), pull.shape[1]
         for i in range(d):
             slopes = self.by_place[i][None] if step is None else self._slopes(i, step)
             found += slopes[:, d:] * pull[:, i, None]
@@ -152,6 +157,8 @@ def expand(model: ErrorModel, x: Array, a: Array, p: Array, with_offsets: bool =
         above, below = (x + shift[0], a, p + shift[1]), (x - shift[0], a, p - shift[1])
         by_place.append((model.error(*above) - model.error(*below)) / (2 * step))
         mixed.append((model.jacobian(*above) - model.jacobian(*below)) / (2 * step))
+    for axis in range(d, len(by_place)):
+        by_place[axis][:, axis - d] -= 1.0
     # Differences leave rounding where the derivative is zero.
     floor = 1e-9 * max((float(np.abs(one).max(initial=0.0)) for one in mixed), default=0.0)
     together = np.stack(mixed, axis=3)
