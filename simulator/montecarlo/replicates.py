@@ -172,7 +172,7 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) ->
         squares += np.einsum("bim,bim->b", pull, pull)
         pull *= group.weight
         by_pose[:, k, :d] -= pull.sum(axis=2)
-        by_pose[:, k, d:] -= _moment(pull @ arm.swapaxes(-1, -2))
+        by_pose[:, k, d:] -= _moment(arm, pull)
         by_ball[:, :, group.ball] -= np.swapaxes(rotation, -1, -2) @ pull
         by_shared[:, layout.model] += group.model.gather(moved, step, pull, _offsets(at, group.probe))
         if group.probe is not None:
@@ -230,10 +230,18 @@ def _turn(turn: Array) -> Array:
     return np.asarray(less + np.eye(less.shape[1]))
 
 
-def _moment(products: Array) -> Array:
-    """Sum of arm x pull from sums of pull_i arm_j, (b, d, d): (b, 3) in space, (b, 1) in the plane."""
-    planes = [(0, 1)] if products.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
-    return np.stack([products[:, j, i] - products[:, i, j] for i, j in planes], axis=1)
+def _moment(arm: Array, pull: Array) -> Array:
+    """Sum over m of arm x pull, with arm (d, m) or (b, d, m) and pull (b, d, m): (b, 3), in the plane (b, 1)."""
+    planes = [(0, 1)] if pull.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
+    if arm.ndim == 2:
+        products = (pull.reshape(-1, arm.shape[1]) @ arm.T).reshape(len(pull), *arm.shape[:1], -1)
+        return np.stack([products[:, j, i] - products[:, i, j] for i, j in planes], axis=1)
+
+    # One by one: as a product of matrices for each replicate it takes twice as long.
+    def product(i: int, j: int) -> Array:
+        return np.asarray(np.einsum("bm,bm->b", arm[:, i], pull[:, j]))
+
+    return np.stack([product(i, j) - product(j, i) for i, j in planes], axis=1)
 
 
 def _bracket(turn: Array, before: Array) -> Array:
