@@ -33,6 +33,7 @@ def run(options: Namespace) -> int:
 
     import numpy as np
 
+    from simulator.experiment.load import message_at
     from simulator.experiment.messages import ExperimentError, Message
     from simulator.generate import (
         NoReadingError,
@@ -60,9 +61,8 @@ def run(options: Namespace) -> int:
             truth = replace(truth, balls=true_artefacts(design, generator))
             readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
-        raise ExperimentError(
-            [Message(str(experiment.source), 0, 0, "true_machine", f"{error}; state smaller ones")]
-        ) from None
+        text = f"{error}; state smaller ones"
+        raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
     if str(options.output) == "-":
         write_readings(sys.stdout, design, readings, x)
         return 0

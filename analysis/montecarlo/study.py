@@ -9,11 +9,13 @@ from simulator.design import Design, nominal_state
 from simulator.estimation.covariance import spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.parameters import shared_layout
+from simulator.experiment.load import message_at
+from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
 from simulator.generate import NoReadingError, on_true_machine
 from simulator.layout import lay_out
 from simulator.machines.truth import true_machine
-from simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
+from simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
 
 from .figures import Outcome, power_of_difference, power_of_misfit
 from .trials import Progress, run_trials
@@ -66,13 +68,19 @@ def trials(
     workers: int = 1,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Trials:
-    """Estimate replicates of an experiment's true machine; see `run_trials`."""
+    """Estimate replicates of an experiment's true machine; see `run_trials`.
+
+    :raises ExperimentError: a true machine whose errors are too large to be simulated or fitted.
+    """
     chosen = experiment.seed if seed is None else seed
     design, truth = true_experiment(experiment)
     try:
         shared = reference(design, truth)
-    except (NoReferenceError, NoReadingError) as error:
+    except NoReferenceError as error:
         return Trials(chosen, None, str(error))
+    except (NoReadingError, TooWildError) as error:
+        text = f"{error}; state smaller errors"
+        raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
     outcome = run_trials(shared, chosen, count, until, workers, report)
     return Trials(chosen, outcome, optimism=_optimism(experiment, shared) if truth.model != design.model else None)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from .calibrations import resolve_calibration
 from .checks import check_calibration_read, check_error_model, check_inside, check_names, check_true_machine, check_use
 from .machine import resolve_evaluation, resolve_machine
-from .messages import ExperimentError, Message
+from .messages import ExperimentError, Message, Steps, format_path
 from .model import Experiment
 from .placements import resolve_position
 from .priors import resolve_priors
@@ -16,7 +16,7 @@ from .problems import Problems, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import in_variants, variant_trees
-from .yamltree import Mapping, Node, read_tree
+from .yamltree import Mapping, Node, mark_of, read_tree
 
 
 def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
@@ -50,6 +50,11 @@ def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
     ]
     _raise_if_any(found, refused, source)
     return tuple(experiments)
+
+
+def message_at(source: Path, steps: Steps, text: str) -> Message:
+    """A message about a path of a file that is right by itself, such as a true machine that turns out too wild."""
+    return mark_of(read_tree(source, []), steps).message(format_path(steps), text)
 
 
 def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:

@@ -32,7 +32,11 @@ FAITHFUL = 1e-8
 
 
 class NoReferenceError(ValueError):
-    """The readings without noise do not give an estimate that the replicates could be compared with."""
+    """The design is rank deficient, so that replicates have no estimate to be compared."""
+
+
+class TooWildError(ValueError):
+    """The true machine's errors are so large that not even readings without noise can be fitted."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,8 @@ class Reference:
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.
 
-    :raises NoReferenceError: a rank deficient design, or readings without noise that cannot be fitted.
+    :raises NoReferenceError: a rank deficient design.
+    :raises TooWildError: readings without noise that cannot be fitted.
     :raises NoReadingError: errors of the true machine so large that no reading belongs to some location.
     """
     observed = _observed(design)
@@ -117,7 +122,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     observed = replace(observed, priors=_true_priors(observed, truth))
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
     if solution.status != "converged":
-        raise NoReferenceError(f"the estimate from readings without noise has {solution.status}")
+        raise TooWildError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
     p = probe_offsets(observed, start)[readings.probe]
     local = _local_models(observed, solution.spectrum, solution.factor.layout.model, start, exact)

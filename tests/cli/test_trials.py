@@ -64,8 +64,21 @@ def test_a_true_machine_too_wild_is_told(capsys: pytest.CaptureFixture[str], tmp
     wild.write_text(
         f"{head}true_machine: {{kind: random, position: 30 m, rotation: 3 rad}}\n\n{tail}", encoding="utf-8"
     )
-    assert run("run", wild, "--trials", "10") == 0
-    assert "no Monte Carlo: the errors of the true machine are too large" in capsys.readouterr().out
+    line = 1 + head.count("\n")
+    for command in (["run", wild, "--trials", "10"], ["simulate", wild, "-o", tmp_path / "r.csv"]):
+        assert run(*command) == 3
+        err = capsys.readouterr().err
+        assert err.startswith(f"{wild}:{line}:15: true_machine: the errors of the true machine are too large")
+
+
+def test_a_true_machine_that_cannot_be_fitted_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    text = Path(QUICKSTART).read_text(encoding="utf-8")
+    wild = tmp_path / "wild.yaml"
+    head, tail = text.split("true_machine:")
+    tail = tail.partition("\n\n")[2]
+    wild.write_text(f"{head}true_machine: {{kind: random, rotation: 200 mrad}}\n\n{tail}", encoding="utf-8")
+    assert run("run", wild, "--trials", "10") == 3
+    assert "true_machine: the e" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
