@@ -32,6 +32,13 @@ def add_json(parser: ArgumentParser) -> None:
     )
 
 
+def count(text: str) -> int:
+    """Read a number of things from the command line."""
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise ArgumentTypeError(f'expected a whole number, 1 or above, not "{text}"')
+    return int(text)
+
+
 def seed(text: str) -> int:
     """Read a seed from the command line."""
     if not text.isascii() or not text.isdigit():

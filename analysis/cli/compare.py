@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentTypeError, Namespace
+from functools import partial
 
-from .common import add_file, add_json
+from .common import add_file, add_json, count, seed
 
 PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "braced", "all")
 
@@ -19,13 +19,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
     )
     add_file(parser, several=True)
-    parser.add_argument("--trials", metavar="N", type=_count, default=100, help="number of data sets; default 100")
+    parser.add_argument("--trials", metavar="N", type=count, default=100, help="number of data sets; default 100")
     parser.add_argument(
         "--estimator", choices=("distances", "cresto", "kruth"), default="distances", help="default: distances"
     )
     add_pairs(parser)
-    parser.add_argument("--seed", type=_seed, help="seed of the data sets, instead of the file's")
-    parser.add_argument("--points", metavar="N", type=_count, default=200, help="pairs of points; default 200")
+    parser.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
+    parser.add_argument("--points", metavar="N", type=count, default=200, help="pairs of points; default 200")
     for key, words in (("rms", "root mean square"), ("maximum", "largest difference")):
         parser.add_argument(
             f"--published-{key}",
@@ -52,20 +52,6 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
     )
 
 
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise ValueError
-    return count
-
-
-def _seed(text: str) -> int:
-    seed = int(text)
-    if seed < 0:
-        raise ValueError
-    return seed
-
-
 def _length(text: str) -> float:
     from simulator.quantities import QuantityError, parse_length
 
@@ -78,37 +64,29 @@ def _length(text: str) -> float:
 def run(options: Namespace) -> int:
     """Compare the estimators for all experiments of the files; 1 if an estimate did not converge."""
     from ..estimators import compare_estimators, comparison_data, comparison_lines
-    from .common import experiments, print_json
+    from .common import experiments, print_json, print_lines
+    from .progress import ProgressBar
 
     published = {"rms": options.published_rms, "maximum": options.published_maximum}
     found = []
     for experiment in experiments(options):
-        comparison = compare_estimators(
-            experiment,
-            options.trials,
-            options.estimator,
-            options.pairs,
-            options.across_probes,
-            options.seed,
-            options.points,
-            _progress(experiment.label, options.trials),
-        )
+        bar = ProgressBar(f"data sets of {experiment.label}")
+        try:
+            comparison = compare_estimators(
+                experiment,
+                options.trials,
+                options.estimator,
+                options.pairs,
+                options.across_probes,
+                options.seed,
+                options.points,
+                partial(bar.show, wanted=options.trials),
+            )
+        finally:
+            bar.close()
         found.append(comparison)
         if not options.json:
-            print("\n".join([*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)]), flush=True)
+            print_lines([*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)])
     if options.json:
         print_json([comparison_data(comparison, published) for comparison in found])
     return 0 if not any(comparison.failed for comparison in found) else 1
-
-
-def _progress(label: str, trials: int):  # type: ignore[no-untyped-def]
-    """Tell the data sets done: in place on a terminal, otherwise a line for every tenth part."""
-    on_terminal = sys.stderr.isatty()
-
-    def tell(done: int) -> None:
-        if on_terminal:
-            print(f"\r{label}: {done} of {trials} data sets", end="\n" if done == trials else "", file=sys.stderr)
-        elif done == trials or done * 10 // trials > (done - 1) * 10 // trials:
-            print(f"{label}: {done} of {trials} data sets", file=sys.stderr, flush=True)
-
-    return tell

@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, seed
+from .common import add_file, add_json, count, seed
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -26,22 +26,16 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_file(parser, several=True)
     group = parser.add_argument_group("Monte Carlo")
-    group.add_argument("--trials", metavar="N", type=_count, help="number of data sets, at most")
+    group.add_argument("--trials", metavar="N", type=count, help="number of data sets, at most")
     group.add_argument(
         "--until", metavar="1%", type=_share, help="stop when the ratios of spread to U are as accurate as this"
     )
     group.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
     group.add_argument(
-        "--workers", metavar="N", type=_count, help="processes that share the work; default: one for each processor"
+        "--workers", metavar="N", type=count, help="processes that share the work; default: one for each processor"
     )
     add_json(parser)
     parser.set_defaults(run=run)
-
-
-def _count(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) < 1:
-        raise ArgumentTypeError(f'expected a whole number, 1 or above, not "{text}"')
-    return int(text)
 
 
 def _share(text: str) -> float:
