@@ -169,7 +169,7 @@ def _both_estimates(
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
     """Parameters by the full and by the rival estimator from one data set; None where one did not converge."""
-    drawn = noisy_certificate(design, truth, generator)
+    drawn = noisy_certificate(design, truth, generator, on_truth.model)
     readings, x = noisy_readings(on_truth, truth, generator)
     drawn = replace(drawn, readings=readings)
     full = gauss_newton(drawn, x, initial_state(drawn, x), ENOUGH)

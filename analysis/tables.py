@@ -38,6 +38,17 @@ def number(value: float, digits: int = 4) -> str:
     return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
 
 
+def to_uncertainty(value: float, uncertainty: float) -> str:
+    """A value to the third digit of its standard uncertainty.
+
+    >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597), to_uncertainty(12.0, float("nan"))
+    ('50000.213', '-0.042', '12.0000')
+    """
+    if math.isnan(value) or not uncertainty > 0.0:
+        return number(value, 6)
+    return f"{value:.{max(2 - math.floor(math.log10(uncertainty)), 0)}f}"
+
+
 def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
     """Rows of cells as lines of text with aligned columns.
 
@@ -135,7 +146,7 @@ def fit_lines(fit: Fit) -> list[str]:
         rows.append(
             [
                 estimate.name,
-                number(1e6 * estimate.value, 6),
+                to_uncertainty(1e6 * estimate.value, 1e6 * estimate.standard_uncertainty),
                 number(1e6 * estimate.standard_uncertainty, 3),
                 SHOWN[estimate.unit],
             ]

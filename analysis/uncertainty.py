@@ -22,6 +22,7 @@ DESCRIPTIONS = {
     "U2": "pose parameters",
     "U2 lengths": "pose parameters: origins",
     "U2 angles": "pose parameters: rotations",
+    "U2 offsets": "probe offsets",
     "U3": "model parameters",
     "U3 lengths": "model parameters: positional errors",
     "U3 angles": "model parameters: rotational errors",
@@ -91,6 +92,10 @@ def uncertainties(
     add("U2", of_poses, "m, rad", names)
     add("U2 lengths", of_poses[~angle], "m", [n for n, a in zip(names, angle, strict=True) if not a])
     add("U2 angles", of_poses[angle], "rad", [n for n, a in zip(names, angle, strict=True) if a])
+
+    offsets = slice(layout.model.stop, len(layout))
+    names = [p.name for p in layout.parameters[offsets]]
+    add("U2 offsets", found.of_shared(np.eye(len(layout))[offsets]), "m", names)
 
     reported = design.model.reported()
     quoted = np.flatnonzero(reported.matrix.any(axis=1))

@@ -88,31 +88,42 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     return balls
 
 
-def noisy_certificate(design: Design, truth: State, generator: np.random.Generator) -> Design:
-    """The design with calibration values, and priors, drawn about those of the truth."""
+def true_priors(design: Design, model: ErrorModel, truth: State) -> Priors:
+    """The design's priors with the values of the truth, whose error model is `model`.
+
+    Priors about an error model that is not the true machine's stay what they are.
+    """
+    priors = design.priors
+    if not len(priors):
+        return priors
+    if model == design.model:
+        return replace(priors, value=prior_values(design, truth))
+    of_model = (priors.position < 0) & (priors.probe < 0)
+    elsewhere = replace(truth, a=np.zeros(priors.by_model.shape[1]))
+    return replace(priors, value=np.where(of_model, priors.value, prior_values(design, elsewhere)))
+
+
+def noisy_certificate(
+    design: Design, truth: State, generator: np.random.Generator, model: ErrorModel | None = None
+) -> Design:
+    """The design with calibration values, and priors, drawn about those of the truth.
+
+    `model` is the error model of the true machine where it is not the design's.
+    """
     distances, coordinates, lengths = design.distances, design.coordinates, design.lengths
     difference = truth.balls[distances.first] - truth.balls[distances.second]
     difference *= np.arange(design.dimension) < distances.dimensions[:, None]
     true_distance = np.sqrt((difference**2).sum(axis=1))
     true_coordinate = truth.balls[coordinates.ball, coordinates.axis]
+    priors = true_priors(design, model or design.model, truth)
+
+    def drawn(value: Array, uncertainty: Array) -> Array:
+        return np.asarray(value + uncertainty * generator.standard_normal(len(uncertainty)))
+
     return replace(
         design,
-        distances=replace(
-            distances, value=true_distance + distances.uncertainty * generator.standard_normal(len(distances))
-        ),
-        coordinates=replace(
-            coordinates,
-            value=true_coordinate + coordinates.uncertainty * generator.standard_normal(len(coordinates)),
-        ),
-        lengths=replace(lengths, value=lengths.value + lengths.uncertainty * generator.standard_normal(len(lengths))),
-        priors=_drawn(design, truth, generator),
+        distances=replace(distances, value=drawn(true_distance, distances.uncertainty)),
+        coordinates=replace(coordinates, value=drawn(true_coordinate, coordinates.uncertainty)),
+        lengths=replace(lengths, value=drawn(lengths.value, lengths.uncertainty)),
+        priors=replace(priors, value=drawn(priors.value, priors.uncertainty)),
     )
-
-
-def _drawn(design: Design, truth: State, generator: np.random.Generator) -> Priors:
-    """Priors with values drawn about those of the truth."""
-    priors = design.priors
-    if not len(priors):
-        return priors
-    noise = priors.uncertainty * generator.standard_normal(len(priors))
-    return replace(priors, value=prior_values(design, truth) + noise)

@@ -95,10 +95,10 @@ def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) ->
     given = list(experiment.priors)
     places = [place.name for place in experiment.positions]
     messages = []
-    for i, prior in enumerate(given):
+    for prior in given:
         if prior.position is not None and held[places.index(prior.position), prior.component]:
             text = f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other positions'
-            messages.append(prior.mark.message(f"priors[{i}].parameter", text))
+            messages.append(prior.mark.message(prior.path, text))
     if messages:
         raise ExperimentError(messages)
     nowhere = Mark(str(experiment.source), 0, 0)

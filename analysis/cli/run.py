@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ..montecarlo.study import Trials
 
-INTERRUPTED = 130
+WRONG_USAGE, INTERRUPTED = 2, 130
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -26,7 +26,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_file(parser, several=True)
     group = parser.add_argument_group("Monte Carlo")
-    group.add_argument("--trials", metavar="N", type=count, help="number of data sets, at most")
+    group.add_argument("--trials", metavar="N", type=_trial_count, help="number of data sets, at most")
     group.add_argument(
         "--until", metavar="1%", type=_share, help="stop when the ratios of spread to U are as accurate as this"
     )
@@ -36,6 +36,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_json(parser)
     parser.set_defaults(run=run)
+
+
+def _trial_count(text: str) -> int:
+    if count(text) < 2:
+        raise ArgumentTypeError(f'one data set has no scatter; ask for 2 at least, not "{text}"')
+    return count(text)
 
 
 def _share(text: str) -> float:
@@ -57,6 +63,9 @@ def run(options: Namespace) -> int:
 
     plans, found, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
+    if not with_trials and (options.seed is not None or options.workers is not None):
+        print("ballplate run: --seed and --workers have a meaning with --trials or --until only", file=sys.stderr)
+        return WRONG_USAGE
     for experiment in experiments(options):
         plans.append(plan(experiment))
         if not options.json:

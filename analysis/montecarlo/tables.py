@@ -60,6 +60,10 @@ def trials_lines(done: Trials) -> list[str]:
         "error of the last digit",
         *aligned(rows, [False, True, True, False, True, True, True, True, False]),
     ]
+    sampled = [symbol for symbol, one in outcome.comparisons.items() if one.sampled]
+    if sampled:
+        count = outcome.comparisons[sampled[0]].count
+        lines.append(f"of {' and '.join(sampled)} a sample of {count} distances is followed")
     if any(one.flags for one in outcome.comparisons.values()):
         lines.append(f"<- differs from linear theory by more than {BEYOND:g} standard errors")
     if outcome.failed:
@@ -85,7 +89,7 @@ def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
     ]
     lines += [
         "",
-        "Too optimistic? The fitted model cannot follow the true machine.",
+        "Too optimistic? The fitted model cannot follow the true machine exactly.",
         f"actual errors are, in units of those predicted: {', '.join(ratios)}",
         f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2 alone shows the misfit in "
         f"{100 * done.optimism.power:.3g} % of experiments",

@@ -10,6 +10,7 @@ import numpy as np
 
 from simulator.montecarlo.reference import Reference
 from simulator.montecarlo.replicates import BATCH, estimate_batch
+from simulator.threads import single_threaded
 
 from .figures import Outcome, outcome
 from .tally import Tally, tally
@@ -80,6 +81,7 @@ def accuracy_of(total: Tally) -> float:
     return worst
 
 
+@single_threaded
 def sum_of_task(shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int) -> Tally:
     """Sums over the replicates of one task."""
     total: Tally | None = None
@@ -100,7 +102,6 @@ def _parts(shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, 
             yield sum_of_task(shared, aims, seed, task, trials)
         return
     from joblib import Parallel, delayed
-    from joblib.externals.loky import get_reusable_executor
 
     parallel = Parallel(n_jobs=workers, return_as="generator", pre_dispatch="2*n_jobs", batch_size=1)
     parts = parallel(delayed(_in_worker)(shared, aims, seed, task, trials) for task in tasks)
@@ -113,7 +114,6 @@ def _parts(shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, 
     finally:
         if not finished:
             # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
-            get_reusable_executor().shutdown(wait=False, kill_workers=True)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)
                 parts.close()

@@ -113,7 +113,7 @@ class Prior:
 
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation. ``probe`` and
     ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of the error model's
-    parameters. ``mark``: where it is stated.
+    parameters. ``mark`` and ``path``: where it is stated.
     """
 
     name: str
@@ -124,6 +124,7 @@ class Prior:
     value: float
     standard_uncertainty: float
     mark: Mark
+    path: str = ""
 
 
 @dataclass(frozen=True, eq=False)

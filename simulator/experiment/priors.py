@@ -9,7 +9,7 @@ from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import hint, shorten
-from .messages import Steps
+from .messages import Steps, format_path
 from .model import Machine, Position, Prior
 from .references import References
 from .sections import PriorSettings
@@ -72,7 +72,7 @@ def _prior(
             advice = "of probe offsets state the standard_uncertainty with the probe"
         problems.add((*steps, "parameter"), f'unknown parameter "{shorten(name)}"; {advice}')
         return []
-    mark = mark_of(problems.root, (*steps, "parameter"))
+    mark, place = mark_of(problems.root, (*steps, "parameter")), format_path((*steps, "parameter"))
     found = []
     for full, position, probe, component, row, unit, nominal in known[name]:
         parse, values = PARSERS[unit], []
@@ -84,5 +84,5 @@ def _prior(
         if len(values) == 2:
             if values[1] <= 0.0:
                 problems.add((*steps, "standard_uncertainty"), "must be above zero; correct it, or remove the prior")
-            found.append(Prior(full, position, probe, component, np.array(row), values[0], values[1], mark))
+            found.append(Prior(full, position, probe, component, np.array(row), values[0], values[1], mark, place))
     return found

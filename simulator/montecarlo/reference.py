@@ -7,19 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, Integers, Priors, State, nominal_state, probe_offsets
+from ..design import Design, Integers, State, nominal_state, probe_offsets
 from ..estimation.covariance import Spectrum, spectrum
 from ..estimation.elimination import Factor, eliminate
 from ..estimation.gauss_newton import gauss_newton
 from ..estimation.initial import initial_state
 from ..estimation.observations import (
     prior_rows,
-    prior_values,
     reading_blocks,
     reading_weights,
 )
 from ..estimation.parameters import shared_layout
-from ..generate import scale_readings
+from ..generate import scale_readings, true_priors
 from ..machines.protocol import Array, ErrorModel
 from ..threads import single_threaded
 from .expansion import Direct, LocalModel, expand
@@ -119,7 +118,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     p = probe_offsets(observed, truth.state)[readings.probe]
     turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
     exact = scale_readings(truth.model, turned + truth.state.origins[readings.position], truth.state.a, p)
-    observed = replace(observed, priors=_true_priors(observed, truth))
+    observed = replace(observed, priors=true_priors(observed, truth.model, truth.state))
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
     if solution.status != "converged":
         raise TooWildError(f"the estimate from its readings without noise has {solution.status}")
@@ -168,18 +167,6 @@ def reference(design: Design, truth: Truth) -> Reference:
         *prior_rows(observed, solution.factor.layout, start),
         exact,
     )
-
-
-def _true_priors(design: Design, truth: Truth) -> Priors:
-    """Priors about the truth; those about an error model that is not the true machine's stay what they are."""
-    priors = design.priors
-    if not len(priors):
-        return priors
-    if truth.model == design.model:
-        return replace(priors, value=prior_values(design, truth.state))
-    none = replace(truth.state, a=np.zeros(priors.by_model.shape[1]))
-    of_model = (priors.position < 0) & (priors.probe < 0)
-    return replace(priors, value=np.where(of_model, priors.value, prior_values(design, none)))
 
 
 def _observed(design: Design) -> Design:

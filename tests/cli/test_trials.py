@@ -85,6 +85,7 @@ def test_a_true_machine_that_cannot_be_fitted_is_told(capsys: pytest.CaptureFixt
     "options",
     [
         ["--trials", "0"],
+        ["--trials", "1"],
         ["--trials", "many"],
         ["--until", "1"],
         ["--until", "0%"],
@@ -98,6 +99,12 @@ def test_wrong_options(options: list[str], capsys: pytest.CaptureFixture[str]) -
     assert caught.value.code == 2
     err = capsys.readouterr().err
     assert f'"{options[1]}"' in err and "invalid _" not in err
+
+
+def test_options_that_would_be_ignored(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", QUICKSTART, "--seed", "3") == 2
+    out, err = capsys.readouterr()
+    assert out == "" and "--trials or --until" in err
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
