@@ -8,7 +8,7 @@ import numpy as np
 
 from simulator.montecarlo.reference import Reference
 
-from .tally import ACTUAL, COVERAGE, ESTIMATED, KNOWN, SPREAD, QuantityTally, Tally, factors
+from .tally import ACTUAL, COVERAGE, ESTIMATED, KNOWN, SPREAD, SYSTEMATIC, QuantityTally, Tally, factors
 from .targets import Target
 
 # Standard errors beyond which a difference is no accident; false in one of some hundred runs with thirty figures each.
@@ -130,11 +130,8 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
     mean_error = sums.errors / count
     # Scatter alone makes means differ from zero; what it makes of their square is taken away.
     square = float(((mean_error / aim.uncertainty) ** 2).mean() - means[SPREAD] / count)
-    scatter = errors[SPREAD] * np.sqrt(count)
-    # Correlation between members is in the scatter of a replicate's mean square, from which both parts follow.
-    error = float("inf")
-    if n > 1:
-        error = float(np.sqrt((scatter / count) ** 2 + 4.0 * max(square, 0.0) * scatter / (np.sqrt(2.0) * count)))
+    # Without a bias the square of a mean scatters as a replicate's mean square does, divided by their number once more.
+    error = float(np.hypot(errors[SPREAD] / np.sqrt(count), errors[SYSTEMATIC])) if n > 1 else float("inf")
     value = float(np.sqrt(max(square, 0.0)))
     bias = Figure(value, error / (2.0 * value) if square > error else float(np.sqrt(error)))
     flags = []

@@ -20,7 +20,7 @@ from .targets import Target
 COVERAGE = 0.95
 
 # Names of the numbers that each replicate gives for a quantity.
-SPREAD, ACTUAL, KNOWN, ESTIMATED = range(4)
+SPREAD, ACTUAL, SYSTEMATIC, KNOWN, ESTIMATED = range(5)
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,11 @@ def factors(freedom: int) -> Factors:
 
 @dataclass(frozen=True)
 class QuantityTally:
-    """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (4,) numbers and their squares.
+    """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (5,) numbers and their squares.
 
-    The four: mean square of the errors' scatter, and of the errors, in standard uncertainties; share of errors within
-    the expanded uncertainty with sigma known, and with sigma estimated from the replicate's residuals.
+    The five: mean square of the errors' scatter, and of the errors, in standard uncertainties, and the difference of
+    the two; share of errors within the expanded uncertainty with sigma known, and with sigma estimated from the
+    replicate's residuals.
     """
 
     errors: Array
@@ -104,10 +105,13 @@ def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: 
         scatter = change * (1.0 / aim.uncertainty)
         error = scatter + aim.base / aim.uncertainty
         size = np.abs(error)
+        of_scatter = np.einsum("bq,bq->b", scatter, scatter) / scatter.shape[1]
+        of_error = np.einsum("bq,bq->b", error, error) / error.shape[1]
         numbers = np.stack(
             [
-                np.einsum("bq,bq->b", scatter, scatter) / scatter.shape[1],
-                np.einsum("bq,bq->b", error, error) / error.shape[1],
+                of_scatter,
+                of_error,
+                of_error - of_scatter,
                 (size <= limits.known).mean(axis=1),
                 (size <= limits.estimated * sigma[:, None]).mean(axis=1),
             ]
