@@ -14,6 +14,9 @@ from .targets import Target
 # Standard errors beyond which a difference is no accident; false in one of some hundred runs with thirty figures each.
 BEYOND = 4.0
 
+# Data sets below which standard errors are themselves too uncertain for flags.
+ENOUGH = 100
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -142,9 +145,11 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
     if known.differs_from(COVERAGE):
         flags.append("coverage")
     if not np.isnan(estimated.value) and estimated.differs_from(COVERAGE):
-        flags.append("coverage, sigma estimated")
+        flags.append("coverage with sigma estimated")
     rms = np.sqrt(sums.squares / count)
     present = [unit for unit in ("m", "rad", "1") if unit in aim.units]
+    if n < ENOUGH:
+        flags = []
     return Comparison(
         aim.symbol,
         ", ".join(present),

@@ -77,7 +77,23 @@ def targets(shared: Reference) -> tuple[Target, ...]:
         own_none = np.zeros((*corrected.shape, design.dimension))
         result.append(_distances("U6", corrected, true, spread, own_none, moved))
     order = ["U1", "U2", "U3", "U4", "U5", "U6"]
-    return tuple(sorted(result, key=lambda target: order.index(target.symbol)))
+    found_uncertain = [uncertain for target in result if (uncertain := _uncertain(target)) is not None]
+    return tuple(sorted(found_uncertain, key=lambda target: order.index(target.symbol)))
+
+
+def _uncertain(target: Target) -> Target | None:
+    """A target without the members that no observation could change; None where nothing is left."""
+    kept = target.uncertainty > 0.0
+    if kept.all():
+        return target
+    if not kept.any():
+        return None
+    units = tuple(unit for unit, keep in zip(target.units, kept, strict=True) if keep)
+
+    def change(replicates: Deviations) -> Array:
+        return target.change(replicates)[:, kept]
+
+    return Target(target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled)
 
 
 def _balls(shared: Reference, found: Covariance) -> Target:

@@ -138,7 +138,7 @@ def test_a_replicate_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyP
 
 def test_too_poor_a_model_is_too_optimistic() -> None:
     """NPL Report CISE 15/98, section 5.3: an empirical machine, a kinematic fit."""
-    done = trials(shipped("npl/5.3.yaml", "kinematic fit"), 64)
+    done = trials(shipped("npl/5.3.yaml", "kinematic fit"), 128)
     assert done.outcome is not None and done.optimism is not None
     for symbol in ("U4", "U5", "U6"):
         one = done.outcome.comparisons[symbol]
@@ -162,6 +162,14 @@ def test_a_deficient_design_says_why_there_is_nothing() -> None:
     assert done.outcome is None
     assert trials_lines(done) == ["no Monte Carlo: the design is rank deficient by 2"]
     assert trials_data(done) == {"reason": "the design is rank deficient by 2"}
+
+
+def test_what_cannot_be_wrong_is_not_counted() -> None:
+    """The metric without a scale has no error in y at the evaluation points."""
+    done = trials(shipped("hocken_borchardt/dummy.yaml", "without scale"), 256)
+    assert done.outcome is not None
+    for one in done.outcome.comparisons.values():
+        assert np.isfinite([one.spread.value, one.bias.value]).all() and one.flags == ()
 
 
 def test_power_of_a_misfit() -> None:
