@@ -25,11 +25,11 @@ class LocalModel(Protocol):
     differs by where offsets are parameters, and `step` (b, n) what the parameters differ by; without a step it is zero.
     """
 
-    def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
+    def change(self, moved: Single | Array, step: Array | None, offsets: Array | None = None) -> Array:
         """Change of the correction (b, d, m)."""
         ...
 
-    def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
+    def gather(self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         """The derivative by the parameters, transposed, times `pull` (b, d, m): (b, n)."""
         ...
 
@@ -55,10 +55,10 @@ class Expansion:
     mixed_columns: tuple[Integers, ...]
     mixed: tuple[Single, ...]
 
-    def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
-        found = np.empty_like(moved)
+    def change(self, moved: Single | Array, step: Array | None, offsets: Array | None = None) -> Array:
+        found = np.empty(moved.shape)
         if step is not None and offsets is None and len(self.by_place[0]) > moved.shape[1]:
-            offsets = np.zeros_like(moved)
+            offsets = np.zeros(moved.shape)
         places = _places(moved, offsets)
         for i in range(len(self.columns)):
             if step is None:
@@ -79,7 +79,7 @@ class Expansion:
         slopes += self.by_place[i]
         return slopes
 
-    def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
+    def gather(self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         found = np.zeros((len(pull), self.size))
         for i, columns in enumerate(self.columns):
             found[:, columns] += pull[:, i] @ self.by_parameters[i].T
@@ -114,14 +114,14 @@ class Direct:
     def _probe(self, offsets: Array | None, k: int) -> Array:
         return self.p if offsets is None else self.p + offsets[k].T
 
-    def change(self, moved: Array, step: Array | None, offsets: Array | None = None) -> Array:
-        found = np.empty_like(moved)
+    def change(self, moved: Single | Array, step: Array | None, offsets: Array | None = None) -> Array:
+        found = np.empty(moved.shape)
         for k in range(len(moved)):
             error = self.model.error(self.x + moved[k].T, self._parameters(step, k), self._probe(offsets, k))
             found[k] = (error - self.value).T
         return found
 
-    def gather(self, moved: Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
+    def gather(self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None) -> Array:
         found = np.empty((len(pull), len(self.a)))
         for k in range(len(pull)):
             probe = self._probe(offsets, k)
@@ -137,7 +137,7 @@ class Direct:
         return found
 
 
-def _places(moved: Array, offsets: Array | None) -> Single:
+def _places(moved: Single | Array, offsets: Array | None) -> Single:
     """What readings, and offsets if they are parameters, differ by, (b, axes, m)."""
     if offsets is None:
         return moved.astype(np.float32)

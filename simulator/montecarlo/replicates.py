@@ -21,6 +21,7 @@ from ..estimation.elimination import Factor
 from ..estimation.parameters import SharedLayout
 from ..machines.protocol import Array
 from ..threads import single_threaded
+from .expansion import Single
 from .reference import Group, Reference
 
 # Replicates of a batch. The size of a matrix product decides the last bits of its result: it must be constant.
@@ -66,7 +67,7 @@ class Draw:
     """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the certificates' distances, co-ordinates
     and lengths (b, m), of priors (b, m), and of the readings of the lengths' two ends (b, d, m)."""
 
-    moved: Array
+    moved: Single
     distances: Array
     coordinates: Array
     lengths: Array
@@ -78,8 +79,9 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     """Noise of one batch."""
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
-    moved = generator.standard_normal((BATCH, *shared.noise.shape))
-    moved *= shared.noise
+    # Single precision: drawn in half the time, and noise is noise.
+    moved = generator.standard_normal((BATCH, *shared.noise.shape), np.float32)
+    moved *= shared.noise.astype(np.float32)
 
     def certificate(uncertainty: Array) -> Array:
         return uncertainty * generator.standard_normal((BATCH, len(uncertainty)))
@@ -189,7 +191,7 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) ->
     return squares, by_ball, by_shared
 
 
-def _pull(shared: Reference, group: Group, moved: Array, at: Deviations, is_start: bool) -> tuple[Array, Array]:
+def _pull(shared: Reference, group: Group, moved: Single, at: Deviations, is_start: bool) -> tuple[Array, Array]:
     """Weighted residuals (b, d, m) of a group, and its balls about their position's origin, (d, m) or (b, d, m)."""
     residual = group.residual + moved
     arm = group.arm
@@ -197,9 +199,11 @@ def _pull(shared: Reference, group: Group, moved: Array, at: Deviations, is_star
         residual += group.model.change(moved, None)
     else:
         residual += group.model.change(moved, at.a, _offsets(at, group.probe))
-        displaced = shared.start.rotations[group.position] @ at.balls[:, :, group.ball]
         # Turned less straight, so that the small difference of two large vectors is never formed.
-        displaced += _turn_less_one(at.rotations[:, group.position]) @ (group.arm + displaced)
+        less = _turn_less_one(at.rotations[:, group.position])
+        rotation = shared.start.rotations[group.position]
+        displaced = (less.reshape(-1, less.shape[2]) @ group.arm).reshape(moved.shape)
+        displaced += (rotation + less @ rotation) @ at.balls[:, :, group.ball]
         residual -= displaced
         residual -= at.origins[:, group.position, :, None]
         arm = group.arm + displaced
