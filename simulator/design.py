@@ -83,7 +83,7 @@ class Lengths:
     `first` and `second` index the readings that a length takes part in. `projected` says whether the
     difference of the corrected points is projected on the standard's nominal direction (m, d) instead of its
     norm being taken; `with_repeatability` whether the readings' own scatter along that direction adds to
-    `uncertainty`.
+    `uncertainty`. Lengths of the same `certificate`, counted from 0, share that error wherever they are read.
     """
 
     first: Integers
@@ -93,6 +93,7 @@ class Lengths:
     projected: NDArray[np.bool_]
     direction: Array
     with_repeatability: NDArray[np.bool_]
+    certificate: Integers
 
     def __len__(self) -> int:
         return len(self.first)

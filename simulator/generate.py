@@ -120,10 +120,12 @@ def noisy_certificate(
     def drawn(value: Array, uncertainty: Array) -> Array:
         return np.asarray(value + uncertainty * generator.standard_normal(len(uncertainty)))
 
+    # One error for each certificate, wherever it is read.
+    error = generator.standard_normal(int(lengths.certificate.max(initial=-1)) + 1)[lengths.certificate]
     return replace(
         design,
         distances=replace(distances, value=drawn(true_distance, distances.uncertainty)),
         coordinates=replace(coordinates, value=drawn(true_coordinate, coordinates.uncertainty)),
-        lengths=replace(lengths, value=drawn(lengths.value, lengths.uncertainty)),
+        lengths=replace(lengths, value=lengths.value + lengths.uncertainty * error),
         priors=replace(priors, value=drawn(priors.value, priors.uncertainty)),
     )

@@ -173,16 +173,17 @@ def _distances(
     """Distances between balls of plates, and the lengths that length standards contribute.
 
     A length standard contributes each of its calibrated distances once for every position and probe with
-    which both its balls are read.
+    which both its balls are read. The error of a certificate is the same in all of them, but where the readings'
+    repeatability is ignored: then the stated uncertainty stands for all that a length may be off, each time anew.
     """
     plates: list[tuple[DistanceCalibration, NDArray[np.int64]]] = []
-    first, second, value, uncertainty, projected, direction, scatter = [], [], [], [], [], [], []
+    first, second, value, uncertainty, projected, direction, scatter, certificate = [], [], [], [], [], [], [], []
     artefacts = list(experiment.artefacts)
     key = {
         (int(b), int(k), int(p)): i
         for i, (b, k, p) in enumerate(zip(readings.ball, readings.position, readings.probe, strict=True))
     }
-    for item in experiment.calibration:
+    for number, item in enumerate(experiment.calibration):
         if not isinstance(item, DistanceCalibration):
             continue
         pairs = np.asarray(item.pairs + first_ball[item.artefact], np.int64)
@@ -191,7 +192,8 @@ def _distances(
             continue
         for k in np.flatnonzero(position_artefact == artefacts.index(item.artefact)):
             for probe in range(len(experiment.probes)):
-                for pair, length, u in zip(pairs, item.values, item.standard_uncertainties, strict=True):
+                given = zip(pairs, item.values, item.standard_uncertainties, strict=True)
+                for row, (pair, length, u) in enumerate(given):
                     ends = [key.get((int(ball), int(k), probe)) for ball in pair]
                     if ends[0] is None or ends[1] is None:
                         continue
@@ -203,6 +205,7 @@ def _distances(
                     uncertainty.append(u)
                     projected.append(item.form == "projection")
                     scatter.append(item.repeatability == "included")
+                    certificate.append((number, row) if scatter[-1] else (-1, len(first)))
     lengths = Lengths(
         np.array(first, np.int64),
         np.array(second, np.int64),
@@ -211,6 +214,7 @@ def _distances(
         np.array(projected, bool),
         np.array(direction, float).reshape(-1, experiment.dimension),
         np.array(scatter, bool),
+        np.array([list(dict.fromkeys(certificate)).index(one) for one in certificate], np.int64),
     )
     distances = Distances(
         _integers([pairs[:, 0] for _, pairs in plates]),

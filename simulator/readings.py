@@ -52,8 +52,8 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
 
     The probe's column may be left out where there is one probe only. An optional column u, with a unit as in u_um,
     states the standard uncertainty of each co-ordinate of a reading; without it a reading has the uncertainty that
-    the design plans for it, and one that is not planned the machine's repeatability. A reading that stands in the
-    file several times counts as often.
+    the design plans for it, and one that is not planned the machine's repeatability. A reading stands in the file no
+    more often than the design plans it; one that is not planned, once.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that cannot be of the
         ball they name (`estimation.misreadings`); all of a kind at once.
@@ -86,6 +86,7 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
     marks = tuple(row.mark for row in rows)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
     refuse_misreadings(observed.design, observed.x, observed.marks)
+    _refuse_repeated(rows, readings, design)
     return observed
 
 
@@ -124,6 +125,26 @@ def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None
     for i, axis in np.argwhere((x < design.lower - size) | (x > design.upper + size)).tolist():
         text = f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the column's name"
         messages.append(rows[i].mark.message("", text))
+    if messages:
+        raise ExperimentError(messages)
+
+
+def _refuse_repeated(rows: tuple[Row, ...], readings: Readings, design: Design) -> None:
+    """Refuse readings that stand in the file more often than planned: a copied line counts as knowledge otherwise."""
+    planned = Counter(_key(design.readings.expanded()))
+    places: dict[tuple[int, int, int], list[Row]] = {}
+    for key, row in zip(_key(readings), rows, strict=True):
+        places.setdefault(key, []).append(row)
+    messages = []
+    for (position, ball, probe), found in places.items():
+        allowed = max(planned[position, ball, probe], 1)
+        for row in found[allowed:]:
+            text = (
+                f'ball "{design.ball_label(ball)}" is repeated in position "{design.position_names[position]}" '
+                f'with probe "{design.probe_names[probe]}" (first in line {found[0].mark.line}); remove the line, '
+                f"or state repeats: {len(found)} for that position in the experiment"
+            )
+            messages.append(row.mark.message("", text))
     if messages:
         raise ExperimentError(messages)
 
@@ -198,7 +219,7 @@ def _combine_standards(
         second=ends[1][present],
         **{
             name: getattr(design.lengths, name)[present]
-            for name in ("value", "uncertainty", "projected", "direction", "with_repeatability")
+            for name in ("value", "uncertainty", "projected", "direction", "with_repeatability", "certificate")
         },
     )
     chosen = np.concatenate([plate, first])

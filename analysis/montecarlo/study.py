@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from simulator.design import Design, nominal_state
+import numpy as np
+
+from simulator.design import Design, Priors, nominal_state
 from simulator.estimation.covariance import spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.parameters import shared_layout
@@ -14,6 +16,7 @@ from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
 from simulator.generate import NoReadingError, on_true_machine
 from simulator.layout import lay_out
+from simulator.machines.joined import JoinedModel
 from simulator.machines.truth import true_machine
 from simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
 
@@ -23,10 +26,10 @@ from .trials import Progress, run_trials
 
 @dataclass(frozen=True)
 class OwnModel:
-    """What fitting the true machine's own model as well would tell (NPL Report CISE 15/98, section 5.3).
+    """What a second fit, with the true machine's own functions added, would tell (NPL Report CISE 15/98, section 5.3).
 
-    It determines `more` parameters more, brings S^2 down by `gain` more than by chance, and the difference of the two
-    S^2 shows the misfit with probability `power`.
+    The design determines `more` parameters more of it; it brings S^2 down by `gain` more than by chance, and the
+    difference of the two S^2 shows the misfit with probability `power`.
     """
 
     more: int
@@ -90,9 +93,17 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     power = power_of_misfit(shared.degrees_of_freedom, misfit)
     if getattr(experiment.true_machine, "error_model", None) is None:
         return Optimism(power, None)
-    own = replace(shared.design, model=shared.truth.model)
-    found = spectrum(eliminate(own, shared_layout(own), nominal_state(own)))
-    more = own.parameter_count - found.deficiency - shared.design.parameter_count
-    if more <= 0:
+    design = shared.design
+    # Neither model need contain the other: what the true one's functions add is the rank of both together.
+    both = replace(design, model=JoinedModel(design.model, shared.truth.model), priors=_widened(design, shared.truth))
+    found = spectrum(eliminate(both, shared_layout(both), nominal_state(both)))
+    more = both.parameter_count - found.deficiency - design.parameter_count
+    if more == 0:
         return Optimism(power, None)
     return Optimism(power, OwnModel(more, misfit, power_of_difference(more, misfit)))
+
+
+def _widened(design: Design, truth: Truth) -> Priors:
+    """The design's priors for a model that has the true one's parameters besides."""
+    by_model = design.priors.by_model
+    return replace(design.priors, by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters)))))

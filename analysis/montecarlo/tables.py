@@ -97,8 +97,8 @@ def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
     own = done.optimism.own_model
     if own is not None:
         lines.append(
-            f"a fit of the true machine's own model, with {own.more} parameters more that this design determines, "
-            f"brings S^2 down by {own.gain:.4g} beyond what they would by chance; comparing the two shows it in "
+            f"a second fit with the true machine's own functions added, {own.more} parameters more that this design "
+            f"determines, brings S^2 down by {own.gain:.4g} beyond chance; comparing the two shows it in "
             f"{100 * own.power:.3g} %"
         )
     return lines

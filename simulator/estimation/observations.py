@@ -15,6 +15,7 @@ from ..design import Design, Readings, State, locations, pose_size, probe_offset
 from ..geometry.motions import vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel
 from .parameters import SharedLayout
+from .whitening import Whitening, whitening
 
 # Metres: of the size of probe offsets.
 OFFSET_STEP = 0.1
@@ -130,28 +131,28 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
     `x` (readings, d) holds the scale readings of all readings, or is None for an error-free machine; the
     length between corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
     """
-    residual, unit, ends, weight = _length_residuals(design, state, x)
+    residual, unit, ends, white = _length_residuals(design, state, x)
     jacobians = [design.model.jacobian(points, state.a, p) for points, p in ends]
-    return residual, np.einsum("md,mdn->mn", unit, jacobians[0] - jacobians[1]) * weight[:, None]
+    return residual, white.whitened(np.einsum("md,mdn->mn", unit, jacobians[0] - jacobians[1]))
 
 
 def length_offset_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
     """Derivative (m, s) of the same residuals by the shared parameters, those of the probe offsets only."""
     given = design.lengths
-    _, unit, ends, weight = _length_residuals(design, state, x)
+    _, unit, ends, white = _length_residuals(design, state, x)
     rows = np.zeros((len(given), len(layout) + 1))
     for sign, chosen, (points, p) in zip((1.0, -1.0), (given.first, given.second), ends, strict=True):
         by_offset = np.einsum("md,mdj->mj", unit, offset_sensitivity(design.model, points, state.a, p))
         # Held offsets go to the extra column.
         columns = layout.offset_columns[design.readings.probe[chosen]]
-        np.add.at(rows, (np.arange(len(given))[:, None], columns), sign * weight[:, None] * by_offset)
-    return rows[:, :-1]
+        np.add.at(rows, (np.arange(len(given))[:, None], columns), sign * by_offset)
+    return white.whitened(rows[:, :-1])
 
 
 def _length_residuals(
     design: Design, state: State, x: Array | None
-) -> tuple[Array, Array, list[tuple[Array, Array]], Array]:
-    """Residuals (m,), directions (m, d), points and offsets of both ends, and weights (m,) of known lengths."""
+) -> tuple[Array, Array, list[tuple[Array, Array]], Whitening]:
+    """Residuals (m,), directions (m, d), points and offsets of both ends, and the whitening of known lengths."""
     given = design.lengths
     corrected, ends, noise = [], [], []
     for chosen in (given.first, given.second):
@@ -167,8 +168,8 @@ def _length_residuals(
     length = np.einsum("md,md->m", unit, difference)
     # Along the nominal direction, so that weights stay what they are while parameters change.
     scatter = np.einsum("md,md->m", given.direction**2, noise[0] + noise[1]) * given.with_repeatability
-    weight = 1.0 / np.sqrt(given.uncertainty**2 + scatter)
-    return weight * (length - given.value), unit, ends, weight
+    white = whitening(np.sqrt(scatter), given.uncertainty, given.certificate)
+    return white.whitened(length - given.value), unit, ends, white
 
 
 def prior_values(design: Design, state: State) -> Array:

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Integers
+from ..design import Integers, Lengths
 from ..estimation.covariance import _solve_balls
 from ..estimation.elimination import Factor
 from ..estimation.parameters import SharedLayout
+from ..estimation.whitening import whitening
 from ..machines.protocol import Array
 from ..threads import single_threaded
 from .expansion import Single
@@ -88,9 +89,15 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
 
     distances = certificate(design.distances.uncertainty)
     coordinates = certificate(design.coordinates.uncertainty)
-    lengths = certificate(design.lengths.uncertainty)
+    lengths = _drawn_lengths(design.lengths, generator)
     priors = certificate(design.priors.uncertainty)
     return Draw(moved, distances, coordinates, lengths, priors, _drawn_ends(shared, generator))
+
+
+def _drawn_lengths(given: Lengths, generator: np.random.Generator) -> Array:
+    """Errors (b, m) of the certificates of lengths, one for each certificate."""
+    drawn = generator.standard_normal((BATCH, int(given.certificate.max(initial=-1)) + 1))
+    return np.asarray(given.uncertainty * drawn[:, given.certificate])
 
 
 def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
@@ -316,10 +323,10 @@ def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squ
     unit = np.where(given.projected, given.direction.T, unit)
     length = (unit * difference).sum(axis=1)
     scatter = ((given.direction.T**2) * (shared.end_noise**2).sum(axis=0)).sum(axis=0) * given.with_repeatability
-    weight = 1.0 / np.sqrt(given.uncertainty**2 + scatter)
-    residual = weight * (length - given.value - drawn.lengths)
-    squares += (residual**2).sum(axis=1)
-    pull = unit * (weight * residual)[:, None]
+    white = whitening(np.sqrt(scatter), given.uncertainty, given.certificate)
+    residual = white.whitened((length - given.value - drawn.lengths).T)
+    squares += (residual**2).sum(axis=0)
+    pull = unit * white.pulled(residual).T[:, None]
     layout = shared.factor.layout
     for sign, end, moved, probe, moved_probe in zip((1.0, -1.0), shared.ends, ends, probes, offsets, strict=True):
         by_shared[:, layout.model] += sign * end.gather(moved, step, pull, moved_probe)

@@ -214,9 +214,8 @@ def test_tables_that_are_none(
     assert refusals(change(good), tmp_path, capsys) == expected
 
 
-def test_a_line_copied_is_told_with_its_number(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text("\n".join([*good, good[3]]) + "\n", encoding="utf-8")
-    capsys.readouterr()
-    assert main(["fit", QUICKSTART, str(path)]) == 0
-    assert "read but not planned (1): z low: ball r1c3 with down (line 252)" in capsys.readouterr().err
+def test_a_line_copied_is_refused(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert refusals([*good, good[3]], tmp_path, capsys) == [
+        '252:1: ball "r1c3" is repeated in position "z low" with probe "down" (first in line 4); '
+        "remove the line, or state repeats: 2 for that position in the experiment"
+    ]

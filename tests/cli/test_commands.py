@@ -128,12 +128,15 @@ def test_fit_names_missing_and_unplanned_readings(capsys: pytest.CaptureFixture[
     readings = tmp_path / "readings.csv"
     run("simulate", QUICKSTART, "-o", readings)
     header, first, second, *rest = readings.read_text(encoding="utf-8").splitlines()
-    readings.write_text("\n".join([header, second, second, *rest]) + "\n", encoding="utf-8")
+    position, ball, _, x, y, z = second.split(",")
+    # The same ball with another probe: its tip is elsewhere by the difference of the offsets.
+    other = f"{position},{ball},right,{float(x) - 50},{y},{float(z) - 50}"
+    readings.write_text("\n".join([header, second, other, *rest]) + "\n", encoding="utf-8")
     capsys.readouterr()
     assert run("fit", QUICKSTART, readings) == 0
     _, err = capsys.readouterr()
     assert "planned but not read (1): z low: ball r1c1 with down" in err
-    assert "read but not planned (1): z low: ball r1c2 with down" in err
+    assert "read but not planned (1): z low: ball r1c2 with right" in err
 
 
 def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -149,6 +149,7 @@ def with_length_standard(design: Design, projected: bool) -> Design:
             projected=np.full(count, projected),
             direction=stated,
             with_repeatability=np.array([True, False, True]),
+            certificate=np.array([0, 1, 0]),
         ),
     )
 

@@ -102,7 +102,8 @@ def test_lengths(design: Design) -> None:
             np.array([1e-7, 2e-7, 3e-7]),
             np.array([False, True, False]),
             direction,
-            np.array([True, False, False]),
+            np.array([True, False, True]),
+            np.array([0, 1, 0]),
         ),
     )
     state = perturbed(design)

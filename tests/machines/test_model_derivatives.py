@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from simulator.machines.bases import Monomial, Polynomial, Spline
 from simulator.machines.empirical import empirical_model
+from simulator.machines.joined import JoinedModel
 from simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
 from simulator.machines.metric import MetricModel
 from simulator.machines.protocol import ErrorModel, HasLines
@@ -43,6 +44,9 @@ MODELS: dict[str, ErrorModel] = {
         }.items()
         for full in (False, True)
     },
+    "joined": JoinedModel(
+        kinematic_model(ARRANGEMENTS["MB2"], 3, 3, LOWER, UPPER), empirical_model(quadratic(), LOWER, UPPER, True)
+    ),
     **{f"metric {scale}": MetricModel(scale) for scale in ("none", "x", "y", "split")},
 }
 

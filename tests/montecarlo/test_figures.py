@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from analysis.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
 from analysis.montecarlo.study import trials, true_experiment
@@ -16,6 +17,9 @@ from analysis.montecarlo.tally import tally
 from analysis.montecarlo.targets import Target, sample_of_pairs, targets
 from analysis.montecarlo.trials import run_trials
 from analysis.study import plan
+from simulator.design import Design, nominal_state
+from simulator.estimation.observations import distance_rows, expected_readings, reading_blocks
+from simulator.estimation.parameters import shared_layout
 from simulator.experiment.load import load
 from simulator.experiment.model import Experiment
 from simulator.montecarlo.reference import Reference, reference
@@ -149,6 +153,55 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
     lines = "\n".join(trials_lines(done))
     assert "Too optimistic? The fitted model cannot follow the true machine exactly." in lines
     assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
+
+
+@pytest.mark.parametrize("variant", ["kinematic fit", "empirical fit"])
+def test_a_second_fit_with_the_true_functions(variant: str) -> None:
+    """Neither model of section 5.3 contains the other; only the kinematic one cannot follow the machine."""
+    experiment = shipped("npl/5.3.yaml", variant)
+    done = trials(experiment, 16)
+    assert done.outcome is not None
+    if variant == "empirical fit":
+        assert done.optimism is not None and done.optimism.own_model is None
+        return
+    assert done.optimism is not None and done.optimism.own_model is not None
+    own = done.optimism.own_model
+    # The rank that the true machine's functions add, by a singular value decomposition of both models' derivatives.
+    design, truth = true_experiment(experiment)
+    columns = []
+    for model in (design.model, truth.model):
+        both = replace(design, model=model)
+        columns.append(dense_columns(both))
+    ranks = [np.linalg.matrix_rank(one, tol=1e-9 * np.linalg.norm(one, 2)) for one in (columns[0], np.hstack(columns))]
+    assert own.more == ranks[1] - ranks[0]
+    assert own.gain == done.outcome.misfit.noise_free
+    expected = scipy.stats.ncx2.sf(scipy.stats.chi2.isf(0.05, own.more), own.more, own.gain)
+    assert own.power == pytest.approx(expected, abs=1e-9)
+    assert f"functions added, {own.more} parameters more" in "\n".join(trials_lines(done))
+
+
+def dense_columns(design: Design) -> np.ndarray:
+    """Derivatives of all readings and distances by balls, poses and the model, scaled to unit columns."""
+    state = nominal_state(design)
+    x = expected_readings(design, state, design.readings)
+    blocks = reading_blocks(design, state, design.readings, x)
+    m, d = blocks.residual.shape
+    layout = shared_layout(design)
+    rows = np.zeros((m, d, design.balls.size + len(layout)))
+    for i in range(m):
+        ball, place = design.readings.ball[i], layout.pose_columns[design.readings.position[i]]
+        rows[i, :, d * ball : d * ball + d] = blocks.by_ball[i]
+        rows[i][:, design.balls.size + place[place >= 0]] = blocks.by_pose[i][:, place >= 0]
+        rows[i, :, design.balls.size + layout.model.start :] = blocks.by_model[i]
+    tied = distance_rows(design, state)
+    below = np.zeros((len(tied.residual), rows.shape[2]))
+    for row, (one, other, along) in enumerate(
+        zip(design.distances.first, design.distances.second, tied.derivative, strict=True)
+    ):
+        below[row, d * one : d * one + d] = along
+        below[row, d * other : d * other + d] = -along
+    whole = np.concatenate([rows.reshape(m * d, -1), below])
+    return np.asarray(whole / np.maximum(np.linalg.norm(whole, axis=0), 1e-30))
 
 
 def test_a_model_that_holds_the_true_one_is_not_blamed() -> None:

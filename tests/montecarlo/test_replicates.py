@@ -86,6 +86,7 @@ def with_length_standard(projected: bool) -> Design:
             np.array([projected, projected]),
             -direction,
             np.array([True, True]),
+            np.array([0, 0]),
         ),
     )
 

@@ -213,16 +213,24 @@ def residuals(problem: Problem, step: Values) -> Values:
     for i in range(len(given.ball)):
         rows.append((balls[given.ball[i], given.axis[i]] - given.value[i]) / given.uncertainty[i])
     given = design.lengths
+    errors: list[Any] = []
+    covariance = np.zeros((len(given.first), len(given.first)))
     for i in range(len(given.first)):
         first, second = given.first[i], given.second[i]
         between = points[first] - points[second]
         along = given.direction[i]
-        variance = given.uncertainty[i] ** 2
+        variance = 0.0
         if given.with_repeatability[i]:
             for end in (first, second):
                 variance += ((along * design.repeatability) ** 2).sum() / readings.repeats[end]
         measured = along @ between if given.projected[i] else length(between)
-        rows.append((measured - given.value[i]) / np.sqrt(variance))
+        errors.append(measured - given.value[i])
+        covariance[i, i] += variance
+        for j in range(len(given.first)):
+            if given.certificate[i] == given.certificate[j]:
+                covariance[i, j] += given.uncertainty[i] * given.uncertainty[j]
+    if errors:
+        rows.extend(np.linalg.solve(np.linalg.cholesky(covariance), np.array(errors)))
     return np.array(rows)
 
 

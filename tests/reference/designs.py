@@ -168,7 +168,7 @@ def plate_design(
 def no_lengths() -> Lengths:
     """A design's lengths where it has no length standard."""
     none, empty = np.zeros(0, np.int64), np.zeros(0)
-    return Lengths(none, none, empty, empty, none.astype(bool), np.zeros((0, 3)), none.astype(bool))
+    return Lengths(none, none, empty, empty, none.astype(bool), np.zeros((0, 3)), none.astype(bool), none)
 
 
 def grid_experiment(n: int, points: int = 200, position_coefficients: int = 5) -> Design:
