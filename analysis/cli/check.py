@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from argparse import Namespace
+from pathlib import Path
 
-from .common import add_file, add_json
+from .common import add_file
+
+FORMATS = ("text", "github", "junit", "json")
+AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -12,24 +18,48 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "check",
         help="judge whether designs determine all their parameters",
         description="Judge the rank of each design. The exit status is 0 if every deficiency is the one that the "
-        "file expects (none, where it says nothing), otherwise 1.",
+        "file expects (none, where it says nothing), otherwise 1; it is 3 if a file cannot be used, and the others "
+        "are then checked nevertheless.",
     )
     add_file(parser, several=True)
-    add_json(parser)
+    parser.add_argument(
+        "--format",
+        choices=FORMATS,
+        default="text",
+        help="text (default); github: workflow commands of GitHub Actions, which mark lines of a pull request; junit: "
+        "an XML report for build servers; json: an object, or an array of them for several experiments, in metres and "
+        "radians",
+    )
+    parser.add_argument("--json", action="store_const", dest="format", const="json", help="the same as --format json")
     parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
-    """Check all designs; 1 if one of them is not as expected."""
-    from ..study import check
+    """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
+    from ..annotations import annotation_lines
+    from ..checking import check_files
+    from ..junit import junit_report
     from ..tables import plan_data, plan_lines
-    from .common import experiments, print_json, print_lines
+    from .common import print_json, print_lines
 
-    plans = []
-    for experiment in experiments(options):
-        plans.append(check(experiment))
-        if not options.json:
-            print_lines(plan_lines(plans[-1]))
-    if options.json:
-        print_json([plan_data(plan) for plan in plans])
-    return 0 if all(plan.verdict.as_expected for plan in plans) else 1
+    workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
+    files = []
+    for checked in check_files(options.files, options.variant):
+        files.append(checked)
+        if options.format == "github":
+            for line in annotation_lines(checked, workspace):
+                print(line, flush=True)
+        elif options.format == "text":
+            for design in checked.designs:
+                print_lines(plan_lines(design.plan))
+        if options.format in ("text", "json"):
+            for message in checked.messages:
+                print(message, file=sys.stderr)
+    if options.format == "junit":
+        print(junit_report(files), end="")
+    designs = [design for checked in files for design in checked.designs]
+    if options.format == "json" and designs:
+        print_json([plan_data(design.plan) for design in designs])
+    if any(checked.messages for checked in files):
+        return BAD_FILE
+    return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED

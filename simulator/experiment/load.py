@@ -12,11 +12,11 @@ from .messages import ExperimentError, Message, Steps, format_path
 from .model import Experiment
 from .placements import resolve_position
 from .priors import resolve_priors
-from .problems import Problems, written_count
+from .problems import Problems, written, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import in_variants, variant_trees
-from .yamltree import Mapping, Node, mark_of, read_tree
+from .yamltree import Mapping, Mark, Node, mark_of, read_tree
 
 
 def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
@@ -55,6 +55,18 @@ def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
 def message_at(source: Path, steps: Steps, text: str) -> Message:
     """A message about a path of a file that is right by itself, such as a true machine that turns out too wild."""
     return mark_of(read_tree(source, []), steps).message(format_path(steps), text)
+
+
+def place_in(source: Path, variant: str | None, steps: Steps) -> Mark:
+    """Where a path stands in a file that is right, or in a variant of it.
+
+    What nobody has written is looked for in the variant's name, and without variants in the positions.
+    """
+    root = read_tree(source, [])
+    tree = root if variant is None else variant_trees(root, Problems(root))[variant]
+    if written(tree, *steps) is not None:
+        return mark_of(tree, steps)
+    return mark_of(root, ("positions",) if variant is None else ("variants", variant), of_key=True)
 
 
 def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:

@@ -1,0 +1,72 @@
+"""Checked files as workflow commands of GitHub Actions, which mark the lines of a pull request."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .checking import CheckedDesign, CheckedFile
+from .tables import verdict_lines
+
+
+def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:
+    """One line for each error of a file and for each design; those as expected are told without a mark.
+
+    Files are named from `workspace`, the top of the repository, where they lie in it.
+    """
+    lines = [
+        _error(
+            checked.file if not message.line else message.file,
+            message.line,
+            message.column,
+            "experiment file",
+            str(message),
+            workspace,
+        )
+        for message in checked.messages
+    ]
+    return lines + [_design_line(checked.file, design, workspace) for design in checked.designs]
+
+
+def _design_line(file: str, design: CheckedDesign, workspace: Path | None) -> str:
+    told = verdict_lines(design.plan.verdict)
+    if design.place is None:
+        # What stands before the name keeps it from being read as a command, and so does the space after a hash.
+        return f"as expected: {file}: {design.plan.label}: {told[0]}".replace("##[", "# #[").replace("\n", " ")
+    place = design.place
+    # The log of a run shows only the message, so that it names the place again.
+    text = "\n".join([f"{place.file}:{place.line}:{place.column}: {design.plan.label}: {told[0]}", *told[1:]])
+    return _error(place.file, place.line, place.column, f"rank of {design.plan.label}", text, workspace)
+
+
+def _error(file: str, line: int, column: int, title: str, text: str, workspace: Path | None) -> str:
+    place = {"file": _named_from(workspace, file)}
+    if line:
+        place |= {"line": str(line), "col": str(column)}
+    place["title"] = title
+    return f"::error {','.join(f'{key}={in_property(value)}' for key, value in place.items())}::{in_message(text)}"
+
+
+def _named_from(workspace: Path | None, file: str) -> str:
+    if workspace is None:
+        return file
+    path = Path(os.path.abspath(file))
+    return path.relative_to(workspace).as_posix() if path.is_relative_to(workspace) else file
+
+
+def in_message(text: str) -> str:
+    r"""A text as the message of a workflow command.
+
+    >>> in_message("5 %\nnext")
+    '5 %25%0Anext'
+    """
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def in_property(text: str) -> str:
+    """A text as a property of a workflow command, where colons and commas have a meaning as well.
+
+    >>> in_property("a, b: 100 %")
+    'a%2C b%3A 100 %25'
+    """
+    return in_message(text).replace(":", "%3A").replace(",", "%2C")

@@ -1,0 +1,255 @@
+"""What `check` says to build servers, and the action and the hook that call it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+from analysis.annotations import annotation_lines, in_message, in_property
+from analysis.checking import CheckedFile, check_files
+from analysis.cli import main
+from analysis.junit import junit_report
+from simulator.experiment.messages import Message
+
+QUICKSTART = Path("designs/quickstart.yaml")
+SYMMETRICAL = Path("designs/npl/6.1.1.yaml")
+COMMAND = re.compile(r"::error file=(.*?)(?:,line=(\d+),col=(\d+))?,title=(.*?)::(.*)")
+
+
+def run(*arguments: str | Path) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One good file, one with two wrong ranks, one that cannot be used, one that states no rank and lacks it."""
+    good = QUICKSTART.read_text(encoding="utf-8")
+    (tmp_path / "good.yaml").write_text(good, encoding="utf-8")
+    symmetrical = SYMMETRICAL.read_text(encoding="utf-8").replace("deficiency: 2", "deficiency: 1")
+    (tmp_path / "wrong.yaml").write_text(symmetrical, encoding="utf-8")
+    (tmp_path / "broken.yaml").write_text(good.replace("0.2 um            #", "100 %             #"), encoding="utf-8")
+    without = re.sub(r"expected_rank_deficiency: .*\n", "", good)
+    without = re.sub(r"  - {name: [xy] .*\n", "", without)
+    (tmp_path / "silent.yaml").write_text(without, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
+    return tmp_path
+
+
+def test_every_file_is_worked_through(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", "broken.yaml", "missing.yaml", "good.yaml") == 3
+    out, err = capsys.readouterr()
+    assert "full rank, as expected; 174 parameters" in out
+    assert [line.partition(":")[0] for line in err.splitlines()] == ["broken.yaml", "missing.yaml"]
+    assert run("check", "wrong.yaml", "good.yaml") == 1
+    assert run("check", "wrong.yaml", "broken.yaml") == 3
+
+
+def test_json_is_a_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for option in (["--json"], ["--format", "json"]):
+        assert run("check", *option, "good.yaml") == 0
+        assert json.loads(capsys.readouterr().out)["rank_deficiency"] == 0
+        assert run("check", *option, "wrong.yaml", "broken.yaml") == 3
+        out, err = capsys.readouterr()
+        assert [one["as_expected"] for one in json.loads(out)] == [True, False, True, False]
+        assert err.startswith("broken.yaml:10:18: machine.repeatability: ")
+        assert run("check", *option, "broken.yaml") == 3
+        assert capsys.readouterr().out == ""
+
+
+def test_an_unknown_variant_is_an_error_in_every_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("text", "github", "junit", "json"):
+        assert run("check", "--format", name, "--variant", "E", "wrong.yaml") == 3
+        out, err = capsys.readouterr()
+        assert "no variant" in out + err
+        # The file that has it may be the one that cannot be used.
+        assert run("check", "--format", name, "--variant", "E", "wrong.yaml", "broken.yaml") == 3
+        out, err = capsys.readouterr()
+        assert "no variant" not in out + err
+
+
+def test_workflow_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", "--format", "github", "good.yaml", "wrong.yaml", "broken.yaml", "missing.yaml") == 3
+    out, err = capsys.readouterr()
+    assert err == ""
+    lines = out.splitlines()
+    good = [line for line in lines if not COMMAND.fullmatch(line)]
+    assert [line.split(": ")[2] for line in good] == ["good", "wrong[A]", "wrong[C]"]
+    assert all(line.startswith("as expected: ") for line in good)
+    bad = [match.groups()[:4] for match in map(COMMAND.fullmatch, lines) if match is not None]
+    assert [one[0] for one in bad] == ["wrong.yaml", "wrong.yaml", "broken.yaml", "missing.yaml"]
+    assert bad[2:] == [("broken.yaml", "10", "18", "experiment file"), ("missing.yaml", None, None, "experiment file")]
+
+
+def test_workflow_commands_mark_the_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", "--format", "github", "wrong.yaml", "silent.yaml") == 1
+    lines = capsys.readouterr().out.splitlines()
+    found = {match[4]: match for match in map(COMMAND.fullmatch, lines) if match is not None}
+    source = {name: (folder / name).read_text(encoding="utf-8").splitlines() for name in ("wrong.yaml", "silent.yaml")}
+    for variant in "BD":
+        match = found[f"rank of wrong[{variant}]"]
+        line, column = int(match[2]), int(match[3])
+        assert source["wrong.yaml"][line - 1][column - 1 :] == "1"
+        assert source["wrong.yaml"][line - 2].strip().startswith("calibration:")
+        assert match[5].startswith(f"wrong.yaml:{line}:{column}: wrong[{variant}]: rank deficiency 2, expected 1; ")
+        assert "%0Aundetermined 2: " in match[5]
+    match = found["rank of silent"]
+    assert source["silent.yaml"][int(match[2]) - 1] == "positions:" and match[3] == "1"
+    assert re.search("rank deficiency [0-9]+, expected full rank", match[5])
+
+
+def test_files_are_named_from_the_top_of_the_repository(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_WORKSPACE", str(folder.parent))
+    assert run("check", "--format", "github", "broken.yaml", folder / "missing.yaml", "../../elsewhere.yaml") == 3
+    names = [match[1] for match in map(COMMAND.fullmatch, capsys.readouterr().out.splitlines()) if match is not None]
+    assert names == [f"{folder.name}/broken.yaml", f"{folder.name}/missing.yaml", "../../elsewhere.yaml"]
+
+
+def test_escapes_of_workflow_commands() -> None:
+    assert in_message("50 %\r\n%0A: a, b") == "50 %25%0D%0A%250A: a, b"
+    assert in_property("a:b,c%\n") == "a%3Ab%2Cc%25%0A"
+    message = Message("odd, name: 5 %.yaml", 3, 4, "title", "two\nlines, 5 %")
+    (line,) = annotation_lines(CheckedFile("odd, name: 5 %.yaml", (), (message,)))
+    assert line == (
+        "::error file=odd%2C name%3A 5 %25.yaml,line=3,col=4,title=experiment file::"
+        "odd, name: 5 %25.yaml:3:4: title: two%0Alines, 5 %25"
+    )
+
+
+def test_no_name_is_taken_for_a_command(folder: Path) -> None:
+    path = folder / "##[error]::stop-commands::x.yaml"
+    path.write_text((folder / "good.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    (checked,) = check_files([path])
+    (line,) = annotation_lines(checked)
+    assert line.startswith("as expected: ") and "##[" not in line
+
+
+def test_junit_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("check", "--format", "junit", "good.yaml", "wrong.yaml", "broken.yaml") == 3
+    out, err = capsys.readouterr()
+    assert err == ""
+    top = ElementTree.fromstring(out)
+    assert top.tag == "testsuites" and (top.get("tests"), top.get("failures"), top.get("errors")) == ("6", "2", "1")
+    counts = [tuple(suite.get(key) for key in ("name", "tests", "failures", "errors")) for suite in top]
+    assert counts == [
+        ("good.yaml", "1", "0", "0"), ("wrong.yaml", "4", "2", "0"), ("broken.yaml", "1", "0", "1")
+    ]  # fmt: skip
+    cases = {case.get("name"): case for case in top.iter("testcase")}
+    assert list(cases) == ["good", "wrong[A]", "wrong[B]", "wrong[C]", "wrong[D]", "experiment file"]
+    assert [name for name, case in cases.items() if case.find("failure") is not None] == ["wrong[B]", "wrong[D]"]
+    failure = cases["wrong[B]"].find("failure")
+    assert failure is not None and failure.get("message", "").startswith("rank deficiency 2, expected 1")
+    assert "undetermined 2: EXX" in (failure.text or "")
+    error = cases["experiment file"].find("error")
+    assert error is not None and "machine.repeatability" in (error.text or "")
+
+
+def test_a_junit_report_is_well_formed_for_any_text() -> None:
+    odd = "".join(map(chr, range(0x20))) + "\x7f\ud800\udcff\ufffe\uffff<&\"'>]]>\U0001f600µ"
+    message = Message(f"{odd}.yaml", 1, 2, odd, odd)
+    report = junit_report([CheckedFile(f"{odd}.yaml", (), (message, message))])
+    assert report.isascii()
+    (suite,) = ElementTree.fromstring(report)
+    kept = "\t\n\r\x7f<&\"'>]]>\U0001f600µ"
+    assert suite.get("name") == f" {kept}.yaml".replace(" ", "", 1)
+    error = suite.find("testcase/error")
+    assert error is not None and error.get("message") == f"{kept}.yaml:1:2: {kept}: {kept}"
+    assert junit_report([])
+
+
+def described(name: str) -> Any:
+    return yaml.safe_load(Path(name).read_text(encoding="utf-8"))
+
+
+def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a script as GitHub's shell `bash` does, with the command of this source tree."""
+    tools = folder / "tools"
+    tools.mkdir(exist_ok=True)
+    program = tools / "ballplate"
+    program.write_text(
+        f"#!{sys.executable}\nimport sys\nsys.path.insert(0, {os.getcwd()!r})\n"
+        "from analysis.cli import main\nsys.exit(main())\n",
+        encoding="utf-8",
+    )
+    program.chmod(0o755)
+    return subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script],
+        cwd=folder,
+        env={**os.environ, "PATH": f"{tools}:{os.environ['PATH']}", "GITHUB_WORKSPACE": str(folder), **variables},
+        capture_output=True,
+        text=True,
+    )
+
+
+def a_repository(top: Path) -> None:
+    """Designs in folders, one of them with a blank in its name, beside a YAML file that is none."""
+    text = QUICKSTART.read_text(encoding="utf-8")
+    for name in ("designs/one.yaml", "designs/more/of them.yaml"):
+        path = top / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    (top / "settings.yaml").write_text("colour: blue\n", encoding="utf-8")
+
+
+def test_the_action_checks(tmp_path: Path) -> None:
+    action = described("action.yml")
+    assert action["runs"]["using"] == "composite"
+    *_, check = action["runs"]["steps"]
+    assert check["shell"] == "bash" and check["env"] == {"FILES": "${{ inputs.files }}"}
+    a_repository(tmp_path)
+    found = shell(check["run"], tmp_path, FILES=action["inputs"]["files"]["default"])
+    assert (found.returncode, found.stderr) == (0, "")
+    assert [line.split(": ")[1] for line in found.stdout.splitlines()] == [
+        "designs/more/of them.yaml",
+        "designs/one.yaml",
+    ]
+    (tmp_path / "designs/one.yaml").write_text("title: nothing else\n", encoding="utf-8")
+    found = shell(check["run"], tmp_path, FILES="designs/o*.yaml\ndesigns/more/of them.yaml\n")
+    assert found.returncode == 3
+    lines = found.stdout.splitlines()
+    assert lines[-1].startswith("as expected: designs/more/of them.yaml")
+    assert len(lines) > 1 and all(line.startswith("::error file=designs/one.yaml,line=1,") for line in lines[:-1])
+    # A pattern that nothing matches is no success, and what an input contains is never run.
+    found = shell(check["run"], tmp_path, FILES="nothing/*.yaml\n$(touch intruder)")
+    assert found.returncode == 3 and "nothing/*.yaml" in found.stdout
+    assert not (tmp_path / "intruder").exists()
+
+
+def test_the_action_installs(tmp_path: Path) -> None:
+    """Nothing is fetched here: the command is run with a Python that only writes down what it is told."""
+    action = described("action.yml")
+    _, install, _ = action["runs"]["steps"]
+    assert install["env"] == {"INSTALL": "${{ inputs.install }}"}
+    recorder = tmp_path / "tools" / "python"
+    recorder.parent.mkdir()
+    recorder.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n', encoding="utf-8")
+    recorder.chmod(0o755)
+    for chosen, expected in ((action["inputs"]["install"]["default"], "/actions/ballplate"), ("ballplate==0.1", None)):
+        found = shell(install["run"], tmp_path, INSTALL=chosen, GITHUB_ACTION_PATH="/actions/ballplate")
+        assert found.stdout.splitlines() == ["-m", "pip", "install", "--quiet", expected or chosen]
+
+
+def test_the_hook(tmp_path: Path) -> None:
+    (hook,) = described(".pre-commit-hooks.yaml")
+    assert (hook["id"], hook["language"], hook["types"]) == ("ballplate-check", "python", ["yaml"])
+    a_repository(tmp_path)
+    every = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.yaml"))
+    chosen = [name for name in every if re.search(hook["files"], name)]
+    assert chosen == ["designs/more/of them.yaml", "designs/one.yaml"]
+    script = f'{hook["entry"]} "$@"'
+    quoted = f"set -- {' '.join(json.dumps(name) for name in chosen)}; {script}"
+    found = shell(quoted, tmp_path)
+    assert found.returncode == 0 and found.stdout.count("full rank, as expected") == 2
+    (tmp_path / "designs/one.yaml").write_text("title: nothing else\n", encoding="utf-8")
+    assert shell(quoted, tmp_path).returncode == 3
