@@ -286,7 +286,7 @@ class ExperimentSettings(Settings):
         "standard_uncertainty: …} where it is estimated; optional in 2-D",
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
-        description="name → artefact: grid, square, balls or two_spheres"
+        description="name → artefact: grid, square, balls, two_spheres or sphere"
     )
     positions: Annotated[tuple[PositionSettings, ...], Field(min_length=1)] = Field(
         description="where the artefacts are put and what is read there"

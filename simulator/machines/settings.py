@@ -98,7 +98,7 @@ def _without(settings: Settings, keys: tuple[str, ...], instead: str) -> None:
 class KinematicSettings(Settings):
     """Errors of each axis as polynomials or splines, superposed along the chain of axes."""
 
-    kind: Literal["kinematic"]
+    kind: Literal["kinematic"] = Field(description="errors of each axis, superposed along the chain of axes")
     arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
     rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
     position_coefficients: int = Field(
@@ -135,7 +135,7 @@ class RadialSettings(Settings):
 class EmpiricalSettings(Settings):
     """Six functions of three variables: displacement and rotation of the probe."""
 
-    kind: Literal["empirical"]
+    kind: Literal["empirical"] = Field(description="six functions of x, y and z")
     terms: Annotated[
         Annotated[Literal["sums", "quadratic", "tensor"], Tag("<one>")]
         | Annotated[RadialSettings, Tag("<mapping>")]
@@ -172,7 +172,7 @@ class EmpiricalSettings(Settings):
 class MetricSettings(Settings):
     """A two-dimensional machine of straight axes: squareness and scale difference."""
 
-    kind: Literal["metric"]
+    kind: Literal["metric"] = Field(description="straight axes in two dimensions")
     scale: Scale = Field(
         default="none", description="Which axis takes the scale difference gamma: x, y, split between both, or none."
     )
@@ -181,7 +181,7 @@ class MetricSettings(Settings):
 class PythonSettings(Settings):
     """A user's own error model, made by a Python function that is called with the volume's corners and the options."""
 
-    kind: Literal["python"]
+    kind: Literal["python"] = Field(description="a model of the user's own")
     object: Annotated[str, StringConstraints(min_length=1)] = Field(
         description="module:function, the module installed or beside this file, or the name of an installed entry "
         "point of the group ballplate.error_models."
@@ -239,7 +239,7 @@ ErrorModelSettings = Annotated[Union[tuple(ERROR_MODELS)], Field(discriminator="
 class ZeroSettings(Settings):
     """A machine without errors."""
 
-    kind: Literal["zero"] = "zero"
+    kind: Literal["zero"] = Field(default="zero", description="no errors")
 
 
 OTHER_MODEL = "Error model of the true machine, where it is another than the estimated one."
@@ -248,7 +248,7 @@ OTHER_MODEL = "Error model of the true machine, where it is another than the est
 class CoefficientSettings(Settings):
     """A machine with stated errors."""
 
-    kind: Literal["coefficients"]
+    kind: Literal["coefficients"] = Field(description="stated errors")
     values: dict[str, str] = Field(
         description="Value with unit of each parameter that is not zero, by its name in the error model or in the "
         'monomial form, for example "EXX t^2": 3 um.'
@@ -261,7 +261,7 @@ class CoefficientSettings(Settings):
 class RandomSettings(Settings):
     """A machine whose errors are drawn at random with stated sizes."""
 
-    kind: Literal["random"]
+    kind: Literal["random"] = Field(description="errors drawn at random")
     position: PositiveLength | None = Field(
         default=None, description="Root mean square of each positional error along its axis, or in the volume."
     )
@@ -277,7 +277,7 @@ class RandomSettings(Settings):
 class CurvesSettings(Settings):
     """A machine with measured error curves."""
 
-    kind: Literal["curves"]
+    kind: Literal["curves"] = Field(description="measured error curves")
     files: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
         description="CSV files, each with the columns position_mm and errors of one axis such as EXX_um and EAX_urad; "
         "errors that no file has are zero."
