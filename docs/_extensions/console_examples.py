@@ -2,8 +2,9 @@
 
 Each page has a folder of its own with a copy of the designs, in which its examples follow one another:
 
-`{console}`      lines that begin with `$ ` are commands; the output follows each of them. `:status:` is the exit status
-                 of the last one, any other stops the build; `:shown:` cuts its output after so many lines.
+`{console}`      lines that begin with `$ ` are commands, and their output follows them. `:status:` is the exit status
+                 of the last one, any other ends the build. Of its output `:only:` shows lines with a pattern, `:from:`
+                 what follows the first such line, `:shown:` so many lines.
 `{file} NAME`    writes a file and shows it.
 `{edit} NAME`    changes a file, as a difference: lines with `-` go, lines with `+` come, others stay.
 `{python-run}`   runs a program and shows what it prints.
@@ -12,15 +13,21 @@ Each page has a folder of its own with a copy of the designs, in which its examp
 from __future__ import annotations
 
 import errno
+import importlib
 import os
 import pty
+import re
 import shlex
 import shutil
-import subprocess
 import sys
 import tempfile
+import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+# One thread, so that the last digits are the same in every build; NumPy asks for it when it is loaded.
+os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
 
 from docutils import nodes
 from docutils.parsers.rst import directives
@@ -30,8 +37,22 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 TOP = Path(__file__).resolve().parents[2]
-COLUMNS = 100
-LANGUAGES = {".yaml": "yaml", ".py": "python"}
+LANGUAGES = {".yaml": "yaml", ".yml": "yaml", ".py": "python"}
+TERMINAL = {"COLUMNS": "100", "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "PYTHONPATH": str(TOP), "TERM": "dumb"}
+# What the commands load when they are run; loaded before, it takes no time for each of them.
+LOADED_BEFORE = (
+    "analysis.annotations",
+    "analysis.cli",
+    "analysis.junit",
+    "analysis.montecarlo.study",
+    "analysis.montecarlo.tables",
+    "simulator.generate",
+    "simulator.readings",
+    "scipy.interpolate",
+    "scipy.linalg",
+    "scipy.spatial",
+    "scipy.special",
+)
 
 
 class _Example(SphinxDirective):
@@ -51,28 +72,45 @@ class _Example(SphinxDirective):
         source, line = self.get_source_info()
         return ExtensionError(f"{source}:{line}: {text}")
 
-    def execute(self, arguments: list[str], expected: int) -> list[str]:
+    def execute(self, what: str, action: Callable[[], int], expected: int = 0) -> list[str]:
         """What a terminal shows of a command, line by line."""
-        status, text = _on_terminal(arguments, self.folder)
+        status, text = _on_terminal(action, self.folder)
         if status != expected:
-            raise self.refuse(f"{arguments[-1]}\nexit status {status} instead of {expected}:\n{text}")
+            raise self.refuse(f"{what}\nexit status {status} instead of {expected}:\n{text}")
         text = text.replace("\r\n", "\n").replace(f"{self.folder}/", "")
         # What a progress bar has drawn is cleared again.
         return [line.rpartition("\r\x1b[K")[2].rstrip() for line in text.rstrip("\n").split("\n")] if text else []
 
 
 class Console(_Example):
-    option_spec = {"status": directives.nonnegative_int, "shown": directives.nonnegative_int}  # noqa: RUF012
+    option_spec = {
+        "status": directives.nonnegative_int,
+        "only": directives.unchanged,
+        "from": directives.unchanged,
+        "shown": directives.nonnegative_int,
+    }
 
     def run(self) -> list[nodes.Node]:
-        commands = "\n".join(self.content).removeprefix("$ ").split("\n$ ")
+        *before, last = "\n".join(self.content).removeprefix("$ ").split("\n$ ")
         shown = []
-        for i, command in enumerate(commands):
-            is_last = i == len(commands) - 1
-            lines = self.execute(["bash", "-o", "pipefail", "-c", command], self.options.get("status", 0) if is_last else 0)
-            limit = self.options.get("shown", len(lines)) if is_last else len(lines)
-            shown += [f"$ {command}", *lines[:limit], *(["…"] if limit < len(lines) else [])]
+        for command in before:
+            shown += [f"$ {command}", *self.execute(command, _command(command))]
+        lines = self.execute(last, _command(last), self.options.get("status", 0))
+        shown += [f"$ {last}", *self.selected(lines)]
         return [nodes.literal_block("", "\n".join(shown), language="console")]
+
+    def selected(self, lines: list[str]) -> list[str]:
+        """The lines that the options ask for, with dots where some are left out."""
+        for option in ("from", "only"):
+            pattern = self.options.get(option)
+            if pattern is None:
+                continue
+            places = [i for i, line in enumerate(lines) if re.search(pattern, line)]
+            if not places:
+                raise self.refuse(f'no line has "{pattern}":\n' + "\n".join(lines))
+            lines = ["…", *lines[places[0] :]] if option == "from" else [lines[i] for i in places]
+        limit = self.options.get("shown", len(lines))
+        return lines if len(lines) <= limit else [*lines[:limit], "…"]
 
 
 class File(_Example):
@@ -105,33 +143,48 @@ class Edit(_Example):
 class PythonRun(_Example):
     def run(self) -> list[nodes.Node]:
         source = "\n".join(self.content)
-        lines = self.execute([sys.executable, "-c", source], 0)
+        lines = self.execute(source, lambda: exec(source, {"__name__": "__main__"}) or 0)
         blocks: list[nodes.Node] = [nodes.literal_block("", source, language="python")]
         return blocks + ([nodes.literal_block("", "\n".join(lines), language="text")] if lines else [])
 
 
-def _on_terminal(arguments: list[str], folder: Path) -> tuple[int, str]:
-    """Exit status of a command and what it writes to a terminal, standard error included."""
-    ours, theirs = pty.openpty()
-    # One thread, so that the last digits are the same in every build.
-    environment = {
-        **{key: value for key, value in os.environ.items() if not key.startswith(("GITHUB_", "SPHINX", "PYTHON"))},
-        **dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
-        "COLUMNS": str(COLUMNS),
-        "LC_ALL": "C.UTF-8",
-        "NO_COLOR": "1",
-        "PATH": f"{_tools()}:{os.environ['PATH']}",
-        "PYTHONPATH": str(TOP),
-        "TERM": "dumb",
-    }
-    process = subprocess.Popen(
-        arguments, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=theirs, stderr=theirs
-    )
-    os.close(theirs)
+def _command(command: str) -> Callable[[], int]:
+    """What runs a line of the shell, the program itself without one where that does as well."""
+    if not command.startswith("ballplate ") or set(command) & set("|&;<>()*?$`\\~#"):
+        return lambda: os.execvp("bash", ["bash", "-o", "pipefail", "-c", command])
+
+    def run() -> int:
+        from analysis.cli import main
+
+        return main(shlex.split(command)[1:])
+
+    return run
+
+
+def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
+    """Exit status of an action in a process of its own, and what it writes to its terminal."""
+    tools = _tools()
+    process, terminal = pty.fork()
+    if process == 0:
+        status = 1
+        try:
+            os.chdir(folder)
+            os.environ.update(TERMINAL, PATH=f"{tools}:{os.environ['PATH']}")
+            os.environ.pop("GITHUB_WORKSPACE", None)
+            sys.stdout, sys.stderr = (os.fdopen(i, "w", buffering=1, encoding="utf-8") for i in (1, 2))
+            sys.path.insert(0, str(TOP))
+            status = action()
+            sys.stdout.flush()
+        except SystemExit as end:
+            status = end.code if isinstance(end.code, int) else 1
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(status)
     pieces = []
     while True:
         try:
-            piece = os.read(ours, 65536)
+            piece = os.read(terminal, 65536)
         except OSError as error:
             # This is how Linux tells that the other end is closed.
             if error.errno != errno.EIO:
@@ -140,15 +193,16 @@ def _on_terminal(arguments: list[str], folder: Path) -> tuple[int, str]:
         if not piece:
             break
         pieces.append(piece)
-    os.close(ours)
-    return process.wait(), b"".join(pieces).decode("utf-8", "replace")
+    os.close(terminal)
+    _, status = os.waitpid(process, 0)
+    return os.waitstatus_to_exitcode(status), b"".join(pieces).decode("utf-8", "replace")
 
 
 _TOOLS: list[tempfile.TemporaryDirectory[str]] = []
 
 
 def _tools() -> str:
-    """A folder with the command `ballplate` of this source tree."""
+    """A folder with the command `ballplate` of this source tree, for the shell."""
     if not _TOOLS:
         _TOOLS.append(tempfile.TemporaryDirectory(prefix="ballplate-docs-"))
         program = Path(_TOOLS[0].name, "ballplate")
@@ -165,6 +219,8 @@ def _leave_folder(app: Sphinx, page: nodes.document) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
+    for module in LOADED_BEFORE:
+        importlib.import_module(module)
     app.connect("doctree-read", _leave_folder)
     app.add_directive("console", Console)
     app.add_directive("file", File)
