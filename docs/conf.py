@@ -20,4 +20,12 @@ html_theme = "furo"
 html_title = "ballplate"
 html_math_renderer = "mathml"
 html_copy_source = False
-html_theme_options = {"top_of_page_buttons": []}
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_theme_options = {
+    "top_of_page_buttons": [],
+    "light_css_variables": {"code-font-size": "0.75rem"},
+    "dark_css_variables": {"code-font-size": "0.75rem"},
+}
+# Two hyphens are the beginning of an option, not a dash.
+smartquotes = False

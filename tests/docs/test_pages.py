@@ -1,0 +1,129 @@
+"""The documentation: it builds without a warning, and what it tells about files outside of it is so."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from analysis.cli import parser
+from simulator.experiment.schema import schema
+
+DOCS = Path("docs")
+GUARD = (DOCS / "how-to/guard-designs.md").read_text(encoding="utf-8")
+
+
+class Page(HTMLParser):
+    """What a page says, where it links to, and what a browser would load for it."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.text, self.links, self.loaded = "", [], []
+        self.names: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        known = dict(attributes)
+        self.names |= {value for key, value in attributes if key == "id" and value}
+        address = known.get("src") or known.get("href")
+        if address and tag == "a":
+            self.links.append(address)
+        elif address:
+            self.loaded.append(address)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages, built with the network out of reach."""
+    folder = tmp_path_factory.mktemp("docs")
+    nowhere = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
+    found = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "-b", "html", DOCS, folder],
+        env={**os.environ, **nowhere},
+        capture_output=True,
+        text=True,
+    )
+    assert (found.returncode, found.stderr) == (0, "")
+    return folder
+
+
+def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
+    pages = {path: Page(path) for path in built.rglob("*.html")}
+    assert len(pages) >= 15
+    for path, page in pages.items():
+        for address in page.loaded:
+            assert "//" not in address and (path.parent / address.partition("?")[0].partition("#")[0]).exists(), address
+        for address in page.links:
+            target, _, name = address.partition("#")
+            if "//" not in address and name:
+                other = (path.parent / target).resolve() if target else path
+                assert other in pages and name in pages[other].names, (path.name, address)
+
+
+def test_reference_pages_have_everything(built: Path) -> None:
+    format_page = Page(built / "reference/file-format.html").text
+    whole = schema()
+    for section in (whole, *whole["$defs"].values()):
+        for key, value in section["properties"].items():
+            assert key in format_page
+            # Typography aside.
+            assert re.sub(r"\W+", " ", value["description"]) in re.sub(r"\W+", " ", format_page), (key, value)
+    command_page = Page(built / "reference/commands.html").text
+    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    for command in commands.choices.values():
+        assert command.prog in command_page
+        assert set(command._option_string_actions) - {"--help"} <= set(re.findall(r"--?[\w-]+", command_page))
+
+
+def test_examples_have_run(built: Path) -> None:
+    tutorial = Page(built / "tutorial.html").text
+    assert "rank deficiency 5, expected full rank" in tutorial and "full rank, as expected; 168" in tutorial
+    # The text quotes these from the tables.
+    for figure in ("0.2623", "1.525"):
+        assert figure in tutorial
+    assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
+
+
+def test_an_example_that_fails_ends_the_build(tmp_path: Path) -> None:
+    page = "# Wrong\n\n```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```\n"
+    (tmp_path / "index.md").write_text(page, encoding="utf-8")
+    found = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"],
+        capture_output=True,
+        text=True,
+    )
+    assert found.returncode != 0 and "exit status 0 instead of 1" in found.stderr
+
+
+def shown(name: str) -> Any:
+    """A YAML file that the page on guarding designs shows."""
+    match = re.search(rf"```{{file}} {re.escape(name)}\n(.*?)```", GUARD, re.DOTALL)
+    assert match is not None
+    return yaml.safe_load(match[1])
+
+
+def test_the_workflow_uses_inputs_that_there_are() -> None:
+    action = yaml.safe_load(Path("action.yml").read_text(encoding="utf-8"))
+    _, step = shown("machines/.github/workflows/designs.yml")["jobs"]["check"]["steps"]
+    assert step["uses"].endswith("/ballplate@v0.1.0") and set(step["with"]) <= set(action["inputs"])
+    rows = dict(re.findall(r"^\| `(.*?)` \|.*\| (.*?) \|$", GUARD, re.MULTILINE))
+    assert set(rows) == set(action["inputs"])
+    for name in ("files", "python-version"):
+        assert rows[name] == f"`{action['inputs'][name]['default']}`"
+
+
+def test_the_hook_is_one_that_there_is() -> None:
+    (repository,) = shown("machines/.pre-commit-config.yaml")["repos"]
+    (hook,) = yaml.safe_load(Path(".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    assert [one["id"] for one in repository["hooks"]] == [hook["id"]]
