@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from argparse import ArgumentParser, Namespace
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -102,8 +102,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         bar.show(summary.done + summary.failed, summary.cells, remark, summary.before)
 
     try:
-        with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
-            runner = _runner(bundle, Path(folder), options)
+        with _runner(bundle, options) as runner:
             summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
     except KeyboardInterrupt:
         bar.close()
@@ -115,16 +114,15 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     return 1 if summary.failed or summary.left else 0
 
 
-def _runner(bundle: Bundle, folder: Path, options: Namespace) -> Runner:
+def _runner(bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
     import os
 
-    from ..sweeps.bundle import unpack
     from ..sweeps.cluster import cluster_runner
     from ..sweeps.local import local_runner
 
     if options.scheduler is not None:
         return cluster_runner(options.scheduler, bundle)
-    return local_runner(folder, unpack(bundle, folder), options.workers or len(os.sched_getaffinity(0)))
+    return local_runner(bundle, options.workers or len(os.sched_getaffinity(0)))
 
 
 def _tell(store: Store, number: int, summary: Summary) -> None:
@@ -132,7 +130,7 @@ def _tell(store: Store, number: int, summary: Summary) -> None:
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
-    print(f"{store.path}: {summary.cells} cells, {summary.done} done{before}, {summary.failed} failed{left}")
+    print(f"{store.path}: {summary.cells} cells, {summary.done} done, {summary.failed} failed{before}{left}")
     versions = {tuple(one.versions.items()) for one in results(store, number)}
     if len(versions) > 1:
         print(f"{store.path}: the rows were computed with {len(versions)} different sets of versions", file=sys.stderr)

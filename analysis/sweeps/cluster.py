@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -21,8 +22,9 @@ class ClusterError(Exception):
     """No cluster can be used; the text says why, and what would help."""
 
 
-def cluster_runner(address: str, bundle: Bundle) -> Runner:
-    """A runner on the cluster of a scheduler such as tcp://127.0.0.1:8786.
+@contextmanager
+def cluster_runner(address: str, bundle: Bundle) -> Iterator[Runner]:
+    """A runner on the cluster of a scheduler such as tcp://127.0.0.1:8786, for as long as it is needed.
 
     :raises ClusterError: dask is not installed, or there is no scheduler at the address.
     """
@@ -50,7 +52,7 @@ def cluster_runner(address: str, bundle: Bundle) -> Runner:
             return future
 
         first = [submit(task) for _, task in zip(range(room), left, strict=False)]
-        completed = as_completed(first)
+        completed = as_completed(first, loop=client.loop)
         for future in completed:
             task = under_way.pop(future.key)
             following = next(left, None)
@@ -63,7 +65,10 @@ def cluster_runner(address: str, bundle: Bundle) -> Runner:
                     yield lost(load_sweep(unpack(bundle, Path(folder))), task)
             future.release()
 
-    return run
+    try:
+        yield run
+    finally:
+        client.close()
 
 
 def _on_worker(bundle: Bundle, task: Task) -> Row:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import multiprocessing
+import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 from ..processes import in_processes
+from .bundle import Bundle, unpack
 from .execute import Runner
 from .load import load_sweep
 from .model import Sweep
@@ -22,8 +25,15 @@ DEATHS = 3
 TRIES = 2
 
 
-def local_runner(folder: Path, source: Path, workers: int) -> Runner:
-    """A runner for the sweep file `source`, unpacked in `folder`; with one worker in this process."""
+@contextmanager
+def local_runner(bundle: Bundle, workers: int) -> Iterator[Runner]:
+    """A runner in processes of this machine; with one worker in this process."""
+    with tempfile.TemporaryDirectory(prefix="ballplate-") as name:
+        folder = Path(name)
+        yield _runner(folder, unpack(bundle, folder), workers)
+
+
+def _runner(folder: Path, source: Path, workers: int) -> Runner:
 
     def run(tasks: Sequence[Task]) -> Iterator[Row]:
         if workers == 1 or len(tasks) == 1:
