@@ -14,9 +14,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reproduce",
         help="compute a document's published experiments and set its figures beside ours",
-        description="Compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the shipped designs. Every "
-        "legible figure stands beside ours with the ratio and what the comparison rests on; statements on rank, errata and "
-        "open differences likewise. The exit status is 0 if all of it agrees within what is stated, otherwise 1.",
+        description="Compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the shipped designs. "
+        "Every legible figure stands beside ours with the ratio and what the comparison rests on; statements on rank, "
+        "errata and open differences likewise. The exit status is 0 if all of it agrees within what is stated, "
+        "otherwise 1.",
     )
     parser.add_argument("document", metavar="DOCUMENT", choices=("npl",), help="npl: NPL Report CISE 15/98")
     parser.add_argument(

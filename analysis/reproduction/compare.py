@@ -35,8 +35,8 @@ Report = Callable[[str, int, int], None]
 class Figure:
     """A published figure and ours, in metres or radians.
 
-    `ratio` is published over ours, `adjusted` the same after the column's common factor, which has to lie `within` limits;
-    `rests_on` are keys of assumptions.
+    `ratio` is published over ours, `adjusted` the same after the column's common factor, which has to lie `within`
+    limits; `rests_on` are keys of assumptions.
     """
 
     quantity: str
@@ -238,8 +238,14 @@ class Section:
 
     @property
     def agrees(self) -> bool:
-        compared = (*self.ranks, *self.columns, *self.remarks, *self.errata, *self.progress, *self.differences)
-        return all(one.agrees for one in compared)
+        return (
+            all(one.agrees for one in self.ranks)
+            and all(one.agrees for one in self.columns)
+            and all(one.agrees for one in self.remarks)
+            and all(one.agrees for one in self.errata)
+            and all(one.agrees for one in self.progress)
+            and all(one.agrees for one in self.differences)
+        )
 
 
 @dataclass(frozen=True)
@@ -405,7 +411,7 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
             for ratios in both:
                 factor = common_factor(ratios[symbol] for symbol in regular)
                 deviations.append(max(abs(ratios[symbol] / factor - 1.0) for symbol in regular))
-            lines.append(ErratumLine(headed, meant, column.statistic, *both, *deviations))
+            lines.append(ErratumLine(headed, meant, column.statistic, both[0], both[1], deviations[0], deviations[1]))
     return ComparedErratum(erratum, tuple(lines), stated.limits.figure)
 
 

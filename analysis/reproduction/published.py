@@ -106,8 +106,8 @@ class Remark(Settings):
 class Progress(Settings):
     """Length of step and sum of squares, in square metres with weight 1 for a reading, of Gauss-Newton iterations.
 
-    It `settles` by the last of them; with a `misfit` the sum of squares that is left is not that of rounding. Steps that
-    are only shown have a reason.
+    It `settles` by the last of them; with a `misfit` the sum of squares that is left is not that of rounding. Steps
+    that are only shown have a reason.
     """
 
     table: str
@@ -187,7 +187,7 @@ def section_of(design: str) -> str:
 
 @cache
 def npl() -> Document:
-    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 5 to 8 and 11, and what is said of them."""
+    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 5 to 8 and 11, and what is said."""
     name = "npl-cise-15-98"
     folder = files(__package__)
     text = folder.joinpath(f"{name}.yaml").read_text(encoding="utf-8")

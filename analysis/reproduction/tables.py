@@ -157,10 +157,9 @@ def _rank(deficiency: int | str) -> str:
 
 def _resting(document: Document, section: Section) -> str:
     """Keys of the assumptions of a section, those of single quantities apart."""
-    general, special = [], []
-    for one in document.statements.assumptions:
-        if one.key in section.rests_on:
-            (special if one.quantities else general).append(one)
+    chosen = [one for one in document.statements.assumptions if one.key in section.rests_on]
+    general = [one for one in chosen if not one.quantities]
+    special = [one for one in chosen if one.quantities]
     text = f"assumptions {', '.join(one.key for one in general)}"
     return "; ".join([text, *(f"{' and '.join(one.quantities)} on {one.key}" for one in special)])
 
@@ -301,11 +300,11 @@ def _differences(section: Section) -> list[Block]:
             for part in one.parts
         ]
     first = section.differences[0].comparison
-    text = "Corrected distances by an estimator of distances alone, less those by the full one, in um: the figure of the one "
-    text += (
-        f"published data set, and the quantiles of {first.trials} data sets of ours, into whose range, and within a "
+    text = (
+        "Corrected distances by an estimator of distances alone, less those by the full one, in um: the figure of the "
+        f"one published data set, and the quantiles of {first.trials} data sets of ours, into whose range it has to "
+        f"fall, and within a factor {section.differences[0].limit:g} of whose median."
     )
-    text += f"factor {section.differences[0].limit:g} of whose median, it has to fall."
     quantiles = ("least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest")
     head = ("case", "", "published", *quantiles, "below", "agrees")
     return [*blocks, Paragraph(text), _grid(head, rows, 2)]
@@ -347,8 +346,9 @@ def _exception_blocks(found: Reproduction) -> list[Block]:
             between = " to ".join(dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios))))
             blocks.append(
                 Paragraph(
-                    f"{one.key}: {' and '.join(one.quantities)} in Table {', '.join(one.tables)}, {many}: after the common "
-                    f"factor {between} times ours, held to {one.within[0]:g} to {one.within[1]:g}. {_sentence(one.reason)}"
+                    f"{one.key}: {' and '.join(one.quantities)} in Table {', '.join(one.tables)}, {many}: after the "
+                    f"common factor {between} times ours, held to {one.within[0]:g} to {one.within[1]:g}. "
+                    f"{_sentence(one.reason)}"
                 )
             )
     return blocks
@@ -381,12 +381,11 @@ def _summary(found: Reproduction) -> list[Block]:
     if regular:
         deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
         factors = [column.factor for column in columns]
-        blocks.append(
-            Paragraph(
-                f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are no exceptions are off "
-                f"by {100 * float(np.median(deviations)):.1f} % (median) and {100 * deviations.max():.1f} % at most."
-            )
+        text = (
+            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are no exceptions are off "
+            f"by {100 * float(np.median(deviations)):.1f} % (median) and {100 * deviations.max():.1f} % at most."
         )
+        blocks.append(Paragraph(text))
     return blocks
 
 
