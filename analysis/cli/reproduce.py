@@ -63,17 +63,21 @@ def run(options: Namespace) -> int:
         if name not in known:
             print(f'ballplate reproduce: no experiment "{name}"; {hint(name, known)}', file=sys.stderr)
             return WRONG_USAGE
-    bar = ProgressBar("data sets")
+    bars: dict[str, ProgressBar] = {}
 
     def report(what: str, done: int, wanted: int) -> None:
-        bar.what = what
-        bar.show(done, wanted)
+        if what not in bars:
+            bars[what] = ProgressBar(what)
+        bars[what].show(done, wanted)
+        if done == wanted:
+            bars[what].close()
 
     trials = None if options.quick else options.trials
     try:
         found = reproduce(document, Shipped(options.designs), options.experiment, trials, report)
     finally:
-        bar.close()
+        for bar in bars.values():
+            bar.close()
     if options.json:
         print_json([reproduction_data(found)])
     elif options.markdown:

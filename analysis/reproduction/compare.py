@@ -331,7 +331,7 @@ def rests_on(document: Document, section: str, quantity: str | None = None) -> s
 def common_factor(ratios: Iterable[float]) -> float:
     """Geometric mid-range of ratios: none deviates from it by more than the two at the ends; NaN without any.
 
-    >>> common_factor([0.9, 1.0, 1.6])
+    >>> round(common_factor([0.9, 1.0, 1.6]), 6)
     1.2
     """
     values = list(ratios)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..estimators import QUANTILES
 from ..tables import aligned, number
 from .compare import (
     ComparedColumn,
@@ -50,6 +49,8 @@ class Grid:
 
 
 Block = Heading | Paragraph | Grid
+
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
 def reproduction_lines(found: Reproduction) -> list[str]:
@@ -110,9 +111,11 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
     if section.columns:
         blocks.append(Paragraph("Columns of tables, their common factor, and how far figures are from it:"))
         blocks.append(_factors(section.columns))
-        blocks.append(
-            Paragraph("Published and computed U in um and urad; the ratio as it is, and after the common factor:")
+        text = (
+            "Published and computed U in um and urad; the ratio as it is, and after the common factor. Notes refer to "
+            "the exceptions and open differences at the end."
         )
+        blocks.append(Paragraph(text))
         blocks.append(_figures(section.columns, with_assumptions))
     blocks += [Paragraph(_remark(one)) for one in section.remarks]
     for erratum in section.errata:
@@ -233,7 +236,7 @@ def _wanted(remark: Remark) -> str:
         words.append(f"at least {remark.at_least:g}")
     if remark.at_most is not None:
         words.append(f"at most {remark.at_most:g}")
-    return "taken as " + " and ".join(words)
+    return "has to be " + " and ".join(words)
 
 
 def _erratum(one: ComparedErratum) -> list[Block]:
@@ -346,12 +349,17 @@ def _exception_blocks(found: Reproduction) -> list[Block]:
             between = " to ".join(dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios))))
             blocks.append(
                 Paragraph(
-                    f"{one.key}: {' and '.join(one.quantities)} in Table {', '.join(one.tables)}, {many}: after the "
+                    f"{one.key}: {' and '.join(one.quantities)} in {_tables(one)}, {many}: after the "
                     f"common factor {between} times ours, held to {one.within[0]:g} to {one.within[1]:g}. "
                     f"{_sentence(one.reason)}"
                 )
             )
     return blocks
+
+
+def _tables(one: Reservation) -> str:
+    *others, last = one.tables
+    return f"Tables {', '.join(others)} and {last}" if others else f"Table {last}"
 
 
 def _sentence(text: str) -> str:
@@ -382,8 +390,8 @@ def _summary(found: Reproduction) -> list[Block]:
         deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
         factors = [column.factor for column in columns]
         text = (
-            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are no exceptions are off "
-            f"by {100 * float(np.median(deviations)):.1f} % (median) and {100 * deviations.max():.1f} % at most."
+            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are no exceptions are "
+            f"off by {100 * float(np.median(deviations)):.1f} % (median) and {100 * deviations.max():.1f} % at most."
         )
         blocks.append(Paragraph(text))
     return blocks
