@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,9 +79,9 @@ def run(options: Namespace) -> int:
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ..sweeps.bundle import changes, definition
+    from ..sweeps.bundle import bundle_of, changes, definition
     from ..sweeps.execute import run_sweep
-    from ..sweeps.store import add_sweep, sweeps
+    from ..sweeps.store import add_sweep, forget_keys, keys, sweeps
     from .progress import ProgressBar
 
     new = definition(sweep, bundle)
@@ -95,14 +95,14 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         return BAD_FILE
     if number is None:
         number = add_sweep(store, new, bundle.files)
-    bar = ProgressBar("cells")
+    bar, before = ProgressBar("cells"), set(keys(store, number))
 
     def report(summary: Summary) -> None:
         remark = f"{summary.failed} failed" if summary.failed else ""
         bar.show(summary.done + summary.failed, summary.cells, remark, summary.before)
 
     try:
-        with _runner(bundle, options) as runner:
+        with _runner(sweep, bundle, options) as runner:
             summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
     except KeyboardInterrupt:
         bar.close()
@@ -110,19 +110,24 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         return INTERRUPTED
     finally:
         bar.close()
+    if bundle_of(sweep) != bundle:
+        forget_keys(store, number, set(keys(store, number)) - before)
+        text = "the files of the sweep were changed while it ran; what was computed meanwhile does not count"
+        print(f"{options.file}: {text}, so start it again", file=sys.stderr)
+        return BAD_FILE
     _tell(store, number, summary)
     return 1 if summary.failed or summary.left else 0
 
 
-def _runner(bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
+def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
     import os
 
     from ..sweeps.cluster import cluster_runner
     from ..sweeps.local import local_runner
 
     if options.scheduler is not None:
-        return cluster_runner(options.scheduler, bundle)
-    return local_runner(bundle, options.workers or len(os.sched_getaffinity(0)))
+        return cluster_runner(options.scheduler, sweep, bundle)
+    return nullcontext(local_runner(sweep, options.workers or len(os.sched_getaffinity(0))))
 
 
 def _tell(store: Store, number: int, summary: Summary) -> None:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from .bundle import Bundle, unpack
 from .execute import Runner
-from .load import load_sweep
 from .local import compute_in
+from .model import Sweep
 from .task import Row, Task, lost
 
 # Tasks that a thread of a worker has waiting, so that it never waits itself.
@@ -23,7 +23,7 @@ class ClusterError(Exception):
 
 
 @contextmanager
-def cluster_runner(address: str, bundle: Bundle) -> Iterator[Runner]:
+def cluster_runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     """A runner on the cluster of a scheduler such as tcp://127.0.0.1:8786, for as long as it is needed.
 
     :raises ClusterError: dask is not installed, or there is no scheduler at the address.
@@ -61,8 +61,7 @@ def cluster_runner(address: str, bundle: Bundle) -> Iterator[Runner]:
             try:
                 yield future.result()
             except KilledWorker:
-                with tempfile.TemporaryDirectory() as folder:
-                    yield lost(load_sweep(unpack(bundle, Path(folder))), task)
+                yield lost(sweep, task)
             future.release()
 
     try:
@@ -72,8 +71,8 @@ def cluster_runner(address: str, bundle: Bundle) -> Iterator[Runner]:
 
 
 def _on_worker(bundle: Bundle, task: Task) -> Row:
-    folder, source = _unpacked(bundle)
-    return compute_in(Path(folder.name), source, task)
+    _, source = _unpacked(bundle)
+    return compute_in(source, task)
 
 
 @cache

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import multiprocessing
-import tempfile
+import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 from ..processes import in_processes
-from .bundle import Bundle, unpack
 from .execute import Runner
 from .load import load_sweep
 from .model import Sweep
@@ -25,27 +23,21 @@ DEATHS = 3
 TRIES = 2
 
 
-@contextmanager
-def local_runner(bundle: Bundle, workers: int) -> Iterator[Runner]:
+def local_runner(sweep: Sweep, workers: int) -> Runner:
     """A runner in processes of this machine; with one worker in this process."""
-    with tempfile.TemporaryDirectory(prefix="ballplate-") as name:
-        folder = Path(name)
-        yield _runner(folder, unpack(bundle, folder), workers)
-
-
-def _runner(folder: Path, source: Path, workers: int) -> Runner:
+    source = Path(os.path.abspath(sweep.source))
 
     def run(tasks: Sequence[Task]) -> Iterator[Row]:
         if workers == 1 or len(tasks) == 1:
             for task in tasks:
-                yield compute_in(folder, source, task)
+                yield _told(compute(sweep, task), sweep.source)
             return
-        yield from _in_workers(folder, source, tasks, workers)
+        yield from _in_workers(sweep, source, tasks, workers)
 
     return run
 
 
-def _in_workers(folder: Path, source: Path, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
+def _in_workers(sweep: Sweep, source: Path, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     left = {(task.number, task.block): task for task in tasks}
@@ -55,9 +47,10 @@ def _in_workers(folder: Path, source: Path, tasks: Sequence[Task], workers: int)
             # One of those under way ends its process each time; each gets a process of its own.
             for task in list(left.values())[: 2 * workers]:
                 del left[task.number, task.block]
-                yield _alone(folder, source, task)
+                row = _alone(source, task)
+                yield row if row is not None else lost(sweep, task)
             deaths = 0
-        arguments = ((folder, source, task) for task in list(left.values()))
+        arguments = ((source, task) for task in list(left.values()))
         try:
             for row in in_processes(compute_in, arguments, workers, ordered=False, batch_size="auto"):
                 del left[row.number, row.block]
@@ -67,21 +60,26 @@ def _in_workers(folder: Path, source: Path, tasks: Sequence[Task], workers: int)
             deaths += 1
 
 
-def _alone(folder: Path, source: Path, task: Task) -> Row:
+def _alone(source: Path, task: Task) -> Row | None:
+    """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
         with ProcessPoolExecutor(1, mp_context=context) as pool:
             try:
-                return pool.submit(compute_in, folder, source, task).result()
+                return pool.submit(compute_in, source, task).result()
             except BrokenProcessPool:
                 continue
-    return lost(_loaded(source), task)
+    return None
 
 
-def compute_in(folder: Path, source: Path, task: Task) -> Row:
-    """Do a task of the sweep file `source` in `folder`; texts tell files by their place in the folder."""
-    row = compute(_loaded(source), task)
-    return replace(row, reason=row.reason.replace(f"{folder.as_posix()}/", ""))
+def compute_in(source: Path, task: Task) -> Row:
+    """Do a task of a sweep file, which is loaded once in each process."""
+    return _told(compute(_loaded(source), task), source)
+
+
+def _told(row: Row, source: Path) -> Row:
+    """The row with files told from the sweep file's folder, wherever that is."""
+    return replace(row, reason=row.reason.replace(f"{source.parent}/", "")) if row.reason else row
 
 
 @cache

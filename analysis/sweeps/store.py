@@ -158,6 +158,12 @@ def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
         )
 
 
+def forget_keys(store: Store, sweep: int, cells: Iterable[int]) -> None:
+    """Take back which results are those of some cells; the results stay."""
+    with _transaction(store) as connection:
+        connection.executemany("DELETE FROM cell WHERE sweep = ? AND number = ?", [(sweep, cell) for cell in cells])
+
+
 def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
     """Write rows: on disk when this returns. A result that is there already stays, unless it had failed."""
     with _transaction(store) as connection:

@@ -13,8 +13,9 @@ from analysis.montecarlo.study import trials
 from analysis.study import plan
 from analysis.sweeps.fingerprint import fingerprint
 from analysis.sweeps.load import experiment_of, load_sweep
+from analysis.sweeps.model import Sweep
 from analysis.sweeps.store import details, files, keys, open_store, results, sweeps
-from analysis.sweeps.task import BLOCK, Task, compute
+from analysis.sweeps.task import BLOCK, Row, Task, compute
 from simulator.experiment.load import load
 
 from .support import assert_same, rows, small_sweep
@@ -96,15 +97,36 @@ def test_a_changed_base_is_refused_with_what_changed(tmp_path: Path, capsys: pyt
     store.close()
 
 
+def test_a_change_while_a_sweep_runs_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, base = small_sweep(tmp_path, 2), tmp_path / "quickstart.yaml"
+    text = base.read_text(encoding="utf-8")
+
+    def changing(loaded: Sweep, task: Task) -> Row:
+        if task.number == 1:
+            base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
+        return compute(loaded, task)
+
+    monkeypatch.setattr("analysis.sweeps.local.compute", changing)
+    assert sweep(path) == 3
+    assert "were changed while it ran" in capsys.readouterr().err
+    assert len(rows(tmp_path / "small.sqlite")) == 0
+    monkeypatch.undo()
+    base.write_text(text, encoding="utf-8")
+    assert sweep(path) == 1
+    assert len(rows(tmp_path / "small.sqlite")) == 4
+
+
 def test_what_two_sweeps_share_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = small_sweep(tmp_path, 2)
     sweep(path)
     path.write_text(path.read_text(encoding="utf-8").replace("[4, 5]", "[4, 5, 6]"), encoding="utf-8")
     done = []
 
-    def counted(sweep: object, task: Task) -> object:
+    def counted(loaded: Sweep, task: Task) -> Row:
         done.append(task)
-        return compute(sweep, task)  # type: ignore[arg-type]
+        return compute(loaded, task)
 
     monkeypatch.setattr("analysis.sweeps.local.compute", counted)
     sweep(path, "--beside")
