@@ -19,6 +19,9 @@ R = TypeVar("R")
 
 @cache
 def _controller() -> ThreadpoolController:
+    # SciPy brings a library of its own, which is found only once it is loaded.
+    import scipy.linalg  # noqa: F401
+
     return ThreadpoolController()
 
 

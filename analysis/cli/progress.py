@@ -20,16 +20,16 @@ class ProgressBar:
     last: float = field(default_factory=time.monotonic)
     drawn: bool = False
 
-    def show(self, done: int, wanted: int, remark: str = "") -> None:
-        """Report, unless the last report is recent and this is not the end."""
+    def show(self, done: int, wanted: int, remark: str = "", before: int = 0) -> None:
+        """Report, unless the last report is recent; the rate leaves out what was done `before`."""
         now = time.monotonic()
         is_terminal = sys.stderr.isatty()
         due = now - self.last >= (OFTEN if is_terminal else SELDOM)
         if not due:
             return
         self.last = now
-        rate = done / max(now - self.started, 1e-9)
-        left = duration((wanted - done) / rate) if done else "?"
+        rate = (done - before) / max(now - self.started, 1e-9)
+        left = duration((wanted - done) / rate) if done > before else "?"
         text = f"{done}/{wanted} {self.what}, {rate:.3g}/s, {left} left{f', {remark}' if remark else ''}"
         if not is_terminal:
             print(text, file=sys.stderr, flush=True)

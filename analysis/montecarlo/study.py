@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -20,8 +22,10 @@ from simulator.machines.joined import JoinedModel
 from simulator.machines.truth import true_machine
 from simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
 
-from .figures import Outcome, power_of_difference, power_of_misfit
-from .trials import Progress, run_trials
+from .figures import Outcome, outcome, power_of_difference, power_of_misfit
+from .tally import Tally
+from .targets import targets
+from .trials import TASK, Progress, run_trials, sum_of_task
 
 
 @dataclass(frozen=True)
@@ -76,16 +80,58 @@ def trials(
     :raises ExperimentError: a true machine whose errors are too large to be simulated or fitted.
     """
     chosen = experiment.seed if seed is None else seed
+    shared = _shared(experiment)
+    if isinstance(shared, str):
+        return Trials(chosen, None, shared)
+    found = run_trials(shared, chosen, count, until, workers, report)
+    differs = shared.truth.model != shared.design.model
+    return Trials(chosen, found, optimism=_optimism(experiment, shared) if differs else None)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Sums over a block of replicates; without them there is a reason."""
+
+    tally: Tally | None
+    reason: str = ""
+
+
+def block_of_trials(experiment: Experiment, count: int, seed: int, block: int, size: int) -> Block:
+    """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most.
+
+    `size` is a multiple of `TASK` replicates. The same replicates have the same bits, whatever the blocks.
+
+    :raises ExperimentError: as `trials`.
+    """
+    shared = _shared(experiment)
+    if isinstance(shared, str):
+        return Block(None, shared)
+    aims = targets(shared)
+    first, last = block * size // TASK, min((block + 1) * size, count)
+    parts = [sum_of_task(shared, aims, seed, task, last) for task in range(first, -(-last // TASK))]
+    return Block(reduce(add, parts))
+
+
+def combined(experiment: Experiment, total: Tally) -> Outcome:
+    """What sums over replicates of an experiment come to.
+
+    :raises ExperimentError: as `trials`.
+    """
+    shared = _shared(experiment)
+    assert not isinstance(shared, str)
+    return outcome(shared, targets(shared), total)
+
+
+def _shared(experiment: Experiment) -> Reference | str:
+    """What all replicates share, or why there are none."""
     design, truth = true_experiment(experiment)
     try:
-        shared = reference(design, truth)
+        return reference(design, truth)
     except NoReferenceError as error:
-        return Trials(chosen, None, str(error))
+        return str(error)
     except (NoReadingError, TooWildError) as error:
         text = f"{error}; state smaller errors"
         raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
-    outcome = run_trials(shared, chosen, count, until, workers, report)
-    return Trials(chosen, outcome, optimism=_optimism(experiment, shared) if truth.model != design.model else None)
 
 
 def _optimism(experiment: Experiment, shared: Reference) -> Optimism:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -12,12 +11,14 @@ from simulator.montecarlo.reference import Reference
 from simulator.montecarlo.replicates import BATCH, estimate_batch
 from simulator.threads import single_threaded
 
+from ..processes import in_processes
 from .figures import Outcome, outcome
 from .tally import Tally, tally
 from .targets import Target, targets
 
 # Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
 BATCHES = 4
+TASK = BATCH * BATCHES
 
 # Replicates of a run that is to go on until its figures are accurate, at the most.
 MOST_TRIALS = 1_000_000
@@ -96,32 +97,9 @@ def sum_of_task(shared: Reference, aims: tuple[Target, ...], seed: int, task: in
 
 
 def _parts(shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, workers: int) -> Iterator[Tally]:
-    tasks = range(-(-trials // (BATCH * BATCHES)))
+    tasks = range(-(-trials // TASK))
     if workers == 1 or len(tasks) == 1:
         for task in tasks:
             yield sum_of_task(shared, aims, seed, task, trials)
         return
-    from joblib import Parallel, delayed
-
-    parallel = Parallel(n_jobs=workers, return_as="generator", pre_dispatch="2*n_jobs", batch_size=1)
-    parts = parallel(delayed(_in_worker)(shared, aims, seed, task, trials) for task in tasks)
-    finished = False
-    try:
-        # Not `yield from`, which would end the workers before the warning below is silenced.
-        for part in parts:  # noqa: UP028
-            yield part
-        finished = True
-    finally:
-        if not finished:
-            # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)
-                parts.close()
-
-
-def _in_worker(shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int) -> Tally:
-    import signal
-
-    # An interruption from the keyboard reaches every process; the one that started the workers answers it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return sum_of_task(shared, aims, seed, task, trials)
+    yield from in_processes(sum_of_task, ((shared, aims, seed, task, trials) for task in tasks), workers)

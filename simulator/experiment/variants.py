@@ -54,6 +54,25 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
     return trees
 
 
+def node_at(root: Node, path: str) -> Node | None:
+    """Return what stands at a path, None where nothing does.
+
+    :raises ValueError: the path is malformed, or an entry of a list does not exist.
+    """
+    node: Node | None = root
+    for step in _place(root, path):
+        node = child(node, int(step) if isinstance(node, Sequence) else step)
+    return node
+
+
+def is_same_place(root: Node, path: str, other: str) -> bool:
+    """Tell whether one of two paths leads to the other's place, or into it.
+
+    :raises ValueError: as ``node_at``.
+    """
+    return _overlap(_place(root, path), _place(root, other))
+
+
 def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     """Return the tree with the node at a path replaced; ``mark`` is where the override stands.
 

@@ -193,13 +193,15 @@ def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
 
 
 def a_repository(top: Path) -> None:
-    """Designs in folders, one of them with a blank in its name, beside a YAML file that is none."""
+    """Designs in folders, one of them with a blank in its name, beside YAML files that are none."""
     text = QUICKSTART.read_text(encoding="utf-8")
     for name in ("designs/one.yaml", "designs/more/of them.yaml"):
         path = top / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     (top / "settings.yaml").write_text("colour: blue\n", encoding="utf-8")
+    (top / "designs/sweeps").mkdir()
+    (top / "designs/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
 
 
 def test_the_action_checks(tmp_path: Path) -> None:
@@ -245,7 +247,7 @@ def test_the_hook(tmp_path: Path) -> None:
     assert (hook["id"], hook["language"], hook["types"]) == ("ballplate-check", "python", ["yaml"])
     a_repository(tmp_path)
     every = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.yaml"))
-    chosen = [name for name in every if re.search(hook["files"], name)]
+    chosen = [name for name in every if re.search(hook["files"], name) and not re.search(hook["exclude"], name)]
     assert chosen == ["designs/more/of them.yaml", "designs/one.yaml"]
     script = f'{hook["entry"]} "$@"'
     quoted = f"set -- {' '.join(json.dumps(name) for name in chosen)}; {script}"

@@ -12,32 +12,26 @@ from pathlib import Path
 
 import pytest
 
-from analysis.study import Fit, check, fit
+from analysis.reproduction.compare import compare_progress
+from analysis.reproduction.published import npl
+from analysis.reproduction.shipped import Shipped, fitted_exactly, shipped_experiment, sums_of_squares
+from analysis.study import Fit, check
 from simulator.experiment.load import load
-from simulator.generate import exact_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings
 
 
 @cache
 def fitted(name: str, variant: str) -> Fit:
-    experiment = {e.name: e for e in load(Path(f"designs/npl/{name}.yaml"))}[variant]
-    design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    machine = true_machine(experiment.true_machine, design.model, *corners)
-    _, x = exact_readings(*on_true_machine(design, machine))
-    return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
+    return fitted_exactly(shipped_experiment(Shipped(Path("designs/npl")), f"{name}[{variant}]"))
 
 
 def steps(found: Fit) -> list[float]:
     return [iteration.step for iteration in found.solution.iterations[1:]]
 
 
-def sums_of_squares(found: Fit) -> list[float]:
-    """In square metres."""
-    scale = float(found.design.repeatability[0]) ** 2
-    return [scale * iteration.sum_of_squares for iteration in found.solution.iterations]
+@pytest.mark.parametrize("progress", npl().statements.convergence, ids=lambda progress: progress.design)
+def test_published_iterations(progress) -> None:  # type: ignore[no-untyped-def]
+    found = compare_progress(npl(), Shipped(Path("designs/npl")), progress)
+    assert found.agrees, [line for line in found.lines if not line.agrees]
 
 
 @pytest.mark.parametrize(

@@ -1,97 +1,68 @@
-"""The uncertainties of NPL Report CISE 15/98, Tables 5 C, 6, 7, 8 and 11, from the shipped designs.
-
-The printed figures carry the residual estimate of sigma of one simulated data set, a factor that all figures of
-a column share. It is taken out as the geometric mid-range of the ratios that are compared.
-"""
+"""The uncertainties of NPL Report CISE 15/98, Tables 5 C, 6, 7, 8 and 11, and what the report says of them."""
 
 from __future__ import annotations
 
-import csv
-import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from analysis.study import plan
-from simulator.experiment.load import load
-
-TABLES = Path(__file__).with_name("npl-cise-15-98-tables.csv")
-SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
+from analysis.reproduction.compare import compare_column, compare_erratum, compare_remark
+from analysis.reproduction.published import SYMBOLS, case_of, npl
+from analysis.reproduction.shipped import Shipped, planned
 
 
-def columns() -> Iterator[tuple[str, str, dict[str, float]]]:
-    """Variant, statistic and printed figures of every column to compare."""
-    for row in csv.DictReader(TABLES.read_text(encoding="utf-8").splitlines()):
-        table, n, ndel = row["table"], row["n"], row["ndel"]
-        if (table, row["statistic"]) in (("8", "maximum"), ("6", "maximum"), ("11", "maximum")):
-            continue
-        label = {
-            "5": f"6.1.1-weights[C w={row['weight']}]",
-            "6": "6.1.2[B]",
-            "7": f"6.2.1[n={n} NDEL={ndel}]",
-            "8": f"6.2.2[n={n} NDEL={ndel}]",
-            "11": f"6.2.5[n={n} NDEL={ndel}]",
-        }[table]
-        yield label, row["statistic"], {symbol: float(row[symbol]) for symbol in SYMBOLS if row[symbol]}
+@pytest.fixture(scope="module")
+def shipped() -> Shipped:
+    return Shipped(Path("designs/npl"))
 
 
-def compared(label: str, statistic: str) -> dict[str, float]:
-    """Permitted deviation of each symbol that is compared.
-
-    Maxima over the unstated evaluation points, U3 (quoted for a conversion that the report does not give at NDEL 7)
-    and U5 at small weights, for unstated pairs, cannot be compared.
-    """
-    if statistic == "maximum":
-        return {"U1": 0.10, "U2": 0.10, "U5": 0.10}
-    wide = 0.15 if label.startswith("6.1.2") else 0.10
-    allowed = {"U1": wide, "U2": wide, "U4": 0.15, "U5": wide, "U6": wide}
-    if "w=" in label and float(label.partition("w=")[2].rstrip("]")) < 2:
-        del allowed["U5"]
-    return allowed
-
-
-def test_tables() -> None:
-    experiments = {
-        experiment.label: experiment
-        for name in ("6.1.1-weights", "6.1.2", "6.2.1", "6.2.2", "6.2.5")
-        for experiment in load(f"designs/npl/{name}.yaml")
-    }
-    failures, seen = [], 0
-    print(f"\n{'experiment':28}{'':9}{'factor':>7}", *(f"{symbol:>7}" for symbol in SYMBOLS))
-    for label, statistic, printed in columns():
-        quantities = plan(experiments[label]).quantities
-        ratio = {s: value / getattr(quantities[s], statistic) for s, value in printed.items()}
-        allowed = compared(label, statistic)
-        used = [ratio[s] for s in allowed if s in ratio]
-        factor = math.sqrt(max(used) * min(used))
-        seen += len(used)
-        shown = (f"{ratio[s] / factor:7.3f}" if s in ratio else "      -" for s in SYMBOLS)
-        print(f"{label:28}{statistic:9}{factor:7.3f}", *shown)
-        # The factor is an estimate of sigma with a relative spread of a few percent.
-        if not 0.85 < factor < 1.15:
-            failures.append(f"{label} {statistic}: common factor {factor:.3f}")
+def test_tables(shipped: Shipped) -> None:
+    failures, regular = [], 0
+    print(f"\n{'design':28}{'':9}{'factor':>7}", *(f"{symbol:>7}" for symbol in SYMBOLS))
+    for column in npl().columns:
+        found = compare_column(npl(), shipped, column)
+        adjusted = {figure.quantity: figure.adjusted for figure in found.figures}
+        shown = (f"{adjusted[s]:7.3f}" if s in adjusted else "      -" for s in SYMBOLS)
+        print(f"{column.design:28}{column.statistic:9}{found.factor:7.3f}", *shown)
+        regular += sum(figure.exception is None for figure in found.figures)
+        if not found.factor_agrees:
+            failures.append(f"{column.design} {column.statistic}: common factor {found.factor:.3f}")
         failures += [
-            f"{label} {statistic} {s}: ratio {ratio[s] / factor:.3f}, permitted 1 +- {limit}"
-            for s, limit in allowed.items()
-            if s in ratio and abs(ratio[s] / factor - 1.0) > limit
+            f"{column.design} {column.statistic} {figure.quantity}: {figure.adjusted:.3f}, permitted {figure.within}"
+            for figure in found.figures
+            if not figure.agrees
         ]
-    assert seen > 100
+    assert regular > 150
     assert not failures, "\n".join(failures)
 
 
-def test_u3_of_the_five_coefficient_tables() -> None:
-    """U3 is not part of the comparison above, but its averages at NDEL 5 agree within 15 %."""
-    for experiment in load("designs/npl/6.2.2.yaml"):
-        for label, statistic, printed in columns():
-            if label == experiment.label and statistic == "average" and "NDEL=5" in label:
-                assert plan(experiment).quantities["U3"].average == pytest.approx(printed["U3"], rel=0.15)
+@pytest.mark.parametrize("remark", npl().statements.remarks, ids=lambda remark: f"{remark.section} {remark.text[:30]}")
+def test_remarks(remark, shipped: Shipped) -> None:  # type: ignore[no-untyped-def]
+    found = compare_remark(shipped, remark)
+    assert found.agrees, (found.least, found.largest)
 
 
-def test_empirical_errors_are_known_well_but_less_so_than_kinematic_ones() -> None:
-    """Section 6.2.6: what the report says of Table 12."""
-    found = {e.name: plan(e).quantities for e in load("designs/npl/6.2.6.yaml")}
-    for n in (5, 7):
-        for symbol in ("U1", "U2", "U4", "U6"):
-            ratio = found[f"n={n} empirical"][symbol].average / found[f"n={n} kinematic"][symbol].average
-            assert 1.0 < ratio < 2.0, (n, symbol)
+@pytest.mark.parametrize("erratum", npl().statements.errata, ids=lambda erratum: f"Table {erratum.table}")
+def test_errata(erratum, shipped: Shipped) -> None:  # type: ignore[no-untyped-def]
+    found = compare_erratum(npl(), shipped, erratum)
+    assert len(found.lines) >= len(erratum.headed) and found.agrees
+
+
+def test_every_exception_is_needed(shipped: Shipped) -> None:
+    """An exception without a figure outside the common limit would only hide what agrees."""
+    columns = [compare_column(npl(), shipped, column) for column in npl().columns]
+    figures = [figure for column in columns for figure in column.figures]
+    for exception in npl().statements.exceptions:
+        under = [abs(figure.adjusted - 1.0) for figure in figures if figure.exception == exception]
+        assert max(under) > npl().statements.limits.figure, exception.reason
+
+
+def test_what_is_named_exists(shipped: Shipped) -> None:
+    stated = npl().statements
+    named = {column.design for column in npl().columns} | {d for one in stated.exceptions for d in one.designs}
+    for design in named:
+        assert planned(shipped, design).label == design and case_of(design) in design
+    keys = [one.key for one in (*stated.assumptions, *stated.exceptions)]
+    assert len(keys) == len(set(keys))
+    blocks = (*stated.ranks, *stated.remarks, *stated.illegible)
+    assert {one.section for one in blocks} | {c.section for c in npl().columns} <= set(stated.sections)

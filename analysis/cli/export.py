@@ -1,0 +1,73 @@
+"""`ballplate export`: a sweep's results as one table for other programs."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+WRONG_USAGE, BAD_FILE = 2, 3
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser: ArgumentParser = commands.add_parser(
+        "export",
+        help="write a sweep's results as CSV or Parquet",
+        description="Write a row for each cell of a store and a column for each figure, in metres and radians, with "
+        "the unit in the column's name.",
+    )
+    add_store(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=Path,
+        required=True,
+        help="table, .csv or .parquet; - for CSV on the screen",
+    )
+    parser.set_defaults(run=run)
+
+
+def add_store(parser: ArgumentParser) -> None:
+    """Add the store and the choice of a sweep in it."""
+    parser.add_argument("store", metavar="STORE", type=Path, help="store that ballplate sweep has made")
+    parser.add_argument("--sweep", metavar="N", type=int, help="which sweep of the store; default: the newest")
+
+
+def run(options: Namespace) -> int:
+    """Write the table."""
+    from ..sweeps.frame import frame
+    from ..sweeps.store import StoreError, open_store, sweeps
+
+    suffix = options.output.suffix.lower()
+    if suffix not in (".csv", ".parquet") and str(options.output) != "-":
+        print(f"ballplate export: {options.output} should end in .csv or .parquet", file=sys.stderr)
+        return WRONG_USAGE
+    try:
+        store = open_store(options.store)
+        known = sweeps(store)
+        if not known or (options.sweep is not None and options.sweep not in known):
+            numbers = ", ".join(map(str, known)) or "none"
+            print(f"{options.store}: there is no such sweep; it has {numbers}", file=sys.stderr)
+            return BAD_FILE
+        table = frame(store, options.sweep)
+        store.close()
+    except StoreError as error:
+        print(error, file=sys.stderr)
+        return BAD_FILE
+    if str(options.output) == "-":
+        table.to_csv(sys.stdout, index=False)
+        return 0
+    try:
+        if suffix == ".csv":
+            table.to_csv(options.output, index=False)
+        else:
+            table.to_parquet(options.output, index=False)
+    except ImportError:
+        text = "Parquet needs pyarrow; install it with: python -m pip install 'ballplate[parquet]'"
+        print(f"ballplate export: {text}", file=sys.stderr)
+        return BAD_FILE
+    except OSError as error:
+        print(f"{options.output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+        return BAD_FILE
+    return 0

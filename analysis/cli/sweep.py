@@ -1,0 +1,178 @@
+"""`ballplate sweep`: a family of experiments, into a store that survives interruptions."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .common import count
+
+if TYPE_CHECKING:
+    from ..sweeps.bundle import Bundle
+    from ..sweeps.execute import Runner, Summary
+    from ..sweeps.model import Sweep
+    from ..sweeps.store import Store
+
+WRONG_USAGE, BAD_FILE, INTERRUPTED = 2, 3, 130
+
+# Cells that an estimate of time tries.
+TRIED = 3
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser: ArgumentParser = commands.add_parser(
+        "sweep",
+        help="compute a family of experiments into a store",
+        description="Compute every cell of a sweep file: rank, U1 to U6, Monte Carlo if it asks for trials. Each "
+        "finished cell is stored on disk; started again, the command goes on where it ended. The exit status is 0 if "
+        "all cells are done, 1 if some have failed.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path, help="sweep file (YAML)")
+    parser.add_argument("--store", metavar="FILE", type=Path, help="store; default: the sweep file's name with .sqlite")
+    parser.add_argument("--dry-run", action="store_true", help="list the cells and estimate the time; store nothing")
+    parser.add_argument("--workers", metavar="N", type=count, help="processes; default: one for each processor")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="compute on the dask.distributed cluster of this scheduler instead"
+    )
+    parser.add_argument("--retry-failed", action="store_true", help="compute cells again that have failed")
+    parser.add_argument("--fail-fast", action="store_true", help="end when a cell fails")
+    parser.add_argument(
+        "--beside", action="store_true", help="enter a changed sweep beside the one that is in the store"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: Namespace) -> int:
+    """Run a sweep; 1 if cells have failed."""
+    from filelock import FileLock, Timeout
+
+    from ..sweeps.bundle import bundle_of
+    from ..sweeps.cluster import ClusterError
+    from ..sweeps.load import load_sweep
+    from ..sweeps.store import StoreError, open_store
+
+    sweep = load_sweep(options.file)
+    bundle = bundle_of(sweep)
+    if options.dry_run:
+        return _dry_run(sweep, bundle, options)
+    path = options.store or options.file.with_suffix(".sqlite")
+    if path.resolve() in (options.file.resolve(), sweep.base.resolve()):
+        print(f"ballplate sweep: --store {path} is the sweep's own file; name another", file=sys.stderr)
+        return WRONG_USAGE
+    try:
+        with FileLock(f"{path}.lock", timeout=0):
+            store = open_store(path, create=True)
+            try:
+                return _run(sweep, bundle, store, options)
+            finally:
+                store.close()
+    except Timeout:
+        print(f"{path}: another process is computing into it; wait for it, or end it", file=sys.stderr)
+    except OSError as error:
+        print(f"{path}: cannot be written ({error.strerror}); check the folder and its permissions", file=sys.stderr)
+    except (StoreError, ClusterError) as error:
+        print(error, file=sys.stderr)
+    return BAD_FILE
+
+
+def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
+    from ..sweeps.bundle import bundle_of, changes, definition
+    from ..sweeps.execute import run_sweep
+    from ..sweeps.store import add_sweep, forget_keys, keys, sweeps
+    from .progress import ProgressBar
+
+    new = definition(sweep, bundle)
+    stored = sweeps(store)
+    number = next((k for k, old in stored.items() if not changes(old, new)), None)
+    if number is None and stored and not options.beside:
+        print(f"{store.path}: holds another sweep; what has changed:", file=sys.stderr)
+        for line in changes(stored[max(stored)], new)[:20]:
+            print(f"  {line}", file=sys.stderr)
+        print("name another store with --store, or keep both in this one with --beside", file=sys.stderr)
+        return BAD_FILE
+    if number is None:
+        number = add_sweep(store, new, bundle.files)
+    bar, before = ProgressBar("cells"), set(keys(store, number))
+
+    def report(summary: Summary) -> None:
+        remark = f"{summary.failed} failed" if summary.failed else ""
+        bar.show(summary.done + summary.failed, summary.cells, remark, summary.before)
+
+    try:
+        with _runner(sweep, bundle, options) as runner:
+            summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
+    except KeyboardInterrupt:
+        bar.close()
+        print(f"interrupted; what is done is in {store.path}, and the same command goes on from there", file=sys.stderr)
+        return INTERRUPTED
+    finally:
+        bar.close()
+    if bundle_of(sweep) != bundle:
+        forget_keys(store, number, set(keys(store, number)) - before)
+        text = "the files of the sweep were changed while it ran; what was computed meanwhile does not count"
+        print(f"{options.file}: {text}, so start it again", file=sys.stderr)
+        return BAD_FILE
+    _tell(store, number, summary)
+    return 1 if summary.failed or summary.left else 0
+
+
+def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
+    import os
+
+    from ..sweeps.cluster import cluster_runner
+    from ..sweeps.local import local_runner
+
+    if options.scheduler is not None:
+        return cluster_runner(options.scheduler, sweep, bundle)
+    return nullcontext(local_runner(sweep, options.workers or len(os.sched_getaffinity(0))))
+
+
+def _tell(store: Store, number: int, summary: Summary) -> None:
+    from ..sweeps.store import results
+
+    before = f" ({summary.before} of them before)" if summary.before else ""
+    left = f", {summary.left} left" if summary.left else ""
+    print(f"{store.path}: {summary.cells} cells, {summary.done} done, {summary.failed} failed{before}{left}")
+    versions = {tuple(one.versions.items()) for one in results(store, number)}
+    if len(versions) > 1:
+        print(f"{store.path}: the rows were computed with {len(versions)} different sets of versions", file=sys.stderr)
+    if summary.failed:
+        reasons: dict[str, list[int]] = {}
+        for one in results(store, number):
+            if one.status == "failed":
+                reasons.setdefault(one.reason, []).append(one.cell)
+        for reason, cells in list(reasons.items())[:10]:
+            more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
+            print(f"cell {cells[0]}{more} failed: {reason}", file=sys.stderr)
+        if len(reasons) > 10:
+            print(f"and {len(reasons) - 10} reasons more; see ballplate export", file=sys.stderr)
+
+
+def _dry_run(sweep: Sweep, bundle: Bundle, options: Namespace) -> int:
+    import os
+    import time
+
+    from ..sweeps.task import Task, blocks_of, compute
+    from .progress import duration
+
+    for number in range(len(sweep.cells)):
+        print(f"{number}: {sweep.label(number)}")
+    last = len(sweep.cells) - 1
+    tried = sorted({0, last // 2, last})[:TRIED]
+    seconds = []
+    for number in tried:
+        start = time.perf_counter()
+        # One block stands for all of a cell's.
+        compute(sweep, Task(number, 1 if blocks_of(sweep) else 0))
+        seconds.append((time.perf_counter() - start) * max(blocks_of(sweep), 1))
+    workers = options.workers or len(os.sched_getaffinity(0))
+    total = sum(seconds) / len(seconds) * len(sweep.cells) / workers
+    print(
+        f"{len(sweep.cells)} cells, about {duration(total)} with {workers} worker{'s' if workers > 1 else ''}, "
+        f"judged by {len(tried)} of them",
+        file=sys.stderr,
+    )
+    return 0

@@ -1,0 +1,1 @@
+"""Published experiments computed anew: what documents print, beside what the shipped designs give."""

@@ -1,0 +1,200 @@
+"""What a document states, as data: figures, ranks, remarks, errata, and the assumptions that a comparison rests on."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Literal
+
+from simulator.experiment.yamltree import parse_tree, to_python
+from simulator.settings import Settings
+
+SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
+Statistic = Literal["maximum", "average"]
+REPEATABILITY = "repeatability"
+
+
+class Assumption(Settings):
+    """What a comparison takes for granted that the document does not state; of all sections and quantities if empty."""
+
+    key: str
+    text: str
+    sections: tuple[str, ...] = ()
+    quantities: tuple[str, ...] = ()
+
+    def concerns(self, section: str, quantity: str) -> bool:
+        """Whether a quantity of a section rests on it."""
+        return section in (self.sections or (section,)) and quantity in (self.quantities or (quantity,))
+
+
+class Limits(Settings):
+    """How closely ours have to agree: `figure` and `factor` are relative, the others factors."""
+
+    figure: float
+    factor: float
+    step: float
+    sum_of_squares: float
+    median: float
+
+
+class Reservation(Settings):
+    """Figures that cannot be held to the common limit, the limits of their ratio instead, and why.
+
+    An `open` one is a difference that nobody has explained.
+    """
+
+    key: str
+    tables: tuple[str, ...]
+    quantities: tuple[str, ...]
+    within: tuple[float, float]
+    reason: str
+    designs: tuple[str, ...] = ()
+    statistic: Statistic | None = None
+    open: bool = False
+
+    def concerns(self, column: Column, quantity: str) -> bool:
+        """Whether a figure of a column is among them."""
+        return (
+            column.table in self.tables
+            and quantity in self.quantities
+            and column.design in (self.designs or (column.design,))
+            and self.statistic in (None, column.statistic)
+        )
+
+
+class Erratum(Settings):
+    """A block of a table, the designs that it is headed with, and those whose figures it has."""
+
+    table: str
+    statistics: tuple[Statistic, ...]
+    headed: tuple[str, ...]
+    meant: tuple[str, ...]
+    text: str
+    figures_of: str | None = None
+
+
+class Illegible(Settings):
+    """A block of which no figure can be read; ours are `told` if there is nothing else of its section."""
+
+    table: str
+    section: str
+    what: str
+    told: bool = False
+
+
+class RankStatement(Settings):
+    """The rank deficiency of designs: a number, or "some" where none is stated."""
+
+    section: str
+    designs: tuple[str, ...]
+    deficiency: int | Literal["some"]
+
+
+class Remark(Settings):
+    """What is said of averages in words, as limits of their ratios in pairs of designs."""
+
+    section: str
+    text: str
+    quantities: tuple[str, ...]
+    pairs: tuple[tuple[str, str], ...]
+    at_least: float | None = None
+    at_most: float | None = None
+
+
+class Progress(Settings):
+    """Length of step and sum of squares, in square metres with weight 1 for a reading, of Gauss-Newton iterations.
+
+    It `settles` by the last of them; with a `misfit` the sum of squares that is left is not that of rounding. Steps
+    that are only shown have a reason.
+    """
+
+    table: str
+    design: str
+    settles: bool
+    steps: tuple[float, ...]
+    sums_of_squares: tuple[float, ...]
+    misfit: bool = False
+    steps_shown_only: tuple[int, ...] = ()
+    reason: str = ""
+
+
+class Difference(Settings):
+    """Root mean square and largest difference, in metres, of distances corrected by two estimators."""
+
+    design: str
+    rms: float
+    maximum: float
+
+
+class Statements(Settings):
+    """What a document states besides the figures of its tables of uncertainties."""
+
+    title: str
+    sections: tuple[str, ...]
+    assumptions: tuple[Assumption, ...]
+    limits: Limits
+    exceptions: tuple[Reservation, ...]
+    errata: tuple[Erratum, ...]
+    illegible: tuple[Illegible, ...]
+    ranks: tuple[RankStatement, ...]
+    remarks: tuple[Remark, ...]
+    convergence: tuple[Progress, ...]
+    differences: tuple[Difference, ...]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a printed table: the legible ones of U1 to U6, in metres and radians, of one design."""
+
+    table: str
+    section: str
+    design: str
+    statistic: Statistic
+    figures: dict[str, float]
+
+    @property
+    def case(self) -> str:
+        return case_of(self.design)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A published document's statements and the columns of its tables."""
+
+    statements: Statements
+    columns: tuple[Column, ...]
+
+
+def case_of(design: str) -> str:
+    """Variant of a design, or its file where it has none.
+
+    >>> case_of("6.2.1[n=4 NDEL=5]"), case_of("6.2.1")
+    ('n=4 NDEL=5', '6.2.1')
+    """
+    return design.partition("[")[2].removesuffix("]") or design
+
+
+def section_of(design: str) -> str:
+    """Section of the document that a design belongs to.
+
+    >>> section_of("6.1.1-weights[C w=1]")
+    '6.1.1'
+    """
+    return design.partition("[")[0].partition("-")[0]
+
+
+@cache
+def npl() -> Document:
+    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 5 to 8 and 11, and what is said."""
+    name = "npl-cise-15-98"
+    folder = files(__package__)
+    text = folder.joinpath(f"{name}.yaml").read_text(encoding="utf-8")
+    statements = Statements.model_validate(to_python(parse_tree(text, f"{name}.yaml")))
+    columns = []
+    for row in csv.DictReader(folder.joinpath(f"{name}-tables.csv").read_text(encoding="utf-8").splitlines()):
+        statistic: Statistic = "maximum" if row["statistic"] == "maximum" else "average"
+        figures = {symbol: float(row[symbol]) for symbol in SYMBOLS if row[symbol]}
+        columns.append(Column(row["table"], row["experiment"], row["design"], statistic, figures))
+    return Document(statements, tuple(columns))

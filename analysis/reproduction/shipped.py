@@ -1,0 +1,76 @@
+"""Shipped designs by their names: loaded, planned and fitted once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Experiment
+from simulator.generate import exact_readings, on_true_machine
+from simulator.layout import lay_out
+from simulator.machines.truth import true_machine
+from simulator.readings import ObservedReadings
+from simulator.settings import hint
+
+from ..study import Fit, Plan, fit, plan
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """The designs in a folder, one YAML file for each experiment; what was loaded and planned is kept."""
+
+    folder: Path
+    loaded: dict[str, dict[str, Experiment]] = field(default_factory=dict)
+    plans: dict[str, Plan] = field(default_factory=dict)
+
+
+def variants(shipped: Shipped, name: str) -> dict[str, Experiment]:
+    """Experiments of the file `name`.yaml by their labels.
+
+    :raises ExperimentError: the folder or the file is missing, or the file has errors.
+    """
+    if name not in shipped.loaded:
+        if not shipped.folder.is_dir():
+            text = (
+                "no such folder; name that of the shipped designs, which is designs/npl in a checkout, with --designs"
+            )
+            raise ExperimentError([Message(str(shipped.folder), 0, 0, "", text)])
+        shipped.loaded[name] = {one.label: one for one in load(shipped.folder / f"{name}.yaml")}
+    return shipped.loaded[name]
+
+
+def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
+    """The experiment that is labelled `file[variant]`.
+
+    :raises ExperimentError: there is none.
+    """
+    name = label.partition("[")[0]
+    found = variants(shipped, name)
+    if label not in found:
+        text = f'no experiment "{label}"; {hint(label, found)}'
+        raise ExperimentError([Message(str(shipped.folder / f"{name}.yaml"), 0, 0, "", text)])
+    return found[label]
+
+
+def planned(shipped: Shipped, label: str) -> Plan:
+    """The plan of a shipped design, at zero machine error."""
+    if label not in shipped.plans:
+        shipped.plans[label] = plan(shipped_experiment(shipped, label))
+    return shipped.plans[label]
+
+
+def fitted_exactly(experiment: Experiment) -> Fit:
+    """The fit of readings without noise of an experiment's true machine, with uncertainties as given."""
+    design = lay_out(experiment)
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    machine = true_machine(experiment.true_machine, design.model, *corners)
+    _, x = exact_readings(*on_true_machine(design, machine))
+    return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
+
+
+def sums_of_squares(found: Fit) -> list[float]:
+    """S^2 of each iteration in square metres, with weight 1 for a reading."""
+    scale = float(found.design.repeatability[0]) ** 2
+    return [scale * iteration.sum_of_squares for iteration in found.solution.iterations]

@@ -1,0 +1,1 @@
+"""Families of experiments: what varies, the store of what came out, and the work spread over processes."""

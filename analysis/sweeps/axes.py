@@ -1,0 +1,221 @@
+"""Axes of a sweep file: what each changes, and the values it takes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+from simulator.experiment.messages import Steps
+from simulator.experiment.problems import Problems, written
+from simulator.experiment.variants import node_at, override
+from simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python
+from simulator.settings import hint, listing
+
+from .model import Axis, Choice, Unit
+from .settings import AxisSettings
+from .values import entry_names, label, numeric, of_range, subset_count, subsets
+
+MOST_VALUES = 100_000
+
+# Ways to say what an axis takes its values from.
+SOURCES = ("values", "start", "together", "subsets", "variants")
+
+
+def read_axis(
+    name: str,
+    settings: AxisSettings,
+    root: Node,
+    trees: dict[str | None, Node],
+    variant: str | None,
+    problems: Problems,
+) -> Axis | None:
+    """An axis of the sweep file `root`; what is wrong with it goes to `problems`."""
+    here: Steps = ("axes", name)
+    given = [key for key in SOURCES if getattr(settings, key) is not None]
+    if len(given) != 1:
+        known = "values, from … to …, together, subsets or variants"
+        problems.add(here, f"{'nothing says' if not given else 'too much says'} what it varies; give one of {known}")
+        return None
+    needless = _needless(settings, given[0])
+    if needless:
+        problems.add((*here, needless), f"does not go with {_key(given[0])}; remove it", of_key=True)
+        return None
+    before = len(problems.messages)
+    choices = _choices(here, given[0], settings, root, trees, variant, problems)
+    if len(problems.messages) > before:
+        return None
+    counts = Counter(choice.label for choice in choices)
+    twice = next((one for one, times in counts.items() if times > 1), None)
+    if twice is not None:
+        problems.add(here, f'has the value "{twice}" twice; take one away, or name the values differently')
+        return None
+    _check_paths(here, choices, trees, problems)
+    return _with_numbers(name, choices, given[0] in ("values", "start"))
+
+
+def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> Axis:
+    """The axis, with the choices' values as numbers where all of them are quantities of one kind."""
+    found: list[tuple[float, Unit]] = []
+    if is_simple:
+        found = [numeric(to_python(choice.changes[0][1])) for choice in choices]
+    if len({unit for _, unit in found}) != 1 or not found[0][1]:
+        return Axis(name, tuple(choices), "")
+    numbers = [replace(choice, value=value) for choice, (value, _) in zip(choices, found, strict=True)]
+    return Axis(name, tuple(numbers), found[0][1])
+
+
+def _key(source: str) -> str:
+    return "from" if source == "start" else source
+
+
+def _needless(settings: AxisSettings, source: str) -> str | None:
+    """A key that has no meaning beside the source of the values."""
+    goes_with = {
+        "values": {"path", "paths"},
+        "start": {"path", "paths", "to", "count", "step", "spacing"},
+        "together": {"names"},
+        "subsets": {"path"},
+        "variants": set(),
+    }[source]
+    written_keys = {one for one in settings.model_fields_set if one != source}
+    return next((_key(one) for one in sorted(written_keys) if one not in goes_with), None)
+
+
+def _choices(
+    here: Steps,
+    source: str,
+    settings: AxisSettings,
+    root: Node,
+    trees: dict[str | None, Node],
+    variant: str | None,
+    problems: Problems,
+) -> list[Choice]:
+    if source == "variants":
+        return _variant_choices(here, settings, trees, problems)
+    if source == "together":
+        return _choices_together(here, settings, root, problems)
+    paths = settings.paths or ((settings.path,) if settings.path is not None else ())
+    if not paths or (settings.path is not None and settings.paths is not None):
+        problems.add(here, "what the values replace is not clear; give path, or paths")
+        return []
+    if source == "subsets":
+        return _subset_choices(here, settings, root, trees, variant, problems)
+    if source == "start":
+        mark = mark_of(root, (*here, "from"))
+        try:
+            found = of_range(
+                settings.start,
+                settings.to,
+                settings.count,
+                settings.step,
+                settings.spacing == "logarithmic",
+                MOST_VALUES,
+            )
+        except ValueError as error:
+            problems.add(here, str(error))
+            return []
+        nodes: list[tuple[str, Node]] = [(str(value), Scalar(mark, value)) for value in found]
+    else:
+        nodes = _nodes(root, (*here, "values"), problems)
+    return [Choice(text, tuple((path, node, node.mark) for path in paths)) for text, node in nodes]
+
+
+def _nodes(root: Node, steps: Steps, problems: Problems) -> list[tuple[str, Node]]:
+    """Values of an axis as nodes with their labels."""
+    node = written(root, *steps)
+    if isinstance(node, Sequence):
+        return [(label(item), item) for item in node.items]
+    if isinstance(node, Mapping):
+        return list(node.items.items())
+    problems.add(steps, "expected a list of values, or name: value; write [a, b]")
+    return []
+
+
+def _variant_choices(
+    here: Steps, settings: AxisSettings, trees: dict[str | None, Node], problems: Problems
+) -> list[Choice]:
+    names = [name for name in trees if name is not None]
+    chosen = list(settings.variants or ()) if settings.variants != "all" else names
+    if not names:
+        problems.add((*here, "variants"), "the base file has no variants; take this axis away")
+        return []
+    for k, name in enumerate(chosen):
+        if name not in names:
+            problems.add((*here, "variants", k), f'no variant "{name}" in the base file; {hint(name, names)}')
+    return [Choice(name, (), variant=name) for name in chosen]
+
+
+def _choices_together(here: Steps, settings: AxisSettings, root: Node, problems: Problems) -> list[Choice]:
+    columns = {path: _nodes(root, (*here, "together", path), problems) for path in settings.together or {}}
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) > 1:
+        counts = listing(f"{path}: {len(column)}" for path, column in columns.items())
+        problems.add((*here, "together"), f"lists of different lengths ({counts}); give each path as many values")
+        return []
+    count = lengths.pop() if lengths else 0
+    names = list(settings.names or ())
+    if names and len(names) != count:
+        problems.add((*here, "names"), f"{len(names)} names for {count} values; give one for each")
+        return []
+    choices = []
+    for k in range(count):
+        own = [column[k] for column in columns.values()]
+        text = names[k] if names else " / ".join(one[0] for one in own)
+        choices.append(Choice(text, tuple((path, one[1], one[1].mark) for path, one in zip(columns, own, strict=True))))
+    return choices
+
+
+def _subset_choices(
+    here: Steps,
+    settings: AxisSettings,
+    root: Node,
+    trees: dict[str | None, Node],
+    variant: str | None,
+    problems: Problems,
+) -> list[Choice]:
+    path, wanted = settings.path or "", settings.subsets
+    assert wanted is not None
+    tree = trees.get(variant, next(iter(trees.values())))
+    try:
+        place = node_at(tree, path)
+    except ValueError as error:
+        problems.add((*here, "path"), str(error))
+        return []
+    names = entry_names(place) if place is not None else None
+    if names is None or not isinstance(place, Sequence):
+        problems.add((*here, "path"), "leads to no list of entries with names; write for example positions")
+        return []
+    before = len(problems.messages)
+    for key, some in (("always", wanted.always), ("among", wanted.among or ())):
+        for k, name in enumerate(some):
+            if name not in names:
+                problems.add((*here, "subsets", key, k), f'no entry "{name}" in {path}; {hint(name, names)}')
+    among = wanted.among if wanted.among is not None else tuple(names)
+    fixed = len(set(wanted.always))
+    total = len(set(among) | set(wanted.always))
+    for k, size in enumerate(wanted.sizes):
+        if not max(fixed, 1) <= size <= total:
+            text = f"no subset has {size} entries; give {max(fixed, 1)} to {total}"
+            problems.add((*here, "subsets", "sizes", k), text)
+    if len(problems.messages) > before:
+        return []
+    count = subset_count(total, fixed, wanted.sizes)
+    if count > MOST_VALUES:
+        problems.add((*here, "subsets"), f"{count} subsets; {MOST_VALUES} are the limit, so take fewer of them")
+        return []
+    mark = mark_of(root, (*here, "subsets"))
+    found = subsets(place, names, wanted.always, among, wanted.sizes)
+    return [Choice(text, ((path, node, mark),)) for text, node in found]
+
+
+def _check_paths(here: Steps, choices: list[Choice], trees: dict[str | None, Node], problems: Problems) -> None:
+    """Refuse paths that lead nowhere in every variant."""
+    for path in dict.fromkeys(path for choice in choices[:1] for path, _, _ in choice.changes):
+        errors = []
+        for tree in trees.values():
+            try:
+                override(tree, path, Scalar(Mark("", 0, 0), 0), Mark("", 0, 0))
+            except ValueError as error:
+                errors.append(str(error))
+        if len(errors) == len(trees):
+            problems.add(here, f"{path}: {errors[0]}")

@@ -1,0 +1,149 @@
+"""The files that a sweep depends on, so that any machine can compute its cells and a store can tell what changed."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from simulator.experiment.yamltree import Node, Scalar, read_tree, to_python, walk
+
+from .model import Sweep
+
+MODULE = ".py"
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Contents of files by their path below a common folder; `source` is the sweep file, `base` the experiment file."""
+
+    source: str
+    base: str
+    files: tuple[tuple[str, bytes], ...]
+
+    @property
+    def digest(self) -> str:
+        """A hash of all paths and contents."""
+        found = hashlib.blake2b(digest_size=20)
+        for name, content in self.files:
+            found.update(f"{len(name)} {name} {len(content)} ".encode("utf-8", "surrogatepass"))
+            found.update(content)
+        return found.hexdigest()
+
+
+def bundle_of(sweep: Sweep) -> Bundle:
+    """The sweep file, its base, and all files beside these that a text in them names.
+
+    A file that is named by its place from the root of the file system is not taken along: it must be there, wherever
+    the sweep is computed.
+    """
+    source, base = Path(os.path.abspath(sweep.source)), Path(os.path.abspath(sweep.base))
+    paths = {source, base}
+    for file in (source, base):
+        for text in _texts(read_tree(file)):
+            paths |= set(_named(base.parent, text))
+    root = Path(os.path.commonpath([path.parent for path in paths]))
+    names = {path: path.relative_to(root).as_posix() for path in sorted(paths)}
+    return Bundle(names[source], names[base], tuple((name, path.read_bytes()) for path, name in names.items()))
+
+
+def _texts(root: Node) -> Iterator[str]:
+    for _, node in walk(root):
+        if isinstance(node, Scalar) and isinstance(node.value, str):
+            yield node.value
+
+
+def _named(folder: Path, text: str) -> Iterator[Path]:
+    """Files below or beside a folder that a text may mean: a path, or a Python module."""
+    if not 0 < len(text) <= 300 or "\0" in text or "\n" in text or text.startswith(("/", "~")):
+        return
+    candidates = [text]
+    if ":" in text:
+        candidates.append(text.partition(":")[0].replace(".", "/") + MODULE)
+    for one in candidates:
+        path = Path(os.path.abspath(folder / one))
+        try:
+            if path.is_file():
+                yield path
+        except (OSError, ValueError):
+            continue
+
+
+def unpack(bundle: Bundle, folder: Path) -> Path:
+    """Write the files below a folder and return the sweep file there."""
+    for name, content in bundle.files:
+        path = folder / PurePosixPath(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return folder / PurePosixPath(bundle.source)
+
+
+def definition(sweep: Sweep, bundle: Bundle) -> dict[str, Any]:
+    """What a store keeps of a sweep as plain data: by it a changed file is told from the same one."""
+    content = {name: hashlib.blake2b(content, digest_size=20).hexdigest() for name, content in bundle.files}
+    return {
+        "title": sweep.title,
+        "source": bundle.source,
+        "base": bundle.base,
+        "sweep": _plain(to_python(read_tree(sweep.source))),
+        "experiment": _plain(to_python(read_tree(sweep.base))),
+        "files": {name: digest for name, digest in content.items() if name not in (bundle.source, bundle.base)},
+        "axes": [
+            {
+                "name": axis.name,
+                "column": axis.column,
+                "unit": axis.unit,
+                "labels": [choice.label for choice in axis.choices],
+                "values": [choice.value for choice in axis.choices] if axis.unit else [],
+            }
+            for axis in sweep.axes
+        ],
+        "cells": [list(cell) for cell in sweep.cells],
+        "trials": sweep.trials,
+        "seed": sweep.seed,
+        "record": list(sweep.record),
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+# What may change without changing a figure.
+WORDS = ("title", "description")
+
+
+def changes(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
+    """Differences of two definitions that matter, each in a line."""
+    found = []
+    for part, name in (("sweep", new["source"]), ("experiment", new["base"])):
+        before, after = (dict(_flat(one[part], "")) for one in (old, new))
+        for path in dict.fromkeys([*before, *after]):
+            if path in WORDS or before.get(path) == after.get(path):
+                continue
+            if path not in after:
+                found.append(f"{name}: {path}: {before[path]!r} is gone")
+            elif path not in before:
+                found.append(f"{name}: {path}: {after[path]!r} is new")
+            else:
+                found.append(f"{name}: {path}: {before[path]!r} has become {after[path]!r}")
+    for path in dict.fromkeys([*old["files"], *new["files"]]):
+        if old["files"].get(path) != new["files"].get(path):
+            found.append(f"{path}: another content")
+    return found
+
+
+def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict) and value:
+        for key, item in value.items():
+            yield from _flat(item, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list) and value:
+        for k, item in enumerate(value):
+            yield from _flat(item, f"{path}[{k}]")
+    else:
+        yield path, value

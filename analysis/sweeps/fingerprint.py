@@ -1,0 +1,108 @@
+"""Fingerprints of validated experiments: equal where the same is computed, whatever the file looks like."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import BaseModel
+
+from simulator.experiment.model import Experiment
+from simulator.machines.settings import PythonSettings
+from simulator.settings import Settings
+
+# What says nothing about the result: names, and where things stand.
+LEFT_OUT = ("title", "description", "source", "mark", "path", "_folder")
+
+
+class _Digest(Protocol):
+    def update(self, data: bytes, /) -> None: ...
+
+
+def fingerprint(experiment: Experiment, *more: object) -> str:
+    """A hash of everything that the figures of an experiment depend on, and of `more`.
+
+    Files that the experiment names count by their content, a user's own error model by the text of its module.
+
+    :raises TypeError: a value of a kind that is not known here, so that nothing is passed over.
+    """
+    digest = hashlib.blake2b(digest_size=20)
+    _add(digest, replace(experiment, name=None))
+    for one in more:
+        _add(digest, one)
+    return digest.hexdigest()
+
+
+def _add(digest: _Digest, value: Any) -> None:
+    """Add a value with its type and length, so that neighbours cannot be mistaken for one another."""
+    if value is None or isinstance(value, bool | int | str):
+        _text(digest, f"{type(value).__name__} {value!r}")
+    elif isinstance(value, float):
+        _text(digest, f"float {value.hex()}")
+    elif isinstance(value, np.ndarray):
+        _text(digest, f"array {value.dtype.str} {value.shape}")
+        digest.update(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, np.generic):
+        _add(digest, value.item())
+    elif isinstance(value, Path):
+        _text(digest, f"path {value.as_posix()}")
+    elif isinstance(value, Mapping):
+        _text(digest, f"mapping {len(value)}")
+        for key, item in value.items():
+            _add(digest, key)
+            _add(digest, item)
+    elif isinstance(value, tuple | list):
+        _text(digest, f"list {len(value)}")
+        for item in value:
+            _add(digest, item)
+    elif isinstance(value, BaseModel):
+        _settings(digest, value)
+    elif is_dataclass(value) and not isinstance(value, type):
+        _text(digest, f"object {type(value).__name__}")
+        for field in fields(value):
+            if field.name not in LEFT_OUT:
+                _text(digest, field.name)
+                _add(digest, getattr(value, field.name))
+    else:
+        raise TypeError(f"no fingerprint of a {type(value).__name__}")
+
+
+def _text(digest: _Digest, text: str) -> None:
+    data = text.encode("utf-8", errors="surrogatepass")
+    digest.update(f"{len(data)}:".encode())
+    digest.update(data)
+
+
+def _settings(digest: _Digest, value: BaseModel) -> None:
+    _text(digest, f"settings {type(value).__name__}")
+    for name in type(value).model_fields:
+        _text(digest, name)
+        _add(digest, getattr(value, name))
+    for name, item in sorted((value.__pydantic_private__ or {}).items()):
+        if name not in LEFT_OUT:
+            _text(digest, name)
+            _add(digest, item)
+    if isinstance(value, PythonSettings):
+        _text(digest, module_text(value))
+
+
+def module_text(settings: Settings) -> str:
+    """The text of the module with a user's own error model; empty where Python has none of it."""
+    name = str(getattr(settings, "object", "")).partition(":")[0]
+    folder = getattr(settings, "_folder", None)
+    places = [] if folder is None else [folder.joinpath(*name.split(".")).with_suffix(".py")]
+    try:
+        found = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        found = None
+    if found is not None and found.origin is not None:
+        places.append(Path(found.origin))
+    for place in places:
+        if place.suffix == ".py" and place.is_file():
+            return place.read_text(encoding="utf-8", errors="replace")
+    return ""

@@ -1,0 +1,67 @@
+"""A sweep: an experiment, axes, and the cells that their combinations are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from simulator.experiment.yamltree import Mark, Node
+
+Unit = Literal["m", "rad", "1", ""]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """One value of an axis: `changes` are paths with the nodes to be put there, or `variant` a variant to begin with.
+
+    `value` is a number in metres, radians or without unit where the axis has such values, otherwise NaN.
+    """
+
+    label: str
+    changes: tuple[tuple[str, Node, Mark], ...]
+    value: float = float("nan")
+    variant: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """What varies. `unit` is that of the choices' values, empty where they are no numbers."""
+
+    name: str
+    choices: tuple[Choice, ...]
+    unit: Unit
+
+    @property
+    def column(self) -> str:
+        """Name of the axis in a table, with the unit where there is one."""
+        return f"{self.name}_{self.unit}" if self.unit in ("m", "rad") else self.name
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A sweep. `trees` are the base file's variants by name, or the whole file under None.
+
+    `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest.
+    """
+
+    source: Path
+    title: str
+    base: Path
+    trees: dict[str | None, Node]
+    variant: str | None
+    axes: tuple[Axis, ...]
+    cells: tuple[tuple[int, ...], ...]
+    trials: int | None
+    seed: int
+    record: tuple[str, ...]
+
+    def choices(self, number: int) -> tuple[Choice, ...]:
+        """The choices that make up a cell."""
+        return tuple(axis.choices[k] for axis, k in zip(self.axes, self.cells[number], strict=True))
+
+    def label(self, number: int) -> str:
+        """A cell in words."""
+        return ", ".join(
+            f"{axis.name} {choice.label}" for axis, choice in zip(self.axes, self.choices(number), strict=True)
+        )

@@ -1,0 +1,101 @@
+"""The keys of a sweep file: forms and ranges. What they refer to is checked where the sweep is loaded."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, Tag
+
+from simulator.experiment.sections import Line, Seed
+from simulator.geometry.artefacts import Name
+from simulator.settings import FORM, Settings
+
+Quantity = Literal["U1", "U2", "U3", "U4", "U5", "U6"]
+QUANTITIES: tuple[Quantity, ...] = ("U1", "U2", "U3", "U4", "U5", "U6")
+
+Path = Annotated[str, Field(min_length=1)]
+Scalar = str | int | float | bool
+Values = Annotated[
+    Annotated[tuple[Any, ...], Field(min_length=1), Tag("<list>")]
+    | Annotated[dict[Name, Any], Field(min_length=1), Tag("<mapping>")]
+    | Annotated[tuple[Any, ...], Tag("<one>")],
+    FORM,
+]
+
+
+class SubsetSettings(Settings):
+    """Which entries of a list are kept, in the order of the list."""
+
+    sizes: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] = Field(
+        description="how many entries, those of always included"
+    )
+    always: tuple[Name, ...] = Field((), description="names of entries that every subset holds")
+    among: tuple[Name, ...] | None = Field(None, description="names to choose from; default: all entries of the list")
+
+
+class AxisSettings(Settings):
+    """One axis of a sweep: what it changes, and the values it takes."""
+
+    path: Path | None = Field(None, description="path of what the values replace, as in error messages")
+    paths: Annotated[tuple[Path, ...], Field(min_length=1)] | None = Field(
+        None, description="several paths that take the same values"
+    )
+    values: Values | None = Field(None, description="list of values, or name: value")
+    start: Scalar | None = Field(None, alias="from", description="first value of a range, a number or quantity")
+    to: Scalar | None = Field(None, description="last value of a range")
+    count: Annotated[int, Field(ge=2, le=100_000)] | None = Field(None, description="number of values of a range")
+    step: Scalar | None = Field(None, description="difference of neighbouring values of a range, instead of count")
+    spacing: Literal["linear", "logarithmic"] = Field("linear", description="of a range with count")
+    together: Annotated[dict[Path, Values], Field(min_length=1)] | None = Field(
+        None, description="path: values, for several paths that change together; lists of the same length"
+    )
+    names: tuple[Name, ...] | None = Field(None, description="a name for each value of together")
+    subsets: SubsetSettings | None = Field(None, description="subsets of the list at path, such as positions")
+    variants: (
+        Annotated[
+            Annotated[Literal["all"], Tag("<one>")]
+            | Annotated[tuple[Name, ...], Field(min_length=1), Tag("<list>")]
+            | Annotated[tuple[Name, ...], Tag("<mapping>")],
+            FORM,
+        ]
+        | None
+    ) = Field(None, description="variants of the base file: all, or a list of names")
+
+
+class BoundsSettings(Settings):
+    """Bounds of an axis, exclusive."""
+
+    above: Scalar | None = Field(None, description="holds for values above this")
+    below: Scalar | None = Field(None, description="holds for values below this")
+
+
+Condition = Annotated[
+    Annotated[Scalar, Tag("<one>")]
+    | Annotated[tuple[Any, ...], Field(min_length=1), Tag("<list>")]
+    | Annotated[BoundsSettings, Tag("<mapping>")],
+    FORM,
+]
+
+
+class SweepSettings(Settings):
+    """A sweep file: an experiment, what varies in it, and what is recorded."""
+
+    title: Line = Field(description="one line that says what the sweep is about")
+    base: Annotated[str, Field(min_length=1)] = Field(description="experiment file, from this file's folder")
+    variant: Name | None = Field(None, description="variant of the base file; needed if it has several")
+    axes: Annotated[dict[Name, AxisSettings], Field(min_length=1)] = Field(
+        description="name: what varies; every combination of the axes' values is a cell"
+    )
+    skip: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
+        (), description="cells left out: axis: value, list of values or {above: …, below: …}, all of an entry at once"
+    )
+    only: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
+        (), description="cells kept, in the same form; default: all"
+    )
+    trials: Annotated[int, Field(ge=2, le=10_000_000)] | None = Field(
+        None, description="synthetic data sets of each cell; default: none"
+    )
+    seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
+    record: Annotated[tuple[Quantity, ...], Field(min_length=1)] = Field(
+        QUANTITIES, description="quantities that are kept; default: all of U1 to U6"
+    )

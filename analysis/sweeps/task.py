@@ -1,0 +1,232 @@
+"""What a worker does for one cell of a sweep: rank, U1 to U6, replicates."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import time
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment
+from simulator.threads import single_threaded
+
+from ..montecarlo.figures import Figure, Outcome
+from ..montecarlo.study import Trials, block_of_trials, combined, trials
+from ..montecarlo.tally import Tally
+from ..study import Plan, plan
+from .fingerprint import fingerprint
+from .load import experiment_of
+from .model import Sweep
+
+# Replicates of a block, a multiple of a batch's; a cell with no more is computed at one go.
+BLOCK = 8192
+
+
+# Block of a task that is to tell the cell's key only.
+KEY_ONLY = -1
+
+
+@dataclass(frozen=True)
+class Task:
+    """Work on cell `number`: replicate block `block`, counted from 1, or, with 0, everything that is left, or the
+    cell's key alone.
+
+    `total` are the sums over all blocks, where the replicates are in several.
+    """
+
+    number: int
+    block: int = 0
+    total: Tally | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of a task. `figures` by name, in SI units with the unit in the name; `details` are texts.
+
+    `key` is the fingerprint of the cell, or a hash of its choices where these make no valid experiment. A failed row
+    has its `reason`. `seconds` is the time that it took, `tally` the sums of a replicate block.
+    """
+
+    number: int
+    block: int
+    key: str
+    status: str
+    reason: str = ""
+    seed: int = 0
+    figures: dict[str, float] = field(default_factory=dict)
+    details: dict[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+    tally: Tally | None = None
+    versions: tuple[tuple[str, str], ...] = ()
+
+
+def blocks_of(sweep: Sweep) -> int:
+    """Number of replicate blocks that are tasks of their own; none where one task does all."""
+    return -(-sweep.trials // BLOCK) if sweep.trials is not None and sweep.trials > BLOCK else 0
+
+
+@single_threaded
+def compute(sweep: Sweep, task: Task) -> Row:
+    """Do a task; whatever goes wrong with the cell is told by its row."""
+    start = time.perf_counter()
+    row = _computed(sweep, task)
+    seconds = time.perf_counter() - start
+    return Row(**{**row.__dict__, "seconds": seconds, "versions": versions()})
+
+
+def _computed(sweep: Sweep, task: Task) -> Row:
+    number, block = task.number, task.block
+    try:
+        experiment = experiment_of(sweep, number)
+    except ExperimentError as error:
+        return Row(number, block, invalid_key(sweep, number), "failed", str(error))
+    key = fingerprint(experiment, sweep.trials, sweep.seed, sweep.record)
+    seed = seed_of(sweep, key)
+    if block == KEY_ONLY:
+        return Row(number, block, key, "done")
+    try:
+        if block:
+            part = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
+            return Row(number, block, key, "done", seed=seed, tally=part.tally)
+        return _whole(sweep, experiment, task, key, seed)
+    except ExperimentError as error:
+        return Row(number, block, key, "failed", str(error), seed)
+    except (MemoryError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return Row(number, block, key, "failed", f"{type(error).__name__}: {error}", seed)
+
+
+def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int) -> Row:
+    planned = plan(experiment)
+    figures, details = plan_figures(planned, sweep.record)
+    if sweep.trials is not None:
+        if task.total is not None:
+            found = Trials(seed, combined(experiment, task.total))
+        else:
+            found = trials(experiment, sweep.trials, seed)
+        if found.outcome is None:
+            details["monte_carlo"] = found.reason
+        else:
+            figures |= trial_figures(found.outcome, sweep.record)
+            details["not_converged"] = list(found.outcome.failed)
+            details["flags"] = {name: list(one.flags) for name, one in found.outcome.comparisons.items() if one.flags}
+    return Row(task.number, 0, key, "done", "", seed, figures, details)
+
+
+def lost(sweep: Sweep, task: Task) -> Row:
+    """The row of a task whose process ends whenever it is tried."""
+    reason = "the process that computed it was ended, by lack of memory perhaps"
+    try:
+        key = fingerprint(experiment_of(sweep, task.number), sweep.trials, sweep.seed, sweep.record)
+    except ExperimentError:
+        key = invalid_key(sweep, task.number)
+    return Row(task.number, task.block, key, "failed", reason, versions=versions())
+
+
+def invalid_key(sweep: Sweep, number: int) -> str:
+    """Key of a cell that makes no valid experiment."""
+    text = "\n".join(
+        f"{axis.name}={choice.label}" for axis, choice in zip(sweep.axes, sweep.choices(number), strict=True)
+    )
+    return "invalid " + hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+
+
+def seed_of(sweep: Sweep, key: str) -> int:
+    """Seed of a cell's data sets: of the sweep's seed and of what is computed, not of the cell's place."""
+    return int.from_bytes(hashlib.blake2b(f"{sweep.seed} {key}".encode(), digest_size=6).digest(), "big")
+
+
+def plan_figures(planned: Plan, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:
+    """Figures and texts of a plan."""
+    judged = planned.verdict
+    counted = judged.singular_values[: len(judged.singular_values) - judged.deficiency]
+    figures = {
+        "parameters": float(judged.parameters),
+        "observations": float(judged.observations),
+        "rank_deficiency": float(judged.deficiency),
+        "as_expected": float(judged.as_expected),
+        "weakly_determined": float(len(judged.weak)),
+        "smallest_singular_value_per_um": float(counted[-1]) if len(counted) else np.nan,
+        "gap": float(judged.gap),
+    }
+    for symbol, one in planned.quantities.items():
+        if symbol.partition(" ")[0] not in record:
+            continue
+        name, unit = symbol.replace(" ", "_"), unit_suffix(one.unit)
+        figures[f"{name}_maximum_{unit}"] = one.maximum
+        figures[f"{name}_average_{unit}"] = one.average
+        figures[f"{name}_undetermined"] = float(one.undetermined)
+        if one.within_target is not None:
+            figures[f"{name}_within_target"] = one.within_target
+    details = {
+        "undetermined": [str(direction) for direction in judged.null],
+        "weak": [str(direction) for direction in judged.weak],
+        "largest_at": {symbol: one.largest for symbol, one in planned.quantities.items() if one.largest},
+    }
+    return figures, details
+
+
+def trial_figures(found: Outcome, record: tuple[str, ...]) -> dict[str, float]:
+    """Figures of replicates."""
+    figures = {"trials": float(found.trials), "not_converged": float(len(found.failed))}
+
+    def add(name: str, figure: Figure) -> None:
+        figures[name] = figure.value
+        figures[f"{name}_standard_error"] = figure.error
+
+    for symbol, one in found.comparisons.items():
+        if symbol.rstrip("'").partition(" ")[0] not in record:
+            continue
+        name, unit = (
+            symbol.replace(" ", "_").replace("'", "_more"),
+            unit_suffix(one.unit),
+        )
+        figures[f"{name}_actual_maximum_{unit}"] = one.actual_maximum
+        figures[f"{name}_actual_average_{unit}"] = one.actual_average
+        add(f"{name}_spread_ratio", one.spread)
+        add(f"{name}_actual_ratio", one.actual)
+        add(f"{name}_bias_ratio", one.bias)
+        add(f"{name}_coverage_sigma_given", one.known)
+        add(f"{name}_coverage_sigma_estimated", one.estimated)
+    add("sum_of_squares", found.misfit.mean)
+    figures["degrees_of_freedom"] = float(found.misfit.degrees_of_freedom)
+    return figures
+
+
+def unit_suffix(unit: str) -> str:
+    """A unit at the end of a column's name.
+
+    >>> unit_suffix("m, rad"), unit_suffix("1")
+    ('m_or_rad', 'ratio')
+    """
+    return unit.replace(", ", "_or_").replace("1", "ratio")
+
+
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """Versions of what the figures were computed with."""
+    import importlib.metadata
+
+    import numpy.linalg  # noqa: F401
+    import scipy
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
+
+    blas = sorted(
+        {
+            f"{one['internal_api']} {one.get('version')} {one.get('architecture', '')}".strip()
+            for one in threadpool_info()
+            if one["user_api"] == "blas"
+        }
+    )
+    return (
+        ("ballplate", importlib.metadata.version("ballplate")),
+        ("python", platform.python_version()),
+        ("numpy", np.__version__),
+        ("scipy", scipy.__version__),
+        ("blas", "; ".join(blas)),
+    )

@@ -1,0 +1,151 @@
+"""Values of axes: texts for tables, numbers where they are numbers, ranges, and subsets of lists."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import combinations
+from typing import Any
+
+from simulator.experiment.yamltree import Mapping, Node, Scalar, Sequence, child, to_python
+from simulator.quantities import QUANTITY, QuantityError, exact_number, parse_angle, parse_length, parse_ratio
+from simulator.settings import shorten
+
+from .model import Unit
+
+KINDS: tuple[tuple[Unit, Callable[[object], float]], ...] = (
+    ("m", parse_length),
+    ("rad", parse_angle),
+    ("1", parse_ratio),
+)
+
+
+def label(node: Node) -> str:
+    """A value as a short text.
+
+    >>> label(Sequence(Mark("", 1, 1), (Scalar(Mark("", 1, 1), 5), Scalar(Mark("", 1, 1), "750 mm"))))
+    '[5, 750 mm]'
+    """
+    return shorten(_text(to_python(node)), 200)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_text(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_text, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value is None else str(value)
+
+
+def numeric(value: object) -> tuple[float, Unit]:
+    """A number or quantity in SI units and the unit; NaN and no unit for anything else.
+
+    >>> numeric("750 mm"), numeric(5), numeric("z low")[1]
+    ((0.75, 'm'), (5.0, '1'), '')
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value) if abs(value) < 1e300 else math.nan
+        return (number, "1") if math.isfinite(number) else (math.nan, "")
+    if isinstance(value, str) and len(value) < 100:
+        for unit, parse in KINDS:
+            try:
+                return parse(value), unit
+            except QuantityError:
+                continue
+    return math.nan, ""
+
+
+def of_range(
+    first: object, last: object, count: int | None, step: object, logarithmic: bool, most: int
+) -> list[str | int | float]:
+    """Values of a range with the unit of its ends, computed exactly.
+
+    :raises ValueError: ends that are no quantities of one unit, a step that does not lead from one to the other, or
+        more values than `most`.
+
+    >>> of_range("300 mm", "750 mm", 4, None, False, 100)
+    ['300 mm', '450 mm', '600 mm', '750 mm']
+    >>> of_range(4, 10, None, 2, False, 100)
+    [4, 6, 8, 10]
+    """
+    low, unit = _exact(first, "from")
+    high, unit_of_last = _exact(last, "to")
+    if unit_of_last != unit:
+        raise ValueError(f'from and to have the units "{unit}" and "{unit_of_last}"; write both in the same unit')
+    if (count is None) == (step is None):
+        raise ValueError("a range needs count or step, and one of them only")
+    if count is None:
+        difference, unit_of_step = _exact(step, "step")
+        if unit_of_step != unit:
+            raise ValueError(f'step has the unit "{unit_of_step}", from and to "{unit}"; write all in the same unit')
+        if difference == 0 or (high - low) / difference < 0:
+            raise ValueError("step does not lead from from to to; turn its sign round, or exchange the ends")
+        if logarithmic:
+            raise ValueError("spacing: logarithmic goes with count; leave step out")
+        count = int((high - low) / difference) + 1
+    else:
+        difference = (high - low) / (count - 1)
+    if count > most:
+        raise ValueError(f"the range has {count} values; {most} are the limit")
+    if logarithmic:
+        if low <= 0 or high <= 0:
+            raise ValueError("spacing: logarithmic needs ends above zero")
+        ratio = float(high / low) ** (1.0 / (count - 1))
+        inner = [Fraction(f"{float(low) * ratio**k:.10g}") for k in range(1, count - 1)]
+        return [_written(value, unit) for value in (low, *inner, high)]
+    return [_written(low + k * difference, unit) for k in range(count)]
+
+
+def _exact(value: object, key: str) -> tuple[Fraction, str]:
+    """A number, and its unit as written."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"{key} is missing; give from, to and count or step")
+    text = str(value)
+    found = QUANTITY.fullmatch(text.strip()) if len(text) < 100 else None
+    if found is None:
+        raise ValueError(f'{key}: "{shorten(text)}" is neither a number nor a quantity such as "300 mm"')
+    return exact_number(found[1]), (found[2] or "").strip()
+
+
+def _written(value: Fraction, unit: str) -> str | int | float:
+    if not unit and value.denominator == 1:
+        return int(value)
+    number = float(value)
+    if not unit:
+        return number
+    return f"{int(value)} {unit}" if value.denominator == 1 else f"{number!r} {unit}"
+
+
+def entry_names(node: Node) -> list[str] | None:
+    """Names of the entries of a list, None where it is no list of named entries."""
+    if not isinstance(node, Sequence):
+        return None
+    names = [child(item, "name") if isinstance(item, Mapping) else item for item in node.items]
+    if not all(isinstance(name, Scalar) for name in names):
+        return None
+    return [_text(to_python(name)) for name in names if name is not None]
+
+
+def subset_count(total: int, fixed: int, sizes: tuple[int, ...]) -> int:
+    """How many subsets there are of `total` entries that hold `fixed` of them."""
+    return sum(math.comb(total - fixed, size - fixed) for size in sizes if fixed <= size <= total)
+
+
+def subsets(
+    node: Sequence, names: list[str], always: tuple[str, ...], among: tuple[str, ...], sizes: tuple[int, ...]
+) -> list[tuple[str, Sequence]]:
+    """Subsets of a list with their names, in the order of sizes and then of the list."""
+    free = [k for k, name in enumerate(names) if name in among and name not in always]
+    fixed = [k for k, name in enumerate(names) if name in always]
+    found = []
+    for size in sizes:
+        if size < len(fixed):
+            continue
+        for chosen in combinations(free, size - len(fixed)):
+            kept = sorted([*fixed, *chosen])
+            items = tuple(node.items[k] for k in kept)
+            found.append((" + ".join(names[k] for k in kept), Sequence(node.mark, items)))
+    return found

@@ -1,0 +1,58 @@
+"""Small sweeps, run as their user would."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas
+
+from analysis.sweeps.frame import frame
+from analysis.sweeps.store import open_store
+
+ROOT = Path(__file__).parents[2]
+
+# The last cells are no valid experiments: the plate reaches out of the volume.
+SWEEP = """\
+title: many small cells
+base: quickstart.yaml
+axes:
+  size: {paths: ["artefacts.plate.size[0]", "artefacts.plate.size[1]"], from: 600 mm, to: 800 mm, count: COUNT}
+  balls: {paths: ["artefacts.plate.balls[0]", "artefacts.plate.balls[1]"], values: [4, 5]}
+seed: 3
+"""
+
+
+def small_sweep(folder: Path, count: int, more: str = "") -> Path:
+    shutil.copy(ROOT / "designs" / "quickstart.yaml", folder)
+    path = folder / "small.yaml"
+    path.write_text(SWEEP.replace("COUNT", str(count)) + more, encoding="utf-8")
+    return path
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "analysis.cli", *map(str, arguments)]
+
+
+def run(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(*arguments), cwd=ROOT, capture_output=True, text=True, timeout=240, **options)
+
+
+def rows(store: Path) -> pandas.DataFrame:
+    """All rows but the time that they took."""
+    opened = open_store(store)
+    try:
+        return frame(opened).drop(columns="duration_s")
+    finally:
+        opened.close()
+
+
+def assert_same(one: pandas.DataFrame, other: pandas.DataFrame) -> None:
+    """Bit for bit."""
+    assert list(one.columns) == list(other.columns)
+    assert one.equals(other)
+    for name in one.select_dtypes("float"):
+        assert one[name].to_numpy().tobytes() == other[name].to_numpy().tobytes(), name

@@ -1,0 +1,204 @@
+"""Sweep files: axes, ranges, subsets, conditions, and what is said of wrong ones."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.sweeps.load import experiment_of, load_sweep
+from analysis.sweeps.model import Sweep
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError
+
+HEAD = "title: a test\nbase: quickstart.yaml\n"
+SIZE = '["artefacts.plate.size[0]", "artefacts.plate.size[1]"]'
+BALLS = '["artefacts.plate.balls[0]", "artefacts.plate.balls[1]"]'
+
+Written = Callable[[str], Path]
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Written:
+    shutil.copy("designs/quickstart.yaml", tmp_path)
+
+    def write(text: str) -> Path:
+        path = tmp_path / "s.yaml"
+        path.write_text(HEAD + text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def labels(sweep: Sweep) -> list[str]:
+    return [sweep.label(k) for k in range(len(sweep.cells))]
+
+
+def refusal(path: Path) -> list[str]:
+    with pytest.raises(ExperimentError) as caught:
+        load_sweep(path)
+    return [str(message).removeprefix(f"{path.parent}/") for message in caught.value.messages]
+
+
+def test_every_combination_is_a_cell(written: Written) -> None:
+    sweep = load_sweep(
+        written(
+            f"axes:\n  size: {{paths: {SIZE}, from: 500 mm, to: 750 mm, step: 125 mm}}\n"
+            f"  balls: {{paths: {BALLS}, values: [4, 5]}}\n"
+        )
+    )
+    assert labels(sweep) == [f"size {size} mm, balls {balls}" for size in (500, 625, 750) for balls in (4, 5)]
+    assert [axis.column for axis in sweep.axes] == ["size_m", "balls"]
+    assert [choice.value for choice in sweep.axes[0].choices] == [0.5, 0.625, 0.75]
+    experiment = experiment_of(sweep, 2)
+    np.testing.assert_allclose(np.ptp(experiment.layouts["plate"].coordinates, axis=0), [0.625, 0.625, 0.0], atol=1e-15)
+    assert len(experiment.layouts["plate"].names) == 16
+
+
+def test_a_cell_is_the_experiment_that_a_variant_would_be(written: Written, tmp_path: Path) -> None:
+    sweep = load_sweep(written("axes:\n  level: {path: 'positions[z low].level', values: [100 mm]}\n"))
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    (tmp_path / "v.yaml").write_text(text + 'variants: {one: {"positions[z low].level": 100 mm}}\n', encoding="utf-8")
+    (expected,) = load(tmp_path / "v.yaml")
+    found = experiment_of(sweep, 0)
+    for one, other in zip(found.positions, expected.positions, strict=True):
+        np.testing.assert_array_equal(one.pose.origin, other.pose.origin)
+        np.testing.assert_array_equal(one.pose.rotation, other.pose.rotation)
+
+
+def test_values_that_change_together(written: Written) -> None:
+    together = 'together: {"positions[z low].level": [100 mm, 200 mm], "positions[z high].level": [900 mm, 800 mm]}'
+    sweep = load_sweep(written(f"axes:\n  levels:\n    {together}\n    names: [wide, narrow]\n"))
+    assert labels(sweep) == ["levels wide", "levels narrow"]
+    second = experiment_of(sweep, 1)
+    assert [one.pose.origin[2] for one in second.positions[:2]] == [0.2, 0.8]
+    assert labels(load_sweep(written(f"axes:\n  levels:\n    {together}\n"))) == [
+        "levels 100 mm / 900 mm",
+        "levels 200 mm / 800 mm",
+    ]
+
+
+def test_named_values_and_conditions(written: Written) -> None:
+    text = (
+        f"axes:\n  size: {{paths: {SIZE}, values: {{small: 450 mm, middle: 600 mm, large: 750 mm}}}}\n"
+        f"  balls: {{paths: {BALLS}, values: [4, 5, 7]}}\n"
+    )
+    assert labels(load_sweep(written(text + "skip: [{size: {below: 500 mm}, balls: [5, 7]}]\n"))) == [
+        "size small, balls 4",
+        *(f"size {size}, balls {balls}" for size in ("middle", "large") for balls in (4, 5, 7)),
+    ]
+    assert labels(load_sweep(written(text + "only: [{size: small}, {balls: {above: 5}, size: 0.75 m}]\n"))) == [
+        *(f"size small, balls {balls}" for balls in (4, 5, 7)),
+        "size large, balls 7",
+    ]
+
+
+def test_subsets_of_positions(written: Written) -> None:
+    sweep = load_sweep(
+        written(
+            "axes:\n  strategy:\n    path: positions\n"
+            "    subsets: {sizes: [3, 6], always: [x low], among: [z low, z high, y low, y high, x high]}\n"
+        )
+    )
+    assert len(sweep.cells) == 10 + 1
+    assert sweep.axes[0].choices[0].label == "z low + z high + x low"
+    assert [one.name for one in experiment_of(sweep, 0).positions] == ["z low", "z high", "x low"]
+    assert len(experiment_of(sweep, 10).positions) == 6
+
+
+def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    variants = 'variants: {few: {"artefacts.plate.balls": [4, 4]}, many: {"artefacts.plate.balls": [7, 7]}}\n'
+    (tmp_path / "quickstart.yaml").write_text(text + variants, encoding="utf-8")
+    levels = 'level: {path: "positions[z low].level", values: [100 mm, 200 mm]}'
+    sweep = load_sweep(written(f"axes:\n  design: {{variants: all}}\n  {levels}\n"))
+    assert labels(sweep)[1] == "design few, level 200 mm"
+    assert [len(experiment_of(sweep, k).layouts["plate"].names) for k in (1, 2)] == [16, 49]
+    assert refusal(written(f"axes:\n  {levels}\n"))[0] == (
+        "s.yaml:2:7: base: has the variants few, many; choose one with variant: NAME, or add an axis {variants: all}"
+    )
+    assert len(load_sweep(written(f"variant: many\naxes:\n  {levels}\n")).cells) == 2
+    assert refusal(written(f"variant: mny\naxes:\n  {levels}\n"))[0].startswith(
+        's.yaml:3:10: variant: no variant "mny" in quickstart.yaml; did you mean "many"?'
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("axes: {}\n", ["s.yaml:3:7: axes: "]),
+        ("axis: {a: {path: seed, values: [1]}}\n", ["s.yaml:1:1: axes: missing", "s.yaml:3:1: axis: unknown key"]),
+        (
+            "axes:\n  a: {path: artefacts.plat.size, values: [1]}\n",
+            ["s.yaml:4:6: axes.a: artefacts.plat.size: there is no"],
+        ),
+        ("axes:\n  a: {path: seed}\n", ["s.yaml:4:6: axes.a: nothing says what it varies"]),
+        (
+            "axes:\n  a: {values: [1]}\n",
+            ["s.yaml:4:6: axes.a: what the values replace is not clear; give path, or paths"],
+        ),
+        ("axes:\n  a: {path: seed, values: [1], to: 5}\n", ["s.yaml:4:32: axes.a.to: does not go with values"]),
+        ("axes:\n  a: {path: seed, from: 1, to: 5}\n", ["s.yaml:4:6: axes.a: a range needs count or step"]),
+        (
+            "axes:\n  a: {path: seed, from: 1 mm, to: 5 m, count: 3}\n",
+            ["s.yaml:4:6: axes.a: from and to have the units"],
+        ),
+        ("axes:\n  a: {path: seed, from: 1, to: 5, step: -1}\n", ["s.yaml:4:6: axes.a: step does not lead"]),
+        (
+            "axes:\n  a: {path: seed, from: 1, to: 9000000, step: 1}\n",
+            ["s.yaml:4:6: axes.a: the range has 9000000 values"],
+        ),
+        ("axes:\n  a: {path: seed, values: [1, 2, 1]}\n", ['s.yaml:4:6: axes.a: has the value "1" twice']),
+        (
+            "axes:\n  a: {path: positions, subsets: {sizes: [9], always: [z lo]}}\n",
+            [
+                's.yaml:4:55: axes.a.subsets.always[0]: no entry "z lo" in positions; did you mean "z low"?',
+                "s.yaml:4:42: axes.a.subsets.sizes[0]: no subset has 9 entries",
+            ],
+        ),
+        (
+            "axes:\n  a: {path: title, subsets: {sizes: [1]}}\n",
+            ["s.yaml:4:13: axes.a.path: leads to no list of entries"],
+        ),
+        (
+            "axes:\n  a: {path: seed, values: [1]}\n  b: {path: seed, values: [1]}\n",
+            ['s.yaml:5:6: axes.b: seed is part of the same place as seed of the axis "a"'],
+        ),
+        ("axes:\n  a: {path: seed, values: [1]}\nskip: [{b: 1}]\n", ['s.yaml:5:9: skip[0].b: there is no axis "b"']),
+        ("axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 2}]\n", ["s.yaml:5:12: skip[0].a: holds for no value"]),
+        ("axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 1}]\n", ["s.yaml:5:7: skip: leaves no cell"]),
+        (
+            "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: {above: 1 mm}}]\n",
+            ['s.yaml:5:12: skip[0].a: "1 mm" cannot'],
+        ),
+        ("axes:\n  a: {path: seed, values: [1]}\ntrials: 1\n", ["s.yaml:5:9: trials: "]),
+        ("axes:\n  a: {path: seed, values: [1]}\nrecord: [U7]\n", ["s.yaml:5:10: record[0]: "]),
+        (
+            "axes:\n"
+            + "".join(
+                f"  {a}: {{path: 'positions[{k}].level', from: 1 mm, to: 100 mm, count: 100}}\n"
+                for k, a in enumerate("abcd")
+            ),
+            ["s.yaml:3:1: axes: 100000000 combinations of values; 1000000 are the limit"],
+        ),
+    ],
+)
+def test_what_is_wrong_is_said(written: Written, text: str, expected: list[str]) -> None:
+    found = refusal(written(text))
+    assert len(found) == len(expected), found
+    for one in expected:
+        assert any(line.startswith(one) for line in found), (one, found)
+
+
+def test_a_wrong_base_file_is_refused(written: Written, tmp_path: Path) -> None:
+    path = written("axes:\n  a: {path: seed, values: [1]}\n")
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    (tmp_path / "quickstart.yaml").write_text(text.replace("[5, 5]", "[5, 0]"), encoding="utf-8")
+    assert refusal(path)[0].startswith("quickstart.yaml:35:34: artefacts.plate.balls[1]: ")
+    (tmp_path / "quickstart.yaml").unlink()
+    assert refusal(path) == [
+        "s.yaml:2:7: base: " + f"{tmp_path}/quickstart.yaml: there is no such file; check the name and the folder"
+    ]

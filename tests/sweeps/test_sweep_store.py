@@ -1,0 +1,227 @@
+"""What a store keeps: every cell once, with its reasons, seeds and versions; what it refuses."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.montecarlo.study import trials
+from analysis.study import plan
+from analysis.sweeps.fingerprint import fingerprint
+from analysis.sweeps.load import experiment_of, load_sweep
+from analysis.sweeps.model import Sweep
+from analysis.sweeps.store import details, files, keys, open_store, results, sweeps
+from analysis.sweeps.task import BLOCK, Row, Task, compute
+from simulator.experiment.load import load
+
+from .support import assert_same, rows, small_sweep
+
+
+def sweep(path: Path, *options: str) -> int:
+    return main(["sweep", str(path), "--workers", "1", *options])
+
+
+def test_figures_are_those_of_the_experiments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small_sweep(tmp_path, 4, "trials: 64\nrecord: [U4, U5]\n")
+    assert sweep(path) == 1
+    out, err = capsys.readouterr()
+    assert out == f"{tmp_path}/small.sqlite: 8 cells, 6 done, 2 failed\n"
+    assert "cell 6 failed: " in err and "quickstart.yaml" in err and str(tmp_path / "quickstart.yaml") not in err
+    table = rows(tmp_path / "small.sqlite")
+    loaded = load_sweep(path)
+    assert table["size_m"].tolist() == [choice[0].value for choice in map(loaded.choices, range(8))]
+    assert table["balls"].tolist() == [4, 5] * 4
+    assert table["status"].tolist() == ["done"] * 6 + ["failed"] * 2
+    for k in (0, 5):
+        experiment = experiment_of(loaded, k)
+        expected = plan(experiment).quantities
+        assert table["U4_maximum_m"][k] == expected["U4"].maximum
+        assert table["U5_average_m"][k] == expected["U5"].average
+        outcome = trials(experiment, 64, int(table["seed"][k])).outcome
+        assert outcome is not None
+        assert table["U4_spread_ratio"][k] == outcome.comparisons["U4"].spread.value
+        assert table["U4_spread_ratio_standard_error"][k] == outcome.comparisons["U4"].spread.error
+        assert table["trials"][k] == 64
+    assert not [name for name in table if name.startswith(("U1", "U6"))]
+    assert table["seed"][:6].nunique() == 6
+    assert (table["ballplate_version"] == "0.1.0").all() and (table["blas_version"] != "").all()
+
+
+def test_a_second_run_computes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path) == 1
+    monkeypatch.setattr("analysis.sweeps.local.compute", None)
+    capsys.readouterr()
+    assert sweep(path) == 1
+    assert capsys.readouterr().out == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
+
+
+def test_failed_cells_are_tried_again_when_asked(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path) == 1
+    before = rows(tmp_path / "small.sqlite")
+    assert sweep(path, "--retry-failed") == 1
+    assert_same(rows(tmp_path / "small.sqlite"), before)
+
+
+def test_the_first_failure_ends_a_run_when_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path, "--fail-fast") == 1
+    assert "2 done, 1 failed, 1 left" in capsys.readouterr().out
+
+
+def test_a_changed_base_is_refused_with_what_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    base = tmp_path / "quickstart.yaml"
+    text = base.read_text(encoding="utf-8")
+    base.write_text("# Only a remark.\n" + text, encoding="utf-8")
+    assert sweep(path) == 1
+    base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
+    capsys.readouterr()
+    assert sweep(path) == 3
+    err = capsys.readouterr().err
+    assert "quickstart.yaml: machine.repeatability: '0.2 um' has become '0.3 um'" in err and "--beside" in err
+    assert sweep(path, "--beside") == 1
+    store = open_store(tmp_path / "small.sqlite")
+    assert len(sweeps(store)) == 2
+    assert keys(store, 1)[0] != keys(store, 2)[0]
+    one, two = (next(results(store, k)).figures["U1_average_m"] for k in (1, 2))
+    assert two > 1.1 * one
+    store.close()
+
+
+def test_a_change_while_a_sweep_runs_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, base = small_sweep(tmp_path, 2), tmp_path / "quickstart.yaml"
+    text = base.read_text(encoding="utf-8")
+
+    def changing(loaded: Sweep, task: Task) -> Row:
+        if task.number == 1:
+            base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
+        return compute(loaded, task)
+
+    monkeypatch.setattr("analysis.sweeps.local.compute", changing)
+    assert sweep(path) == 3
+    assert "were changed while it ran" in capsys.readouterr().err
+    assert len(rows(tmp_path / "small.sqlite")) == 0
+    monkeypatch.undo()
+    base.write_text(text, encoding="utf-8")
+    assert sweep(path) == 1
+    assert len(rows(tmp_path / "small.sqlite")) == 4
+
+
+def test_what_two_sweeps_share_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    path.write_text(path.read_text(encoding="utf-8").replace("[4, 5]", "[4, 5, 6]"), encoding="utf-8")
+    done = []
+
+    def counted(loaded: Sweep, task: Task) -> Row:
+        done.append(task)
+        return compute(loaded, task)
+
+    monkeypatch.setattr("analysis.sweeps.local.compute", counted)
+    sweep(path, "--beside")
+    assert sorted(task.number for task in done if task.block == 0) == [2, 5]
+
+
+def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    shutil.copy("tests/sweeps/balls.csv", tmp_path)
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    plate = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
+    text = text.replace(plate, "{kind: balls, file: balls.csv}").replace("corner sides ", "[[a, b], [b, c]]  ")
+    (tmp_path / "quickstart.yaml").write_text(text, encoding="utf-8")
+    path.write_text("title: t\nbase: quickstart.yaml\naxes: {a: {path: seed, values: [1, 2]}}\n", encoding="utf-8")
+    assert sweep(path) == 0
+    store = open_store(tmp_path / "small.sqlite")
+    assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
+    assert "undetermined" in details(store, keys(store, 1)[0])
+    store.close()
+    (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8")
+    assert sweep(path) == 3
+
+
+def test_replicates_in_blocks_are_the_same_replicates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
+    assert BLOCK % 512 == 0
+    monkeypatch.setattr("analysis.sweeps.task.BLOCK", 512)
+    assert sweep(path) == 1
+    split = rows(tmp_path / "small.sqlite")
+    monkeypatch.undo()
+    assert sweep(path, "--store", str(tmp_path / "whole.sqlite")) == 1
+    whole = rows(tmp_path / "whole.sqlite")
+    assert split["trials"][0] == whole["trials"][0] == 1100
+    for name in ("U5_spread_ratio", "U5_coverage_sigma_given", "U5_actual_average_m"):
+        np.testing.assert_allclose(split[name][:2], whole[name][:2], rtol=1e-12)
+    store = open_store(tmp_path / "small.sqlite")
+    assert store.connection.execute("SELECT count(*) FROM result WHERE block > 0 AND status = 'done'").fetchone() == (
+        0,
+    )
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "differs"),
+    [
+        ("title: ", "title: another ", False),
+        ("750 mm", "0.75 m", False),
+        ("probes: [down]", "probes: [down], repeats: 1", False),
+        ("seed: 7", "seed: 8", True),
+        ("0.2 um ", "0.21 um ", True),
+        ("z low", "z lower", True),
+        ("[5, 5]", "[5, 6]", True),
+        ("random: 200", "random: 201", True),
+    ],
+)
+def test_a_fingerprint_tells_what_matters(tmp_path: Path, old: str, new: str, differs: bool) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "b.yaml").write_text(text.replace(old, new), encoding="utf-8")
+    one, other = (fingerprint(load(tmp_path / name)[0]) for name in ("a.yaml", "b.yaml"))
+    assert (one != other) == differs
+
+
+def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small_sweep(tmp_path, 2)
+    assert sweep(path, "--dry-run") == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines()[1] == "1: size 600 mm, balls 5" and len(out.splitlines()) == 4
+    assert err.startswith("4 cells, about ") and not (tmp_path / "small.sqlite").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\0" * 5000])
+def test_no_store(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x.sqlite").write_bytes(content)
+    assert main(["export", str(tmp_path / "x.sqlite"), "-o", "-"]) == 3
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith(f"{tmp_path}/x.sqlite: ") and "Traceback" not in err
+
+
+def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import pandas
+
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
+    for name in ("t.csv", "t.parquet"):
+        assert main(["export", str(store), "-o", str(tmp_path / name)]) == 0
+    csv = pandas.read_csv(tmp_path / "t.csv")
+    parquet = pandas.read_parquet(tmp_path / "t.parquet")
+    for name in table.select_dtypes("float"):
+        np.testing.assert_array_equal(csv[name], table[name])
+        np.testing.assert_array_equal(parquet[name], table[name])
+    assert main(["export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
+    assert main(["export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
+    assert main(["export", str(store), "--sweep", "5", "-o", "-"]) == 3
+    assert main(["export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
+    assert "there is no such store" in capsys.readouterr().err

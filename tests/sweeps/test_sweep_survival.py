@@ -1,0 +1,183 @@
+"""A sweep that is killed, starved or interrupted goes on, and ends with exactly the rows of an undisturbed one."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import signal
+import sqlite3
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from .support import ROOT, assert_same, command, rows, run, small_sweep
+
+Change = Callable[[], None]
+
+
+def stored(path: Path) -> int:
+    """Rows on disk, 0 before there is a store."""
+    if not path.exists():
+        return 0
+    try:
+        connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5.0)
+        try:
+            return int(connection.execute("SELECT count(*) FROM result").fetchone()[0])
+        finally:
+            connection.close()
+    except sqlite3.Error:
+        return 0
+
+
+def children(process: int) -> list[int]:
+    """Processes started by another that compute."""
+    path = Path(f"/proc/{process}/task/{process}/children")
+    found = [int(word) for word in path.read_text(encoding="ascii").split()] if path.exists() else []
+    return [one for one in found if b"popen_loky" in Path(f"/proc/{one}/cmdline").read_bytes()]
+
+
+def wait_until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> bool:
+    """Whether a condition came true before the process ended."""
+    end = time.monotonic() + 120
+    while process.poll() is None:
+        assert time.monotonic() < end, "hangs"
+        if condition():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    processes: list[subprocess.Popen[str]] = []
+
+    def start(path: Path, *options: str, **how: object) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            command("sweep", path, "--workers", "2", *options),
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **how,  # type: ignore[call-overload]
+        )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+    """Twenty times: the command itself, one of its workers, or a disk that takes no more."""
+    path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
+    undisturbed = tmp_path / "undisturbed.sqlite"
+    assert run("sweep", path, "--store", undisturbed).returncode == 1
+    chance = random.Random(5)
+    killed = {"command": 0, "worker": 0, "disk": 0}
+    kinds = ["command", "worker"] * 8 + ["disk"] * 4
+    chance.shuffle(kinds)
+    process: subprocess.Popen[str] | None = None
+    for kind in kinds:
+        if kind == "disk":
+            if process is not None:
+                process.kill()
+                process.wait()
+            process = None
+            used = sum(file.stat().st_size for file in tmp_path.glob("small.sqlite*"))
+            room = used // 2 + chance.randrange(1, 40_000)
+
+            def starve(room: int = room) -> None:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+            starved = started(path, preexec_fn=starve)
+            out, err = starved.communicate(timeout=120)
+            if starved.returncode == 3:
+                assert "make room" in err and "Traceback" not in err, err
+                killed[kind] += 1
+            continue
+        if process is None or process.poll() is not None:
+            process = started(path)
+        before, wait = stored(store), chance.uniform(0.0, 0.3)
+        if not wait_until(lambda before=before: stored(store) > before, process):  # type: ignore[misc]
+            continue
+        time.sleep(wait)
+        if kind == "command":
+            process.kill()
+            process.wait()
+            killed[kind] += 1
+        else:
+            for worker in children(process.pid)[:1]:
+                os.kill(worker, signal.SIGKILL)
+                killed[kind] += 1
+    if process is not None and process.poll() is None:
+        process.communicate(timeout=240)
+    last = run("sweep", path)
+    assert last.returncode == 1 and "Traceback" not in last.stderr, last.stderr
+    assert "80 cells" in last.stdout and "left" not in last.stdout
+    assert_same(rows(store), rows(undisturbed))
+    assert sum(killed.values()) >= 12 and all(killed.values()), killed
+
+
+def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> None:
+    """An error model that ends its process, as one that takes all memory would."""
+    path = small_sweep(tmp_path, 2)
+    (tmp_path / "deadly.py").write_text(
+        "import multiprocessing, os\n"
+        "from simulator.machines.kinematic import kinematic_model\n"
+        "from simulator.machines.arrangement import ARRANGEMENTS\n"
+        "def build(lower, upper, deadly=False):\n"
+        "    if deadly and multiprocessing.current_process().name != 'MainProcess':\n"
+        "        os.kill(os.getpid(), 9)\n"
+        "    return kinematic_model(ARRANGEMENTS['MB2'], 3, 3, lower, upper)\n",
+        encoding="utf-8",
+    )
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    before, _, after = text.partition("error_model:\n")
+    after = after[after.index("\n\n") :]
+    model = "error_model: {kind: python, object: 'deadly:build', options: {deadly: false}}"
+    (tmp_path / "quickstart.yaml").write_text(before + model + after, encoding="utf-8")
+    axes = "deadly: {path: error_model.options.deadly, values: [false, true]}, seed: {path: seed, values: [1, 2, 3]}"
+    path.write_text(f"title: t\nbase: quickstart.yaml\naxes: {{{axes}}}\n", encoding="utf-8")
+    done = run("sweep", path, "--workers", "2")
+    assert done.returncode == 1, done.stderr
+    assert "6 cells, 3 done, 3 failed" in done.stdout
+    assert "the process that computed it was ended" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+    path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
+    process = started(path)
+    assert wait_until(lambda: stored(store) > 2, process)
+    begun = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130 and time.monotonic() - begun < 20
+    assert "the same command goes on from there" in err and "Traceback" not in err
+    assert 2 < stored(store) < 80
+
+
+def test_one_writer_at_a_time(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+    path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
+    process = started(path)
+    assert wait_until(lambda: stored(store) > 0, process)
+    second = run("sweep", path)
+    assert second.returncode == 3 and "another process is computing into it" in second.stderr
+    # Reading goes on meanwhile.
+    assert run("export", store, "-o", tmp_path / "t.csv").returncode == 0
+
+
+def test_the_number_of_workers_changes_no_bit(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 3, "trials: 16\n")
+    for workers in (1, 2):
+        assert run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite").returncode == 1
+    assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))
