@@ -136,14 +136,15 @@ def _tell(store: Store, number: int, summary: Summary) -> None:
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
     print(f"{store.path}: {summary.cells} cells, {summary.done} done, {summary.failed} failed{before}{left}")
-    versions = {tuple(one.versions.items()) for one in results(store, number)}
+    found = results(store, number)
+    versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:
         print(f"{store.path}: the rows were computed with {len(versions)} different sets of versions", file=sys.stderr)
     if summary.failed:
         reasons: dict[str, list[int]] = {}
-        for one in results(store, number):
-            if one.status == "failed":
-                reasons.setdefault(one.reason, []).append(one.cell)
+        for cell, status, reason in zip(found.cells.tolist(), found.statuses, found.reasons, strict=True):
+            if status == "failed":
+                reasons.setdefault(reason, []).append(cell)
         for reason, cells in list(reasons.items())[:10]:
             more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
             print(f"cell {cells[0]}{more} failed: {reason}", file=sys.stderr)

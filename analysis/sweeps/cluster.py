@@ -33,7 +33,7 @@ def cluster_runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runne
     except ImportError:
         raise ClusterError("dask is not installed; install it with: python -m pip install 'ballplate[dask]'") from None
     try:
-        client = Client(address, timeout=20, set_as_default=False)
+        client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         text = f"there is no scheduler at {address} ({type(error).__name__}); start one with: dask scheduler"
         raise ClusterError(text) from None

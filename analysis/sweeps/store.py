@@ -16,6 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from simulator.design import Integers
+from simulator.machines.protocol import Array
+
 from ..montecarlo.tally import QuantityTally, Tally
 from .task import Row
 
@@ -237,42 +240,59 @@ def _unpacked(content: bytes) -> Tally:
 
 
 @dataclass(frozen=True)
-class Result:
-    """A stored result of a cell; `cell` counts from 0."""
+class Results:
+    """Results of a sweep's cells (n,) in their order; `cells` count from 0, `seconds` is what each took.
 
-    cell: int
-    key: str
-    status: str
-    reason: str
-    seed: int
-    figures: dict[str, float]
-    versions: dict[str, str]
-    seconds: float
+    `figures` by name, (n,) each, NaN where a cell has no such figure; `versions` by name, a text for each cell.
+    """
+
+    cells: Integers
+    keys: list[str]
+    statuses: list[str]
+    reasons: list[str]
+    seeds: Integers
+    seconds: Array
+    figures: dict[str, Array]
+    versions: dict[str, list[str]]
 
 
-def results(store: Store, sweep: int) -> Iterator[Result]:
-    """Results of a sweep's cells in their order; cells not done yet are left out."""
-    connection = store.connection
-    texts: dict[int, Any] = {
-        number: json.loads(value) for number, value in connection.execute("SELECT id, value FROM text")
-    }
-    rows = connection.execute(
-        "SELECT number, cell.key, status, reason, seed, names, figures, versions, seconds FROM cell JOIN result "
-        "ON result.key = cell.key AND block = 0 WHERE sweep = ? ORDER BY number",
-        [sweep],
+def results(store: Store, sweep: int) -> Results:
+    """Results of a sweep; cells that are not done yet are left out.
+
+    :raises StoreError: the store cannot be read.
+    """
+    try:
+        texts = {number: json.loads(value) for number, value in store.connection.execute("SELECT id, value FROM text")}
+        rows = store.connection.execute(
+            "SELECT number, cell.key, status, reason, seed, seconds, names, versions, figures FROM cell JOIN result "
+            "ON result.key = cell.key AND block = 0 WHERE sweep = ? ORDER BY number",
+            [sweep],
+        ).fetchall()
+    except sqlite3.Error as error:
+        raise _told(store.path, error) from None
+    columns: list[list[Any]] = [list(column) for column in zip(*rows, strict=True)] or [[] for _ in range(9)]
+    numbers, found_keys, found_statuses, reasons, seeds, seconds, names, versions, blobs = columns
+    # Rows with the same names make a matrix.
+    figures: dict[str, Array] = {}
+    of_names: dict[int, list[int]] = {}
+    for place, number in enumerate(names):
+        of_names.setdefault(number, []).append(place)
+    for number, places in of_names.items():
+        matrix = np.frombuffer(b"".join(blobs[place] for place in places), "<f8").reshape(len(places), -1)
+        for k, name in enumerate(texts[number]):
+            figures.setdefault(name, np.full(len(rows), np.nan))[places] = matrix[:, k]
+    of_versions = {number: texts[number] for number in dict.fromkeys(versions)}
+    kinds = dict.fromkeys(name for one in of_versions.values() for name in one)
+    return Results(
+        np.array(numbers, np.int64),
+        found_keys,
+        found_statuses,
+        reasons,
+        np.array(seeds, np.int64),
+        np.array(seconds, float),
+        figures,
+        {name: [of_versions[number].get(name, "") for number in versions] for name in kinds},
     )
-    for number, key, status, reason, seed, names, figures, versions, seconds in rows:
-        values = np.frombuffer(figures, "<f8").tolist()
-        yield Result(
-            number,
-            key,
-            status,
-            reason,
-            seed,
-            dict(zip(texts[names], values, strict=True)),
-            texts[versions],
-            seconds,
-        )
 
 
 def details(store: Store, key: str) -> dict[str, Any]:

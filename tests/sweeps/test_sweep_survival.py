@@ -6,7 +6,6 @@ import os
 import random
 import resource
 import signal
-import sqlite3
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -14,23 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from .support import ROOT, assert_same, command, rows, run, small_sweep
+from .support import ROOT, assert_same, command, rows, run, small_sweep, stored
 
 Change = Callable[[], None]
-
-
-def stored(path: Path) -> int:
-    """Rows on disk, 0 before there is a store."""
-    if not path.exists():
-        return 0
-    try:
-        connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5.0)
-        try:
-            return int(connection.execute("SELECT count(*) FROM result").fetchone()[0])
-        finally:
-            connection.close()
-    except sqlite3.Error:
-        return 0
 
 
 def children(process: int) -> list[int]:
