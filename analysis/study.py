@@ -19,6 +19,7 @@ from simulator.geometry.motions import vector_from_rotation
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array, Unit
 from simulator.readings import ObservedReadings
+from simulator.threads import single_threaded
 
 from .rank import Verdict, verdict
 from .uncertainty import Quantity, uncertainties
@@ -104,6 +105,7 @@ def plan(experiment: Experiment) -> Plan:
     return _plan(experiment, lay_out(experiment), with_quantities=True)
 
 
+@single_threaded
 def _plan(experiment: Experiment, design: Design, with_quantities: bool) -> Plan:
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
@@ -123,6 +125,7 @@ def _nothing_open(design: Design, found: Spectrum) -> Covariance:
     return Covariance(found.root, empty, np.zeros((n, d, d)), found.null, empty, found.scale)
 
 
+@single_threaded
 def fit(
     experiment: Experiment,
     observed: ObservedReadings,

@@ -15,12 +15,15 @@ QUANTITIES: tuple[Quantity, ...] = ("U1", "U2", "U3", "U4", "U5", "U6")
 
 Path = Annotated[str, Field(min_length=1)]
 Scalar = str | int | float | bool
+SomeValues = Annotated[tuple[Any, ...], Field(min_length=1)]
 Values = Annotated[
-    Annotated[tuple[Any, ...], Field(min_length=1), Tag("<list>")]
+    Annotated[SomeValues, Tag("<list>")]
     | Annotated[dict[Name, Any], Field(min_length=1), Tag("<mapping>")]
-    | Annotated[tuple[Any, ...], Tag("<one>")],
+    # A single value is none of these; the list's message says what is expected.
+    | Annotated[SomeValues, Tag("<one>")],
     FORM,
 ]
+VariantNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 
 
 class SubsetSettings(Settings):
@@ -54,8 +57,8 @@ class AxisSettings(Settings):
     variants: (
         Annotated[
             Annotated[Literal["all"], Tag("<one>")]
-            | Annotated[tuple[Name, ...], Field(min_length=1), Tag("<list>")]
-            | Annotated[tuple[Name, ...], Tag("<mapping>")],
+            | Annotated[VariantNames, Tag("<list>")]
+            | Annotated[VariantNames, Tag("<mapping>")],
             FORM,
         ]
         | None

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..design import Design
 from ..machines.protocol import Array
-from ..threads import single_threaded
+from ..threads import scipy_linalg, single_threaded
 from .elimination import Factor
 from .parameters import SharedLayout
 
@@ -129,8 +129,7 @@ def covariance(design: Design, factor: Factor, found: Spectrum) -> Covariance:
     ball_null[factor.eliminated] = -(carried @ null)
     own[factor.eliminated] = _solve_balls(factor.ball_root, np.broadcast_to(np.eye(d), factor.ball_root.shape))
     if k:
-        from scipy.linalg import solve_triangular
-
+        solve_triangular = scipy_linalg().solve_triangular
         sides = np.concatenate([factor.kept_shared @ shared, factor.kept_shared @ null, -np.eye(k)], axis=1)
         solved = -solve_triangular(factor.kept_root, sides, check_finite=False)
         ball[factor.kept, :, :rank] = solved[:, :rank].reshape(len(factor.kept), d, rank)

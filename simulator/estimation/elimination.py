@@ -17,7 +17,7 @@ import numpy as np
 
 from ..design import Design, Integers, State
 from ..machines.protocol import Array
-from ..threads import single_threaded
+from ..threads import scipy_linalg, single_threaded
 from .observations import (
     coordinate_rows,
     distance_rows,
@@ -142,8 +142,7 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
     if len(rows) < ROWS_AT_ONCE // 2:
         return _triangle(np.concatenate([triangle, rows]))
     # Three times as fast on many rows, which pay for the time that it takes to import.
-    from scipy.linalg.lapack import dtpqrt
-
+    dtpqrt = scipy_linalg().lapack.dtpqrt
     above = np.asfortranarray(_square(triangle, rows.shape[1]))
     found, _, _, _ = dtpqrt(0, min(PANEL, rows.shape[1]), above, np.asfortranarray(rows), overwrite_a=1, overwrite_b=1)
     return np.triu(found)

@@ -10,6 +10,7 @@ import numpy as np
 from ..design import Design, State, probe_offsets
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
+from ..threads import scipy_linalg, single_threaded
 from .covariance import Spectrum, _solve_balls, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .parameters import shared_layout
@@ -51,6 +52,7 @@ class Solution:
     status: Status
 
 
+@single_threaded
 def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSettings | None = None) -> Solution:
     """Minimise S^2 over balls, poses and machine errors, from `start`.
 
@@ -92,8 +94,7 @@ def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array,
     side = factor.ball_side + factor.ball_shared @ shared
     balls[factor.eliminated] = -_solve_balls(factor.ball_root, side[:, :, None])[:, :, 0]
     if len(factor.kept):
-        from scipy.linalg import solve_triangular
-
+        solve_triangular = scipy_linalg().solve_triangular
         kept = -solve_triangular(factor.kept_root, factor.kept_side + factor.kept_shared @ shared)
         balls[factor.kept] = kept.reshape(-1, design.dimension)
     return shared, balls
@@ -101,8 +102,7 @@ def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array,
 
 def _shared_step(factor: Factor, found: Spectrum) -> Array:
     if found.deficiency == 0:
-        from scipy.linalg import solve_triangular
-
+        solve_triangular = scipy_linalg().solve_triangular
         return np.asarray(-solve_triangular(factor.root, factor.side))
     # root = U diag(values) V' / scale, so U' side follows from root times the directions.
     left = factor.root @ found.directions[:, : found.rank]

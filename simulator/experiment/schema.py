@@ -11,38 +11,38 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of an experiment file."""
-    tidied: dict[str, Any] = _tidied(ExperimentSettings.model_json_schema())
+    found: dict[str, Any] = tidied(ExperimentSettings.model_json_schema())
     # Variants may supply what the file itself leaves out, which no schema can tell.
-    required = tidied.pop("required")
-    tidied["anyOf"] = [{"required": ["variants"]}, {"required": required}]
-    return {"$schema": DRAFT, **tidied, "title": "ballplate experiment"}
+    required = found.pop("required")
+    found["anyOf"] = [{"required": ["variants"]}, {"required": required}]
+    return {"$schema": DRAFT, **found, "title": "ballplate experiment"}
 
 
-def _tidied(part: Any) -> Any:
+def tidied(part: Any) -> Any:
     """Leave out what serves programs only: titles, OpenAPI's discriminators, null for an omitted key."""
     if isinstance(part, list):
-        return [_tidied(item) for item in part]
+        return [tidied(item) for item in part]
     if not isinstance(part, dict):
         return part
-    tidied: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for key, value in part.items():
         if key in ("properties", "$defs"):
-            tidied[key] = {name: _tidied(below) for name, below in value.items()}
+            found[key] = {name: tidied(below) for name, below in value.items()}
         elif key == "title" or key == "discriminator" or (key == "default" and not _is_writable(value, part)):
             continue
         else:
-            tidied[key] = _tidied(value)
-    choices: list[Any] = tidied.get("anyOf", [])
+            found[key] = tidied(value)
+    choices: list[Any] = found.get("anyOf", [])
     if {"type": "null"} in choices:
         choices = [choice for choice in choices if choice != {"type": "null"}]
-        tidied["anyOf"] = choices
+        found["anyOf"] = choices
     if len(choices) == 1:
-        del tidied["anyOf"]
-        tidied = {**choices[0], **tidied}
+        del found["anyOf"]
+        found = {**choices[0], **found}
     # Whole numbers serve as names too.
-    if isinstance(tidied.get("items"), dict) and tidied["items"] == {"minLength": 1, "type": "string"}:
-        tidied["items"] = {"minLength": 1, "type": ["string", "integer"]}
-    return tidied
+    if isinstance(found.get("items"), dict) and found["items"] == {"minLength": 1, "type": "string"}:
+        found["items"] = {"minLength": 1, "type": ["string", "integer"]}
+    return found
 
 
 def _is_writable(default: Any, part: dict[str, Any]) -> bool:

@@ -21,7 +21,7 @@ from ..estimation.elimination import Factor
 from ..estimation.parameters import SharedLayout
 from ..estimation.whitening import whitening
 from ..machines.protocol import Array
-from ..threads import single_threaded
+from ..threads import scipy_linalg, single_threaded
 from .expansion import Single
 from .reference import Group, Reference
 
@@ -336,8 +336,7 @@ def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squ
 
 def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
     """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared parameters (b, s)."""
-    from scipy.linalg import solve_triangular
-
+    solve_triangular = scipy_linalg().solve_triangular
     b, d, n = by_ball.shape
     e, s = len(factor.eliminated), by_shared.shape[1]
     rows = factor.ball_shared.reshape(e * d, s)
