@@ -8,16 +8,27 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter
 from sphinx.application import Sphinx
 
 from analysis.cli import parser as command_line
+from analysis.reproduction.compare import reproduce
+from analysis.reproduction.published import npl
+from analysis.reproduction.shipped import Shipped
+from analysis.reproduction.tables import reproduction_markdown
+from analysis.sweeps.schema import schema as sweep_schema
 from simulator.experiment.schema import schema
 from simulator.quantities import UNITS, Angle, Length, LengthFunction, Ratio
 
 Schema = dict[str, Any]
+
+TOP = Path(__file__).resolve().parents[2]
+
+# As many as the command takes unless told.
+DATA_SETS = 100
 
 QUANTITIES = {
     TypeAdapter(kind).json_schema()["pattern"]: words
@@ -32,7 +43,22 @@ QUANTITIES = {
 
 def file_format() -> str:
     """The keys of an experiment file, section by section, as Markdown."""
-    whole = schema()
+    return _keys(schema())
+
+
+def sweep_format() -> str:
+    """The keys of a sweep file, section by section, as Markdown."""
+    return _keys(sweep_schema())
+
+
+def reproduction() -> str:
+    """The published figures beside ours, as Markdown."""
+    found = reproduce(npl(), Shipped(TOP / "designs" / "npl"), (), DATA_SETS)
+    # The page has a title of its own.
+    return reproduction_markdown(found).partition("\n")[2]
+
+
+def _keys(whole: Schema) -> str:
     sections = dict(_sections(whole))
     lines = ["## The file", "", *_table(whole, whole, sections)]
     for name, paths in sections.items():
@@ -180,7 +206,13 @@ def _text(action: argparse.Action) -> str:
     return (action.help or "").replace("%%", "%") + "."
 
 
-PARTS = {"<!-- file format -->": file_format, "<!-- units -->": units, "<!-- commands -->": commands}
+PARTS = {
+    "<!-- file format -->": file_format,
+    "<!-- sweep format -->": sweep_format,
+    "<!-- units -->": units,
+    "<!-- commands -->": commands,
+    "<!-- reproduction -->": reproduction,
+}
 
 
 def _fill(app: Sphinx, page: str, source: list[str]) -> None:
