@@ -49,7 +49,7 @@ def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measur
             ]
         for statistic, unit, factor in (("undetermined", "", 1.0), ("within_target", "%", 100.0)):
             column = f"{name}_{statistic}"
-            if column not in results.frame or (statistic == "undetermined" and not results.figure(column).max() > 0):
+            if column not in results.frame or (statistic == "undetermined" and not (results.figure(column) > 0).any()):
                 continue
             found.append(
                 Measure(symbol, statistic.replace("_", " "), unit, column, factor, is_count=statistic == "undetermined")
@@ -60,7 +60,7 @@ def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measur
 def rank_measures(results: Results) -> list[Measure]:
     """The rank deficiency, where a cell has any."""
     column = "rank_deficiency"
-    if column not in results.frame or not results.figure(column).max() > 0:
+    if column not in results.frame or not (results.figure(column) > 0).any():
         return []
     return [Measure("rank", "deficiency", "", column, 1.0, is_count=True)]
 

@@ -96,6 +96,8 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
     inner = body[body.index(">") + 1 :]
     inner = re.sub(r"<metadata>.*?</metadata>", "", inner, flags=re.DOTALL)
     inner = re.sub(r"<!--.*?-->\s*", "", inner, flags=re.DOTALL)
+    # A style inside would hold for the whole page, which has it in its own.
+    inner = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", inner, flags=re.DOTALL)
     # Groups that nothing refers to need no id.
     used = set(re.findall(r'(?:xlink:href="#|url\(#)([^")]+)', inner))
     inner = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", inner)
@@ -106,7 +108,7 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
     inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font: \1px sans-serif", inner)
     inner = re.sub(r"\n\s*", "\n", inner)
     start = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size[1]} {size[2]}" role="img" '
+        f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img" '
         f'aria-label="{escape(words, quote=True)}">'
     )
     return start + inner.strip()

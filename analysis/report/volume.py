@@ -18,7 +18,7 @@ from simulator.threads import single_threaded
 from ..uncertainty import point_pairs
 
 # Points along x and y of a slice.
-POINTS = 15
+POINTS = 21
 
 LEVELS = (("low", 0.0), ("middle", 0.5), ("high", 1.0))
 
