@@ -36,7 +36,7 @@ class Measure:
 def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measure]:
     """Maximum and average of all recorded uncertainties, what is open, and shares within the target accuracy.
 
-    Without `of_parts` the lengths and angles of U2 and U3 are left out.
+    Without `of_parts` the lengths and angles of U2 and U3 are left out, and how much is open.
     """
     found: list[Measure] = []
     for symbol in DESCRIPTIONS:
@@ -49,7 +49,9 @@ def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measur
             ]
         for statistic, unit, factor in (("undetermined", "", 1.0), ("within_target", "%", 100.0)):
             column = f"{name}_{statistic}"
-            if column not in results.frame or (statistic == "undetermined" and not (results.figure(column) > 0).any()):
+            if column not in results.frame:
+                continue
+            if statistic == "undetermined" and not (of_parts and (results.figure(column) > 0).any()):
                 continue
             found.append(
                 Measure(symbol, statistic.replace("_", " "), unit, column, factor, is_count=statistic == "undetermined")

@@ -16,6 +16,7 @@ from simulator.settings import listing
 
 from ..sweeps.store import Store
 from ..tables import number
+from ..uncertainty import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
@@ -24,6 +25,7 @@ from .results import Results, best_and_worst, criterion, one_line
 from .scene import MOST_BALLS, Scene, scene
 from .series import Plot, plots
 from .tables import Block, Entry, Row, Table, report_tables
+from .svg import micro
 from .verdicts import failures, flags, ranks, weak
 from .volume import error_map
 
@@ -98,22 +100,13 @@ def _markup(text: str) -> Any:
     return Markup(text)
 
 
-def micro(text: str) -> str:
-    """Units of micrometres as they are printed.
-
-    >>> micro("U2 maximum, um or urad"), micro("um")
-    ('U2 maximum, µm or µrad', 'µm')
-    """
-    return re.sub(r"(^|, | or )u(m|rad)\b", r"\1µ\2", text)
-
-
 def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
     known = [
         ("swept", "What was swept", True),
-        ("failed", "Failed cells", context["failures"].shown),
         ("uncertainties", "Uncertainties", context["tables"]),
         ("plots", "Along the axes", context["plots"]),
         ("heat", "Over two axes", context["heats"]),
+        ("failed", "Failed cells", context["failures"].shown),
         ("rank", "What the readings determine", context["ranks"].shown),
         ("designs", "Designs", context["designs"] or context["no_designs"]),
         ("error-map", "The error map's uncertainty", context["error_map"]),
@@ -162,7 +155,7 @@ def _plots(drawn: list[Plot]) -> list[tuple[str, list[Drawn]]]:
         figures = []
         for plot in some:
             number_of += 1
-            caption = f"{plot.symbol} against {plot.axis.name}: average and maximum. {plot.note}".strip()
+            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}. {plot.note}".strip()
             figures.append(Drawn(plot_svg(plot, f"plot{number_of}"), caption))
         found.append((axis, figures))
     return found

@@ -10,26 +10,29 @@ from simulator.machines.protocol import Array
 
 from ..tables import number
 from .scene import Place, Scene
-from .svg import DASHES, INK, MUTED, PAPER, SERIES, as_svg, blank_axes, drawing
+from .svg import DASHES, INK, MUTED, PAPER, SERIES, WIDTH, as_svg, blank_axes, drawing, placed_axes
 from .volume import ErrorMap, Slice
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# Points around a map.
+LEFT, RIGHT, BELOW, ABOVE = 50.0, 14.0, 40.0, 8.0
+
 # Positions whose names fit into the drawing; more are numbered.
 MOST_NAMES = 8
 
-# Light enough for dark letters everywhere.
-LIGHT = ("#f4f8fb", "#dfeaf3", "#c8dcec", "#aecbe3", "#93b8d8", "#79a4cb")
+# Bands between lines of the error map at most, from the first of these colours to the second: light enough for dark
+# letters everywhere.
+MOST_BANDS = 10
+LIGHT = ("#f6f9fc", "#79a4cb")
 DARK = "#101010"
 
 
 def scene_svg(drawn: Scene, name: str, words: str) -> str:
     """The volume with the positions in it."""
     with drawing(330.0) as figure:
-        axes = figure.subplots()
-        blank_axes(axes)
-        axes.set_aspect("equal")
+        axes = blank_axes(figure)
         for edge, is_hidden in zip(drawn.edges, drawn.hidden, strict=True):
             axes.plot(*edge.T, color=MUTED, linewidth=0.8, linestyle=":" if is_hidden else "-")
         taken = [_write_axis(axes, drawn, *axis) for axis in drawn.axes]
@@ -102,9 +105,7 @@ def _unit(vectors: Array) -> Array:
 def probes_svg(drawn: Scene, name: str, words: str) -> str:
     """The tips about the reference point, enlarged."""
     with drawing(200.0) as figure:
-        axes = figure.subplots()
-        blank_axes(axes)
-        axes.set_aspect("equal")
+        axes = blank_axes(figure)
         size = max(float(np.abs(tip).max()) for _, tip in drawn.tips) or 1.0
         axes.plot(0.0, 0.0, color=INK, marker="s", markersize=6.0)
         groups: list[tuple[Array, list[str]]] = []
@@ -122,22 +123,26 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
             height = "bottom" if away[1] > 0.5 else "top" if away[1] < -0.5 else "center"
             text = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
             axes.annotate(text, tip, 9.0 * away, textcoords="offset points", ha=side, va=height)
-        axes.margins(0.3)
+        axes.set_xlim(-2.2 * size, 2.2 * size)
+        axes.set_ylim(-1.5 * size, 1.3 * size)
         return as_svg(figure, name, words)
 
 
 def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
     """A level of the error map: shades with the same limits in all levels, and lines with their values."""
+    from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.ticker import MaxNLocator
 
     values = 1e6 * one.values
     every = 1e6 * np.concatenate([level.values.ravel() for level in drawn.slices])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 1.0)
-    levels = MaxNLocator(nbins=len(LIGHT), steps=[1, 2, 2.5, 5, 10]).tick_values(low, max(high, low + 1e-9))
+    levels = MaxNLocator(nbins=MOST_BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, max(high, low + 1e-9))
     span = np.array([np.ptp(drawn.x), np.ptp(drawn.y)])
-    with drawing(min(max(280.0 * float(span[1] / span[0]), 200.0), 420.0) + 50.0) as figure:
-        axes = figure.subplots()
+    width = WIDTH - LEFT - RIGHT
+    height = min(max(width * float(span[1] / span[0]), 150.0), 450.0)
+    with drawing(height + BELOW + ABOVE) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, width, height)
         axes.set_aspect("equal")
         axes.set_xlabel("x, mm")
         axes.set_ylabel("y, mm")
@@ -148,7 +153,7 @@ def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
         if hatched.any():
             axes.contourf(x, y, hatched.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
         if not hatched.all():
-            colours = [LIGHT[min(k, len(LIGHT) - 1)] for k in range(len(levels) - 1)]
+            colours = LinearSegmentedColormap.from_list("light", LIGHT)(np.linspace(0.0, 1.0, len(levels) - 1))
             axes.contourf(x, y, np.ma.masked_invalid(values), levels=levels, colors=colours)
             if ((np.nanmin(values) < levels) & (levels < np.nanmax(values))).any():
                 lines = axes.contour(x, y, np.ma.masked_invalid(values), levels=levels, colors=DARK, linewidths=0.8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..tables import number
 from .series import Line, Panel, Plot
-from .svg import DASHES, INK, MARKERS, PAPER, SERIES, as_svg, drawing
+from .svg import DASHES, INK, MARKERS, PAPER, SERIES, WIDTH, as_svg, drawing, micro, placed_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 WIDE = 30.0
 
 # Letters of a legend's line.
-LEGEND = 58
+LEGEND = 54
+
+# Points: of a panel and around it, and of a line of the legend.
+PANEL, ABOVE, LEFT, RIGHT, BELOW, LINE = 118.0, 22.0, 50.0, 9.0, 40.0, 15.0
 
 
 def plot_svg(plot: Plot, name: str) -> str:
@@ -28,20 +31,27 @@ def plot_svg(plot: Plot, name: str) -> str:
     columns = 2 if max((len(line.label) for line in lines), default=0) <= LEGEND // 2 - 6 else 1
     rows = -(-(len(lines) + (len(lines[0].actual) > 0)) // columns) if has_legend else 0
     wrapped = max(len(_wrapped(line.label).splitlines() or [""]) for line in lines)
-    with drawing(330.0 + 15.0 * rows * wrapped) as figure:
-        axes = figure.subplots(len(plot.panels), 1, sharex=True, squeeze=False)[:, 0]
-        for one, panel in zip(axes, plot.panels, strict=True):
-            _panel(one, plot, panel)
-        axes[-1].set_xlabel(plot.axis.title)
+    count = len(plot.panels)
+    below = BELOW + LINE * rows * wrapped
+    with drawing(below + count * (PANEL + ABOVE)) as figure:
+        found: list[Axes] = []
+        for k, panel in enumerate(plot.panels):
+            bottom = below + (count - 1 - k) * (PANEL + ABOVE)
+            found.append(placed_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL))
+            _panel(found[k], plot, panel)
+            found[k].tick_params(labelbottom=k == count - 1)
+        found[-1].set_xlabel(micro(plot.axis.title))
         if has_legend:
-            handles, labels = axes[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+            handles, labels = found[0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="lower center", ncols=columns, borderaxespad=0.0)
         return as_svg(figure, name, words(plot))
 
 
 def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
+    from matplotlib.ticker import NullLocator
+
     axes.set_title(panel.measure.name, loc="left")
-    axes.set_ylabel(plot.unit.replace("u", "µ", 1))
+    axes.set_ylabel(micro(plot.unit))
     axes.grid(True)
     for k, line in enumerate(panel.lines):
         _line(axes, line, k, is_only=len(panel.lines) == 1)
@@ -51,12 +61,14 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     if len(finite) and finite.min() > 0 and finite.max() > WIDE * finite.min():
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_locator(NullLocator())
     else:
         axes.set_ylim(0, 1.06 * float(finite.max(initial=0.0)) or 1.0)
     numbers = np.unique(plot.axis.numbers)
     if numbers.min() > 0 and numbers.max() > WIDE * numbers.min():
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_locator(NullLocator())
     elif len(numbers) <= 8 and np.diff(numbers).min() > 0.09 * np.ptp(numbers):
         axes.set_xticks(numbers, [f"{value:.6g}" for value in numbers])
 
@@ -90,8 +102,8 @@ def words(plot: Plot) -> str:
             if not len(known):
                 continue
             first, last = known[0], known[-1]
-            unit = plot.unit.replace("u", "µ", 1)
-            at = f" {plot.axis.unit}" if plot.axis.unit else ""
+            unit = micro(plot.unit)
+            at = f" {micro(plot.axis.unit)}" if plot.axis.unit else ""
             told.append(
                 f"{panel.measure.statistic}{', ' + line.label if line.label else ''}: {number(line.y[first], 3)} {unit} "
                 f"at {line.x[first]:.6g}{at}"

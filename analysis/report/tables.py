@@ -9,7 +9,14 @@ from dataclasses import dataclass
 from ..montecarlo.figures import Figure
 from ..montecarlo.tables import with_error
 from ..tables import number
-from .measures import Measure, descriptions, rank_measures, trial_measures, uncertainty_measures
+from .measures import (
+    Measure,
+    descriptions,
+    rank_measures,
+    symbol_column,
+    trial_measures,
+    uncertainty_measures,
+)
 from .results import Results
 
 DIGITS = 3
@@ -62,6 +69,11 @@ class Table:
     spanner: str = ""
     block: str = ""
     notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return sum(len(block.rows) for block in self.blocks)
 
 
 def report_tables(results: Results) -> tuple[Table, ...]:
@@ -150,6 +162,9 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
     if results.frame["status"].iloc[row] != "done":
         return Entry(str(results.frame["status"].iloc[row]), None, cell, measure.figure)
     value = float(results.frame[measure.figure].iloc[row])
+    if math.isnan(value) and not _is_open(results, measure, row):
+        # Not recorded of this cell, as opposed to undetermined.
+        return Entry("", value, cell, measure.figure)
     if measure.is_count:
         text = "-" if math.isnan(value) else f"{value:.0f}"
     elif measure.error:
@@ -157,3 +172,9 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
     else:
         text = number(measure.factor * value, DIGITS)
     return Entry(text, value, cell, measure.figure)
+
+
+def _is_open(results: Results, measure: Measure, row: int) -> bool:
+    """Whether the observations of a cell leave open all that a measure tells of."""
+    column = f"{symbol_column(measure.symbol)}_undetermined"
+    return column in results.frame and float(results.frame[column].iloc[row]) > 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .results import Results, cell_list, common_values
@@ -30,6 +30,15 @@ class Groups:
     shown: tuple[Group, ...]
     more: int = 0
 
+    @property
+    def size(self) -> int:
+        """Number of lines."""
+        return sum(len(group.lines) for group in self.shown)
+
+
+# A heading, and the lines that belong to it.
+Told = tuple[str, tuple[str, ...]]
+
 
 def ranks(results: Results) -> Groups:
     """Cells by rank deficiency and by what is undetermined."""
@@ -54,36 +63,37 @@ def weak(results: Results) -> Groups:
     for cell, texts in results.texts.items():
         if texts.get("weak"):
             found.setdefault(tuple(texts["weak"]), []).append(cell)
-    return _told(results, found.items(), lambda lines: f"{len(lines)} weakly determined")
+    return _told(results, {(f"{len(lines)} weakly determined", lines): cells for lines, cells in found.items()})
 
 
 def flags(results: Results) -> Groups:
     """Cells by what Monte Carlo finds different from linear theory, and by why there is no Monte Carlo."""
-    found: dict[tuple[str, ...], list[int]] = {}
+    found: dict[Told, list[int]] = {}
     for cell, texts in results.texts.items():
-        lines = [f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()]
+        told = [f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()]
         if "monte_carlo" in texts:
-            lines.append(f"no Monte Carlo: {texts['monte_carlo']}")
+            told.append(f"no Monte Carlo: {texts['monte_carlo']}")
         if texts.get("not_converged"):
-            lines.append("data sets that did not converge, and are left out")
-        if lines:
-            found.setdefault(tuple(lines), []).append(cell)
-    return _told(results, found.items(), lambda lines: lines[0])
+            told.append("data sets that did not converge, and are left out")
+        if told:
+            found.setdefault(("; ".join(told), ()), []).append(cell)
+    return _told(results, found)
 
 
 def failures(results: Results) -> Groups:
     """Failed cells by reason."""
-    found: dict[tuple[str, ...], list[int]] = {}
+    found: dict[Told, list[int]] = {}
     failed = results.frame[results.frame["status"] == "failed"]
     for cell, reason in zip(failed["cell"], failed["reason"], strict=True):
-        found.setdefault(tuple(str(reason).splitlines()), []).append(int(cell))
-    return _told(results, found.items(), lambda lines: "failed")
+        lines = tuple(str(reason).splitlines())
+        told: Told = (lines[0] if lines else "failed", ()) if len(lines) < 2 else (f"{len(lines)} errors", lines)
+        found.setdefault(told, []).append(int(cell))
+    return _told(results, found)
 
 
-def _told(results: Results, found: Iterable[tuple[tuple[str, ...], list[int]]], heading) -> Groups:  # type: ignore[no-untyped-def]
-    ordered = list(found)
-    groups = tuple(_group(results, heading(lines), cells, lines) for lines, cells in ordered[:MOST_GROUPS])
-    return Groups(groups, max(len(ordered) - MOST_GROUPS, 0))
+def _told(results: Results, found: Mapping[Told, list[int]]) -> Groups:
+    groups = [_group(results, heading, cells, lines) for (heading, lines), cells in list(found.items())[:MOST_GROUPS]]
+    return Groups(tuple(groups), max(len(found) - MOST_GROUPS, 0))
 
 
 def _group(results: Results, heading: str, cells: list[int], lines: tuple[str, ...]) -> Group:
