@@ -55,7 +55,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     axes.grid(True)
     for k, line in enumerate(panel.lines):
         _line(axes, line, k, is_only=len(panel.lines) == 1)
-    values = [np.concatenate([line.y, line.low, line.actual]) for line in panel.lines]
+    values = [np.concatenate([line.y, line.low, line.high, line.actual]) for line in panel.lines]
     finite = np.concatenate(values)
     finite = finite[np.isfinite(finite)]
     if len(finite) and finite.min() > 0 and finite.max() > WIDE * finite.min():

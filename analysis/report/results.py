@@ -41,8 +41,12 @@ class Axis:
 
     @property
     def short_labels(self) -> tuple[str, ...]:
-        """Labels without the unit that `title` has."""
-        return tuple(f"{number:.10g}" for number in self.numbers) if self.numbers else self.labels
+        """Labels without the unit that `title` has, and no longer than tells them apart."""
+        if not self.numbers:
+            return self.labels
+        short = tuple(f"{number:.4g}" for number in self.numbers)
+        is_enough = len(set(short)) == len(short) and not any("e" in text for text in short)
+        return short if is_enough else tuple(f"{number:.10g}" for number in self.numbers)
 
 
 @dataclass(frozen=True, eq=False)

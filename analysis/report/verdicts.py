@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .results import Results, cell_list, common_values
 
-# Groups that are told in full.
-MOST_GROUPS = 40
+# Groups that are told, and lines of each.
+MOST_GROUPS, MOST_LINES = 30, 8
+
+# Amounts, by which alone cells of a sweep may differ in what is told of them.
+AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?= (um|urad|ppm)\b)")
 
 
 @dataclass(frozen=True)
 class Group:
-    """Cells of which the same is told: `heading` in short, `lines` in full."""
+    """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, `more` of them left out."""
 
     heading: str
     cells: str
@@ -21,6 +25,7 @@ class Group:
     count: int
     lines: tuple[str, ...]
     is_surprise: bool = False
+    more: int = 0
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,8 @@ class Groups:
         return sum(len(group.lines) for group in self.shown)
 
 
+NOT = "not "
+
 # A heading, and the lines that belong to it.
 Told = tuple[str, tuple[str, ...]]
 
@@ -46,24 +53,23 @@ def ranks(results: Results) -> Groups:
         return Groups(())
     done = (results.frame["status"] == "done").to_numpy()
     columns = (results.frame[name].to_numpy()[done] for name in ("cell", "rank_deficiency", "as_expected"))
-    found: dict[tuple[int, bool, tuple[str, ...]], list[int]] = {}
+    found: dict[Told, list[int]] = {}
     for cell, deficiency, expected in zip(*columns, strict=True):
+        heading = f"rank deficiency {int(deficiency)}" if deficiency else "full rank"
         lines = tuple(results.texts.get(int(cell), {}).get("undetermined", ()))
-        found.setdefault((int(deficiency), bool(expected), lines), []).append(int(cell))
-    groups = []
-    for (deficiency, expected, lines), cells in list(found.items())[:MOST_GROUPS]:
-        heading = f"rank deficiency {deficiency}" if deficiency else "full rank"
-        groups.append(_group(results, heading + (", as expected" if expected else ", not as expected"), cells, lines))
-    return Groups(tuple(groups), max(len(found) - MOST_GROUPS, 0))
+        found.setdefault((f"{heading}, {'' if expected else NOT}as expected", lines), []).append(int(cell))
+    return _told(results, found)
 
 
 def weak(results: Results) -> Groups:
     """Cells by what is weakly determined."""
-    found: dict[tuple[str, ...], list[int]] = {}
+    found: dict[Told, list[int]] = {}
     for cell, texts in results.texts.items():
         if texts.get("weak"):
-            found.setdefault(tuple(texts["weak"]), []).append(cell)
-    return _told(results, {(f"{len(lines)} weakly determined", lines): cells for lines, cells in found.items()})
+            lines = tuple(texts["weak"])
+            word = "direction" if len(lines) == 1 else "directions"
+            found.setdefault((f"{len(lines)} {word} weakly determined", lines), []).append(cell)
+    return _told(results, found)
 
 
 def flags(results: Results) -> Groups:
@@ -92,10 +98,19 @@ def failures(results: Results) -> Groups:
 
 
 def _told(results: Results, found: Mapping[Told, list[int]]) -> Groups:
-    groups = [_group(results, heading, cells, lines) for (heading, lines), cells in list(found.items())[:MOST_GROUPS]]
-    return Groups(tuple(groups), max(len(found) - MOST_GROUPS, 0))
+    """Groups of cells of which the same is told, those together that differ in amounts only."""
+    alike: dict[Told, tuple[Told, list[int]]] = {}
+    for (heading, lines), cells in found.items():
+        form = heading, tuple(AMOUNT.sub("", line) for line in lines)
+        alike.setdefault(form, ((heading, lines), []))[1].extend(cells)
+    some = list(alike.values())[:MOST_GROUPS]
+    groups = [_group(results, *told, sorted(cells), len(found) > len(alike)) for told, cells in some]
+    return Groups(tuple(groups), max(len(alike) - MOST_GROUPS, 0))
 
 
-def _group(results: Results, heading: str, cells: list[int], lines: tuple[str, ...]) -> Group:
+def _group(results: Results, heading: str, lines: tuple[str, ...], cells: list[int], with_example: bool) -> Group:
     values = results.label(cells[0]) if len(cells) == 1 else common_values(results, cells)
-    return Group(heading, cell_list(cells), values, len(cells), lines, "not as expected" in heading)
+    if with_example and lines and len(cells) > 1:
+        heading += f", with the amounts of cell {cells[0]}"
+    shown, more = lines[:MOST_LINES], max(len(lines) - MOST_LINES, 0)
+    return Group(heading, cell_list(cells), values, len(cells), shown, f"{NOT}as expected" in heading, more)
