@@ -63,10 +63,10 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
         text = number(measure.factor * medians[k], DIGITS) if len(known) else "-" if len(rows_here) else NOT_DONE
         if planned[k] == 1 and len(rows_here):
             row = int(rows_here[0])
-            status = str(results.frame["status"].iloc[row])
+            status = results.status(row)
             is_done = status == "done"
             value = float(values[row]) if is_done else None
-            cell = int(results.frame["cell"].iloc[row])
+            cell = int(results.frame["cell"].to_numpy()[row])
             entries.append(Entry(text if is_done else status, value, cell, measure.figure))
         else:
             entries.append(Entry(text if planned[k] else ""))

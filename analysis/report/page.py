@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from importlib import resources
 from itertools import groupby
@@ -24,8 +25,8 @@ from .plots import plot_svg
 from .results import Results, best_and_worst, criterion, one_line
 from .scene import MOST_BALLS, Scene, scene
 from .series import Plot, plots
-from .tables import Block, Entry, Row, Table, report_tables
 from .svg import micro
+from .tables import Block, Entry, Row, Table, report_tables
 from .verdicts import failures, flags, ranks, weak
 from .volume import error_map
 
@@ -67,6 +68,7 @@ def page(store: Store, results: Results, run_modules: bool = False) -> str:
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
     from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(micro=micro, full=repr)
@@ -76,8 +78,7 @@ def page(store: Store, results: Results, run_modules: bool = False) -> str:
     context: dict[str, Any] = {
         "title": one_line(results.title),
         "summary": _summary(results),
-        # Trusted, and without the one sign that would end the element.
-        "style": package.joinpath("page.css").read_text(encoding="utf-8"),
+        "style": Markup(package.joinpath("page.css").read_text(encoding="utf-8")),
         "facts": _facts(results),
         "failures": failures(results),
         "tables": report_tables(results),
@@ -89,15 +90,8 @@ def page(store: Store, results: Results, run_modules: bool = False) -> str:
         "flags": flags(results),
         **_designs(store, results, run_modules),
     }
-    context["style"] = _markup(context["style"])
     context["sections"] = _sections(context)
     return re.sub(r"\n{2,}", "\n", template.render(context)).lstrip() + "\n"
-
-
-def _markup(text: str) -> Any:
-    from markupsafe import Markup
-
-    return Markup(text)
 
 
 def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
@@ -141,8 +135,8 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         ("Seed", str(stored["seed"])),
     ]  # fmt: skip
     names = [name for name in results.frame.columns if name.endswith("_version")]
-    counts = results.frame.groupby(names, sort=False).size() if names else []
-    for versions, count in dict(counts).items():
+    counts = Counter(zip(*(results.frame[name].tolist() for name in names), strict=True))
+    for versions, count in counts.items():
         words = ", ".join(f"{name.removesuffix('_version')} {one}" for name, one in zip(names, versions, strict=True))
         facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cells)"))
     return facts
@@ -176,7 +170,7 @@ def _designs(store: Store, results: Results, run_modules: bool) -> dict[str, Any
     for k, (cell, experiment) in enumerate(zip(cells, found, strict=True)):
         which = ("Smallest", "Largest")[k] if len(cells) > 1 else "The only"
         row = int(np.flatnonzero(results.frame["cell"] == cell)[0])
-        value, open_ = (float(results.frame[name].iloc[row]) for name in (judged[0], f"{judged[1]}_undetermined"))
+        value, open_ = (results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined"))
         told = f"{number(1e6 * value, 3)} µm" if judged[0].endswith("_m") else number(1e6 * value, 3)
         told += f", {open_:.0f} undetermined" if open_ else ""
         heading = f"{which} average of {symbol}, {told}: cell {cell}, {results.label(cell)}"
@@ -197,9 +191,7 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
         caption += " Of many balls only some are drawn."
     has_offsets = any(tip.any() for _, tip in drawn.tips)
     probes = probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}") if has_offsets else ""
-    return DrawnDesign(
-        cell, heading, scene_svg(drawn, f"scene{k}", words), probes, caption, _positions(drawn, cell)
-    )
+    return DrawnDesign(cell, heading, scene_svg(drawn, f"scene{k}", words), probes, caption, _positions(drawn, cell))
 
 
 def _positions(drawn: Scene, cell: int) -> Table:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Points around a map.
-LEFT, RIGHT, BELOW, ABOVE = 50.0, 14.0, 40.0, 8.0
+LEFT, RIGHT, BELOW, ABOVE = 50.0, 18.0, 40.0, 10.0
 
 # Positions whose names fit into the drawing; more are numbered.
 MOST_NAMES = 8
@@ -41,6 +41,11 @@ def scene_svg(drawn: Scene, name: str, words: str) -> str:
             _place(axes, place)
         for place in drawn.places:
             _name(axes, place, taken, size, len(drawn.places) > MOST_NAMES)
+        # Room for what is written around the volume and for plates that stand out of it.
+        drawn_points = np.concatenate([drawn.edges.reshape(-1, 2), *(place.outline for place in drawn.places)])
+        low, high = drawn_points.min(axis=0) - 0.11 * size, drawn_points.max(axis=0) + 0.11 * size
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
         return as_svg(figure, name, words)
 
 
@@ -94,7 +99,7 @@ def _name(axes: Axes, place: Place, taken: list[Array], size: float, by_number: 
     at = places[int(np.argmax(apart))]
     taken.append(at)
     box = {"facecolor": PAPER, "alpha": 0.8, "edgecolor": "none", "boxstyle": "square,pad=0.12"}
-    axes.text(*at, text, ha="center", va="center", bbox=box)
+    axes.text(at[0], at[1], text, ha="center", va="center", bbox=box)
 
 
 def _unit(vectors: Array) -> Array:
@@ -122,7 +127,9 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
             side = "left" if away[0] > 0.3 else "right" if away[0] < -0.3 else "center"
             height = "bottom" if away[1] > 0.5 else "top" if away[1] < -0.5 else "center"
             text = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-            axes.annotate(text, tip, 9.0 * away, textcoords="offset points", ha=side, va=height)
+            axes.annotate(
+                text, (tip[0], tip[1]), (9.0 * away[0], 9.0 * away[1]), textcoords="offset points", ha=side, va=height
+            )
         axes.set_xlim(-2.2 * size, 2.2 * size)
         axes.set_ylim(-1.5 * size, 1.3 * size)
         return as_svg(figure, name, words)

@@ -14,14 +14,14 @@ from .svg import DASHES, INK, MARKERS, PAPER, SERIES, WIDTH, as_svg, drawing, mi
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Ratio of the largest to the smallest value above which an axis is logarithmic.
+# Ratio of the largest to the smallest value above which an axis is logarithmic, unless its values are evenly spaced.
 WIDE = 30.0
 
 # Letters of a legend's line.
 LEGEND = 54
 
 # Points: of a panel and around it, and of a line of the legend.
-PANEL, ABOVE, LEFT, RIGHT, BELOW, LINE = 118.0, 22.0, 50.0, 9.0, 40.0, 15.0
+PANEL, ABOVE, LEFT, RIGHT, BELOW, LINE = 118.0, 22.0, 50.0, 16.0, 40.0, 15.0
 
 
 def plot_svg(plot: Plot, name: str) -> str:
@@ -65,7 +65,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     else:
         axes.set_ylim(0, 1.06 * float(finite.max(initial=0.0)) or 1.0)
     numbers = np.unique(plot.axis.numbers)
-    if numbers.min() > 0 and numbers.max() > WIDE * numbers.min():
+    if numbers.min() > 0 and numbers.max() > WIDE * numbers.min() and np.median(numbers) < 0.3 * numbers.max():
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_locator(NullLocator())
@@ -101,12 +101,9 @@ def words(plot: Plot) -> str:
             known = np.flatnonzero(np.isfinite(line.y))
             if not len(known):
                 continue
-            first, last = known[0], known[-1]
-            unit = micro(plot.unit)
-            at = f" {micro(plot.axis.unit)}" if plot.axis.unit else ""
-            told.append(
-                f"{panel.measure.statistic}{', ' + line.label if line.label else ''}: {number(line.y[first], 3)} {unit} "
-                f"at {line.x[first]:.6g}{at}"
-                + (f", {number(line.y[last], 3)} {unit} at {line.x[last]:.6g}{at}" if last != first else "")
-            )
+            ends = [
+                f"{number(line.y[k], 3)} {micro(plot.unit)} at {line.x[k]:.6g} {micro(plot.axis.unit)}".rstrip()
+                for k in sorted({known[0], known[-1]})
+            ]
+            told.append(" ".join([panel.measure.statistic, line.label]).rstrip() + ": " + ", ".join(ends))
     return f"{plot.symbol} against {plot.axis.name}. " + "; ".join(told)

@@ -83,6 +83,14 @@ class Results:
             f"{axis.name} {axis.labels[k]}" for axis, k in zip(self.axes, self.cells[cell].tolist(), strict=True)
         )
 
+    def value(self, name: str, row: int) -> float:
+        """A figure of a row of the frame."""
+        return float(self.frame[name].to_numpy()[row])
+
+    def status(self, row: int) -> str:
+        """Status of a row of the frame."""
+        return str(self.frame["status"].to_numpy()[row])
+
     def figure(self, name: str) -> NDArray[np.float64]:
         """A column of the frame (rows,)."""
         return np.asarray(self.frame[name], float)

@@ -100,12 +100,7 @@ def _box(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[np.boo
     """Edges of the volume, and which are behind it."""
     d = len(lower)
     corners = np.array(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij")).reshape(d, -1).T
-    edges = [
-        (one, other)
-        for k, one in enumerate(corners)
-        for other in corners[k + 1 :]
-        if (one != other).sum() == 1
-    ]
+    edges = [(one, other) for k, one in enumerate(corners) for other in corners[k + 1 :] if (one != other).sum() == 1]
     if d == 2:
         return np.array(edges), np.zeros(len(edges), bool)
     rear = corners[(corners @ away).argmax()]

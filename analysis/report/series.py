@@ -14,7 +14,7 @@ from .results import Axis, Results
 Floats = NDArray[np.float64]
 
 # Lines that can be told apart, and places along an axis that can.
-MOST_LINES, MOST_PLACES = 6, 40
+MOST_LINES, MOST_PLACES = 6, 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +122,8 @@ def _median(axis: Axis, places: NDArray[np.int64], groups: NDArray[np.int64] | N
     found = pandas.DataFrame(
         {"x": table["x"].median(), "y": table["y"].median(), "low": table["y"].min(), "high": table["y"].max()}
     ).sort_values("x")
-    columns = [found[name].to_numpy(float) for name in ("x", "y", "low", "high")]
-    return Line("median", *columns, np.zeros(0), np.zeros(0))
+    x, y, low, high = (found[name].to_numpy(float) for name in ("x", "y", "low", "high"))
+    return Line("median", x, y, low, high, np.zeros(0), np.zeros(0))
 
 
 def _actual(results: Results, measure: Measure, done: NDArray[np.bool_]) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +28,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 # Width of a drawing in points: small enough for a telephone with its text still readable.
 WIDTH = 360.0
 
-SETTINGS = {
+SETTINGS: Any = {
     "svg.hashsalt": "ballplate",
     "svg.fonttype": "none",
     "text.parse_math": False,
@@ -103,9 +103,7 @@ def micro(text: str) -> str:
 def as_svg(figure: Figure, name: str, words: str) -> str:
     """The figure as an element of a page, with `name` in front of its ids and a text for those who do not see it."""
     found = io.StringIO()
-    figure.savefig(
-        found, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    )
+    figure.savefig(found, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     body = found.getvalue()
     body = body[body.index("<svg") :]
     size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', body)
@@ -124,8 +122,5 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
         inner = inner.replace(colour, f"var({variable})")
     inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font: \1px sans-serif", inner)
     inner = re.sub(r"\n\s*", "\n", inner)
-    start = (
-        f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img" '
-        f'aria-label="{escape(words, quote=True)}">'
-    )
+    start = f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img" aria-label="{escape(words, quote=True)}">'
     return start + inner.strip()

@@ -116,9 +116,7 @@ def _table(
     return build(results, name, caption, measures, words)
 
 
-def _beside(
-    results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]
-) -> Table:
+def _beside(results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]) -> Table:
     """A column for each value of the last axis, a block for each of the first where there are two."""
     cells = {tuple(choice): cell for cell, choice in enumerate(results.cells.tolist())}
     rows = {int(cell): row for row, cell in enumerate(results.frame["cell"])}
@@ -144,7 +142,7 @@ def _below(results: Results, name: str, caption: str, measures: Sequence[Measure
     """A row for each cell, as far as they can be read."""
     found = []
     for row in range(min(len(results.frame), MOST_ROWS)):
-        cell = int(results.frame["cell"].iloc[row])
+        cell = int(results.frame["cell"].to_numpy()[row])
         labels = tuple(axis.labels[k] for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True))
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
         found.append(Row((str(cell), *labels), entries))
@@ -159,16 +157,16 @@ def _below(results: Results, name: str, caption: str, measures: Sequence[Measure
 def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> Entry:
     if row is None:
         return Entry(NOT_DONE, None, cell, measure.figure)
-    if results.frame["status"].iloc[row] != "done":
-        return Entry(str(results.frame["status"].iloc[row]), None, cell, measure.figure)
-    value = float(results.frame[measure.figure].iloc[row])
+    if results.status(row) != "done":
+        return Entry(results.status(row), None, cell, measure.figure)
+    value = results.value(measure.figure, row)
     if math.isnan(value) and not _is_open(results, measure, row):
         # Not recorded of this cell, as opposed to undetermined.
         return Entry("", value, cell, measure.figure)
     if measure.is_count:
         text = "-" if math.isnan(value) else f"{value:.0f}"
     elif measure.error:
-        text = with_error(Figure(value, float(results.frame[measure.error].iloc[row])), measure.factor)
+        text = with_error(Figure(value, results.value(measure.error, row)), measure.factor)
     else:
         text = number(measure.factor * value, DIGITS)
     return Entry(text, value, cell, measure.figure)
@@ -177,4 +175,4 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
 def _is_open(results: Results, measure: Measure, row: int) -> bool:
     """Whether the observations of a cell leave open all that a measure tells of."""
     column = f"{symbol_column(measure.symbol)}_undetermined"
-    return column in results.frame and float(results.frame[column].iloc[row]) > 0
+    return column in results.frame and results.value(column, row) > 0

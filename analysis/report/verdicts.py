@@ -17,7 +17,7 @@ AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?= (um|urad|ppm)\b)")
 
 @dataclass(frozen=True)
 class Group:
-    """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, `more` of them left out."""
+    """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, less `more` of them."""
 
     heading: str
     cells: str

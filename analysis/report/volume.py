@@ -51,19 +51,18 @@ def error_map(experiment: Experiment) -> ErrorMap:
     """The error map's uncertainty with the probe with which the experiment is evaluated, at zero machine error."""
     design = lay_out(experiment)
     x, y = (np.linspace(design.lower[k], design.upper[k], POINTS) for k in (0, 1))
+    levels: list[tuple[str, float | None]] = [("", None)]
+    grid = np.stack(np.meshgrid(y, x, indexing="ij")[::-1], axis=-1)[None]
     if design.dimension == 3:
-        depth = design.upper[2] - design.lower[2]
-        levels = [(name, float(design.lower[2] + share * depth)) for name, share in LEVELS]
-        grid = np.stack(np.meshgrid([level for _, level in levels], y, x, indexing="ij")[::-1], axis=-1)
-    else:
-        levels = []
-        grid = np.stack(np.meshgrid(y, x, indexing="ij")[::-1], axis=-1)[None]
+        heights = [float(design.lower[2] + share * (design.upper[2] - design.lower[2])) for _, share in LEVELS]
+        levels = [(name, height) for (name, _), height in zip(LEVELS, heights, strict=True)]
+        grid = np.stack(np.meshgrid(heights, y, x, indexing="ij")[::-1], axis=-1)
     design = replace(design, points=grid.reshape(-1, design.dimension))
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
     spread = covariance(design, factor, spectrum(factor))
     of_points, pairs = point_pairs(design, layout, state, spread, experiment.target_accuracy)
     values = np.sqrt((of_points**2).mean(axis=1)).reshape(grid.shape[:-1])
-    slices = [Slice(name, level, found) for (name, level), found in zip(levels or [("", None)], values, strict=True)]
+    slices = [Slice(name, level, found) for (name, level), found in zip(levels, values, strict=True)]
     within = None if experiment.target_accuracy is None else pairs.within / pairs.count
     return ErrorMap(x, y, tuple(slices), within)
