@@ -51,7 +51,7 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
     row_of, row_labels = _grouped(rows)
     column_of, column_labels = _grouped(columns)
     shape = len(row_labels), len(column_labels)
-    values = np.where(results.frame["status"] == "done", results.figure(measure.figure), np.nan)
+    values = np.where(results.done, results.figure(measure.figure), np.nan)
     place = row_of[results.chosen[:, i]] * shape[1] + column_of[results.chosen[:, j]]
     members = _members(place, shape[0] * shape[1])
     planned = np.bincount(row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members))
@@ -63,7 +63,7 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
         text = number(measure.factor * medians[k], DIGITS) if len(known) else "-" if len(rows_here) else NOT_DONE
         if planned[k] == 1 and len(rows_here):
             row = int(rows_here[0])
-            status = results.status(row)
+            status = results.statuses[row]
             is_done = status == "done"
             value = float(values[row]) if is_done else None
             cell = int(results.frame["cell"].to_numpy()[row])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class Results:
 
     def count(self, status: str) -> int:
         """Number of cells of a status."""
-        return int((self.frame["status"] == status).sum())
+        return self.statuses.count(status)
 
     @property
     def left(self) -> int:
@@ -87,9 +88,15 @@ class Results:
         """A figure of a row of the frame."""
         return float(self.frame[name].to_numpy()[row])
 
-    def status(self, row: int) -> str:
-        """Status of a row of the frame."""
-        return str(self.frame["status"].to_numpy()[row])
+    @cached_property
+    def statuses(self) -> list[str]:
+        """Status of each row of the frame."""
+        return [str(status) for status in self.frame["status"]]
+
+    @cached_property
+    def done(self) -> NDArray[np.bool_]:
+        """Which rows of the frame are of cells that are done."""
+        return np.array([status == "done" for status in self.statuses], bool)
 
     def figure(self, name: str) -> NDArray[np.float64]:
         """A column of the frame (rows,)."""
@@ -140,7 +147,7 @@ def best_and_worst(results: Results) -> tuple[int, ...]:
     One cell if there is only one, none if none is done or nothing is recorded.
     """
     judged = criterion(results)
-    done = np.flatnonzero((results.frame["status"] == "done").to_numpy())
+    done = np.flatnonzero(results.done)
     if judged is None or not len(done):
         return ()
     column, name = judged

@@ -70,7 +70,7 @@ def plots(results: Results) -> list[Plot]:
 
 def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) -> Plot:
     axis = results.axes[k]
-    done = (results.frame["status"] == "done").to_numpy()
+    done = results.done
     others = [i for i in range(len(results.axes)) if i != k]
     settings, which = np.unique(results.chosen[done][:, others], axis=0, return_inverse=True)
     which = which.ravel()

@@ -157,8 +157,8 @@ def _below(results: Results, name: str, caption: str, measures: Sequence[Measure
 def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> Entry:
     if row is None:
         return Entry(NOT_DONE, None, cell, measure.figure)
-    if results.status(row) != "done":
-        return Entry(results.status(row), None, cell, measure.figure)
+    if results.statuses[row] != "done":
+        return Entry(results.statuses[row], None, cell, measure.figure)
     value = results.value(measure.figure, row)
     if math.isnan(value) and not _is_open(results, measure, row):
         # Not recorded of this cell, as opposed to undetermined.

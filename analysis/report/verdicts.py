@@ -51,7 +51,7 @@ def ranks(results: Results) -> Groups:
     """Cells by rank deficiency and by what is undetermined."""
     if "rank_deficiency" not in results.frame:
         return Groups(())
-    done = (results.frame["status"] == "done").to_numpy()
+    done = results.done
     columns = (results.frame[name].to_numpy()[done] for name in ("cell", "rank_deficiency", "as_expected"))
     found: dict[Told, list[int]] = {}
     for cell, deficiency, expected in zip(*columns, strict=True):
