@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -154,25 +155,30 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
 
 
 def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(
+    mark = tmp_path / "has run"
+    module = (
         "from pathlib import Path\n"
-        "from simulator.machines.settings import build_error_model, KinematicSettings\n"
+        "from simulator.machines.settings import KinematicSettings, build_error_model\n"
         "def build(lower, upper):\n"
-        "    return build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower, upper)\n",
-        encoding="utf-8",
+        f"    Path({str(mark)!r}).touch()\n"
+        "    return build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower, upper)\n"
     )
-    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
-    text = re.sub(r"(?m)^error_model:\n(  .*\n)+", "error_model: {kind: python, object: 'mine:build'}\n", text)
-    assert "mine:build" in text
-    (tmp_path / "base.yaml").write_text(text, encoding="utf-8")
-    store = sweep(tmp_path, "title: own\nbase: base.yaml\naxes:\n  r: {path: machine.repeatability, values: [1 um]}\n")
-    opened = open_store(store)
-    results = read_results(opened, 1)
-    with pytest.raises(NoExperimentError, match="--run-modules"):
-        experiments(opened, results, [0])
-    assert "run only with --run-modules" in report(store)
-    if results.count("done"):
-        assert "The designs cannot be drawn" not in report(store, "--run-modules")
+    base = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    base = re.sub(r"(?m)^error_model:.*\n(  .*\n)+", "error_model: {kind: python, object: 'own_model:build'}\n", base)
+    own = "title: own\nbase: base.yaml\naxes:\n  k: {path: machine.repeatability, values: [1 um]}\n"
+    figures = {"U4_maximum_m": 2e-6, "U4_average_m": 1e-6, "U4_undetermined": 0.0}
+    store = made_up(tmp_path / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)])
+    contents = {"made-up.yaml": own, "base.yaml": base, "own_model.py": module}
+    rows = [(1, name, content.encode()) for name, content in contents.items()]
+    store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+    store.close()
+    assert "is run only with --run-modules" in report(store.path)
+    assert not mark.exists()
+    # In a process of its own, as the module would stay in this one.
+    page_file = tmp_path / "own.html"
+    command = [sys.executable, "-m", "analysis.cli", "report", store.path, "--run-modules", "-o", page_file]
+    subprocess.run(command, check=True)
+    assert mark.exists() and "cannot be drawn" not in page_file.read_text(encoding="utf-8")
 
 
 def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> None:
