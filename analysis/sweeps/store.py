@@ -299,3 +299,13 @@ def details(store: Store, key: str) -> dict[str, Any]:
     """Texts of a result: null directions, where the largest uncertainties stand, flags."""
     row = store.connection.execute("SELECT details FROM result WHERE key = ? AND block = 0", [key]).fetchone()
     return {} if row is None else dict(json.loads(row[0]))
+
+
+def all_details(store: Store, sweep: int) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Texts of the results of a sweep's cells, by number, in their order."""
+    rows = store.connection.execute(
+        "SELECT number, details FROM cell JOIN result ON result.key = cell.key AND block = 0 WHERE sweep = ? "
+        "ORDER BY number",
+        [sweep],
+    )
+    return ((number, json.loads(text)) for number, text in rows)

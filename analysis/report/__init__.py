@@ -1,0 +1,1 @@
+"""A sweep's results as a page and as tables, from its store alone."""

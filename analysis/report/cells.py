@@ -1,0 +1,58 @@
+"""Experiments of cells, made anew from the files in a store."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment
+from simulator.experiment.yamltree import Scalar, read_tree, walk
+
+from ..sweeps.bundle import MODULE, Bundle, unpack
+from ..sweeps.load import experiment_of, load_sweep
+from ..sweeps.store import Store, files
+from .results import Results
+
+KIND_WITH_CODE = "python"
+
+
+class NoExperimentError(Exception):
+    """A cell's experiment cannot be had; the text says why."""
+
+
+def experiments(store: Store, results: Results, cells: Sequence[int], run_modules: bool = False) -> list[Experiment]:
+    """Experiments of cells.
+
+    Error models of a user's own are Python code, which a store from elsewhere must not run unasked: only with
+    `run_modules` are they loaded.
+
+    :raises NoExperimentError: the files are not there, have changed their meaning, or would run code.
+    """
+    bundle = Bundle(results.definition["source"], results.definition["base"], files(store, results.number))
+    names = [name for name, _ in bundle.files]
+    if bundle.source not in names or bundle.base not in names:
+        raise NoExperimentError("the store does not hold the sweep's files")
+    if any(PurePosixPath(name).is_absolute() or ".." in name.split("/") or "\\" in name for name in names):
+        raise NoExperimentError("the store names files outside its own folder")
+    with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
+        try:
+            source = unpack(bundle, Path(folder))
+            if not run_modules and _has_code(bundle, Path(folder)):
+                text = "the experiment has an error model in Python, which is run only with --run-modules"
+                raise NoExperimentError(text)
+            sweep = load_sweep(source)
+            if len(sweep.cells) != len(results.cells):
+                raise NoExperimentError("the stored files make other cells than those stored")
+            return [experiment_of(sweep, cell) for cell in cells]
+        except ExperimentError as error:
+            raise NoExperimentError(error.messages[0].text) from None
+
+
+def _has_code(bundle: Bundle, folder: Path) -> bool:
+    """Whether anything that is loaded may run a module, from the store or elsewhere."""
+    if any(name.endswith(MODULE) for name, _ in bundle.files):
+        return True
+    roots = [read_tree(folder / PurePosixPath(name)) for name in (bundle.source, bundle.base)]
+    return any(isinstance(n, Scalar) and n.value == KIND_WITH_CODE for root in roots for _, n in walk(root))

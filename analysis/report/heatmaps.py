@@ -1,0 +1,115 @@
+"""Averages over each pair of axes: tables whose entries are shaded by their size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tables import number
+from .measures import Measure, uncertainty_measures
+from .results import Axis, Results, criterion
+from .tables import DIGITS, NOT_DONE, Entry
+
+# Values of an axis that are shown, shades that can be told apart, and pairs of axes.
+MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
+
+
+@dataclass(frozen=True)
+class Heat:
+    """A measure over two axes; `shades` from 0, the smallest, to SHADES - 1, or -1 where there is none."""
+
+    rows: Axis
+    columns: Axis
+    measure: Measure
+    row_labels: tuple[str, ...]
+    column_labels: tuple[str, ...]
+    entries: tuple[tuple[Entry, ...], ...]
+    shades: tuple[tuple[int, ...], ...]
+    note: str
+
+
+def heat_maps(results: Results) -> list[Heat]:
+    """A map of the averages that cells are judged by, for each pair of axes with few or with ordered values."""
+    judged = criterion(results)
+    measures = [m for m in uncertainty_measures(results) if judged is not None and m.figure == judged[0]]
+    if not measures:
+        return []
+    pairs = [
+        (i, j)
+        for i, j in combinations(range(len(results.axes)), 2)
+        if all(len(results.axes[k].labels) <= MOST_VALUES or results.axes[k].numbers for k in (i, j))
+        and min(len(results.axes[k].labels) for k in (i, j)) > 1
+    ]
+    return [_heat(results, i, j, measures[0]) for i, j in pairs[:MOST_PAIRS]]
+
+
+def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
+    rows, columns = results.axes[i], results.axes[j]
+    row_of, row_labels = _grouped(rows)
+    column_of, column_labels = _grouped(columns)
+    shape = len(row_labels), len(column_labels)
+    values = np.where(results.done, results.figure(measure.figure), np.nan)
+    place = row_of[results.chosen[:, i]] * shape[1] + column_of[results.chosen[:, j]]
+    members = _members(place, shape[0] * shape[1])
+    planned = np.bincount(row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members))
+    entries, medians = [], np.full(len(members), np.nan)
+    for k, rows_here in enumerate(members):
+        known = rows_here[np.isfinite(values[rows_here])]
+        if len(known):
+            medians[k] = np.median(values[known])
+        text = number(measure.factor * medians[k], DIGITS) if len(known) else "-" if len(rows_here) else NOT_DONE
+        if planned[k] == 1 and len(rows_here):
+            row = int(rows_here[0])
+            status = results.statuses[row]
+            is_done = status == "done"
+            value = float(values[row]) if is_done else None
+            cell = int(results.frame["cell"].to_numpy()[row])
+            entries.append(Entry(text if is_done else status, value, cell, measure.figure))
+        else:
+            entries.append(Entry(text if planned[k] else ""))
+    note = "" if planned.max() <= 1 else "Medians over all cells that share the two values."
+    return Heat(
+        rows,
+        columns,
+        measure,
+        row_labels,
+        column_labels,
+        tuple(tuple(entries[r * shape[1] : (r + 1) * shape[1]]) for r in range(shape[0])),
+        tuple(tuple(row) for row in _shades(medians).reshape(shape).tolist()),
+        note,
+    )
+
+
+def _members(place: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+    """Rows at each place."""
+    order = np.argsort(place, kind="stable")
+    return np.split(order, np.searchsorted(place[order], np.arange(1, count)))
+
+
+def _grouped(axis: Axis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """Place of each value in the map, and the labels there: neighbouring values together where there are many."""
+    count = len(axis.labels)
+    if count <= MOST_VALUES:
+        return np.arange(count), axis.short_labels
+    numbers = np.array(axis.numbers)
+    order = np.argsort(np.argsort(numbers, kind="stable"), kind="stable")
+    group = order * MOST_VALUES // count
+    ends = [(numbers[group == k].min(), numbers[group == k].max()) for k in range(MOST_VALUES)]
+    return group, tuple(f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends)
+
+
+def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Shades by size, on a logarithmic scale where all are above zero."""
+    finite = np.isfinite(values)
+    found = np.full(len(values), -1)
+    if not finite.any():
+        return found
+    scaled = np.log(values[finite]) if values[finite].min() > 0 else values[finite]
+    low, size = scaled.min(), np.ptp(scaled)
+    # Equal values but for rounding have no order to show.
+    share = (scaled - low) / size if size > 1e-9 else np.zeros(len(scaled))
+    found[finite] = np.minimum((share * SHADES).astype(int), SHADES - 1)
+    return found

@@ -1,0 +1,156 @@
+"""A design as it stands in the machine, seen from the front and above: outlines, balls, styli."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.design import Design, locations, nominal_state
+from simulator.machines.protocol import Array
+
+# The eye: turned about z, then raised, in degrees.
+TURN, RISE = -35.0, 24.0
+
+# Balls of a position that are drawn; of more, every so many.
+MOST_BALLS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A position on the paper: outline (k, 2), balls that are read (m, 2), styli (n, 2, 2) from tip to reference point.
+
+    `number` counts from 1 in the order of the file; `depth` is larger for what stands further back.
+    """
+
+    number: int
+    name: str
+    artefact: str
+    probes: tuple[str, ...]
+    outline: Array
+    balls: Array
+    styli: Array
+    depth: float
+    read: int
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A design on the paper, in metres: edges (k, 2, 2) of the volume, hidden ones marked, and positions, rear first.
+
+    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, `tips` the probes' tips
+    about the reference point.
+    """
+
+    edges: Array
+    hidden: NDArray[np.bool_]
+    places: tuple[Place, ...]
+    axes: tuple[tuple[str, Array, float, float], ...]
+    tips: tuple[tuple[str, Array], ...]
+
+
+def scene(design: Design) -> Scene:
+    """The scene of a design; one in two dimensions is seen from above."""
+    view, towards = _view(design.dimension)
+    edges, hidden = _box(design.lower, design.upper, towards)
+    where = locations(design, nominal_state(design), design.readings)
+    places = []
+    for k, name in enumerate(design.position_names):
+        mine = np.flatnonzero(design.readings.position == k)
+        if not len(mine):
+            continue
+        balls = where[mine]
+        _, first = np.unique(design.readings.ball[mine], return_index=True)
+        kept = first[:: -(-len(first) // MOST_BALLS)]
+        used = np.unique(design.readings.probe[mine])
+        # All styli at the ball nearest to the middle, where they hide least.
+        middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
+        styli = np.stack([np.stack([middle, middle - design.probes[probe]]) for probe in used])
+        places.append(
+            Place(
+                k + 1,
+                name,
+                design.artefact_names[design.position_artefact[k]],
+                tuple(design.probe_names[probe] for probe in used),
+                hull(balls @ view.T),
+                balls[kept] @ view.T,
+                styli @ view.T,
+                float(balls.mean(axis=0) @ towards) if design.dimension == 3 else 0.0,
+                len(first),
+            )
+        )
+    places.sort(key=lambda place: -place.depth)
+    tips = tuple((name, view @ offset) for name, offset in zip(design.probe_names, design.probes, strict=True))
+    return Scene(edges @ view.T, hidden, tuple(places), _axes(design, view), tips)
+
+
+def _view(dimension: int) -> tuple[Array, Array]:
+    """Projection (2, d) on the paper, and the direction (d,) away from the eye."""
+    if dimension == 2:
+        return np.eye(2), np.zeros(2)
+    turn, rise = np.radians([TURN, RISE])
+    right = np.array([np.cos(turn), -np.sin(turn), 0.0])
+    away = np.array([np.sin(turn) * np.cos(rise), np.cos(turn) * np.cos(rise), -np.sin(rise)])
+    up = np.cross(right, away)
+    return np.stack([right, up]), away
+
+
+def _box(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Edges of the volume, and which are behind it."""
+    d = len(lower)
+    corners = np.array(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij")).reshape(d, -1).T
+    edges = [(one, other) for k, one in enumerate(corners) for other in corners[k + 1 :] if (one != other).sum() == 1]
+    if d == 2:
+        return np.array(edges), np.zeros(len(edges), bool)
+    rear = corners[(corners @ away).argmax()]
+    hidden = [bool((one == rear).all() or (other == rear).all()) for one, other in edges]
+    return np.array(edges), np.array(hidden)
+
+
+def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
+    """Axes along the edges that stand outermost on the paper: x and y below, z on the left."""
+    lower, upper = design.lower, design.upper
+    starts = [lower.copy() for _ in range(design.dimension)]
+    if design.dimension == 3:
+        # The vertical edge at the left, the lower one at the right.
+        left = min(
+            ([x, y] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])),
+            key=lambda corner: float((view @ [*corner, lower[2]])[0]),
+        )
+        starts[2][:2] = left
+        front = min((lower[1], upper[1]), key=lambda y: float((view @ [lower[0], y, lower[2]])[1]))
+        starts[0][1] = front
+        side = min((lower[0], upper[0]), key=lambda x: float((view @ [x, lower[1], lower[2]])[1]))
+        starts[1][0] = side
+    found = []
+    for k, start in enumerate(starts):
+        end = start.copy()
+        start[k], end[k] = lower[k], upper[k]
+        found.append(("xyz"[k], np.stack([view @ start, view @ end]), float(lower[k]), float(upper[k])))
+    return tuple(found)
+
+
+def hull(points: Array) -> Array:
+    """Corners of the convex hull of points (n, 2) counter-clockwise, by Andrew's chain.
+
+    >>> hull(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.1], [1.0, 1.0], [0.0, 1.0]])).tolist()
+    [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    """
+    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    ordered = np.unique(points, axis=0)
+    if len(ordered) < 3:
+        return ordered
+
+    def chain(one_way: Array) -> list[Array]:
+        kept: list[Array] = []
+        for point in one_way:
+            while len(kept) > 1:
+                (a, b), (c, d) = kept[-1] - kept[-2], point - kept[-2]
+                if a * d - b * c > 1e-12 * size * size:
+                    break
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    return np.array(chain(ordered) + chain(ordered[::-1]))

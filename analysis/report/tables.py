@@ -1,0 +1,178 @@
+"""The tables of a report, before any of the forms that they are written in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..montecarlo.figures import Figure
+from ..montecarlo.tables import with_error
+from ..tables import number
+from .measures import (
+    Measure,
+    descriptions,
+    rank_measures,
+    symbol_column,
+    trial_measures,
+    uncertainty_measures,
+)
+from .results import Results
+
+DIGITS = 3
+
+# Columns beside each other, blocks below each other and rows of a table that can still be read.
+MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
+
+NOT_DONE = "left"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A place in a table; `value` is the figure of the cell as it is stored, None where a text stands alone."""
+
+    text: str
+    value: float | None = None
+    cell: int | None = None
+    figure: str = ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row: what it is about, then its entries."""
+
+    headings: tuple[str, ...]
+    entries: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows that belong together; `title` is empty where a table has no blocks."""
+
+    title: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    `headings` stand above what rows are about, `columns` above the entries, `spanner` above all of these, and `block`
+    says what the blocks' titles are values of.
+    """
+
+    name: str
+    caption: str
+    headings: tuple[str, ...]
+    columns: tuple[str, ...]
+    blocks: tuple[Block, ...]
+    spanner: str = ""
+    block: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return sum(len(block.rows) for block in self.blocks)
+
+
+def report_tables(results: Results) -> tuple[Table, ...]:
+    """All tables of figures: the uncertainties and, where trials were made, those of Monte Carlo."""
+    beside = _is_beside(results)
+    measures = [*rank_measures(results), *uncertainty_measures(results, beside)]
+    found = [_table(results, "uncertainties", "Standard uncertainties", measures, beside)] if measures else []
+    of_trials = trial_measures(results, beside)
+    if of_trials:
+        caption = "Monte Carlo beside the uncertainties"
+        note = (
+            "In parentheses the standard error in units of the last digit; actual is the root mean square of the "
+            "errors, averaged as U is; covered is the share of true values within the expanded uncertainty for 95 %."
+        )
+        found.append(_table(results, "monte-carlo", caption, of_trials, beside, (note,)))
+    return tuple(found)
+
+
+def _is_beside(results: Results) -> bool:
+    """Whether cells fit beside each other: one axis as columns, another as blocks."""
+    counts = [len(axis.labels) for axis in results.axes]
+    return (
+        len(counts) <= 2
+        and counts[-1] <= MOST_COLUMNS
+        and (len(counts) == 1 or counts[0] <= MOST_BLOCKS)
+        and len(results.cells) <= MOST_ROWS
+    )
+
+
+def _table(
+    results: Results,
+    name: str,
+    caption: str,
+    measures: Sequence[Measure],
+    beside: bool,
+    notes: tuple[str, ...] = (),
+) -> Table:
+    words = (*notes, *([f"{'; '.join(descriptions(measures))}."] if descriptions(measures) else []))
+    build = _beside if beside else _below
+    return build(results, name, caption, measures, words)
+
+
+def _beside(results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]) -> Table:
+    """A column for each value of the last axis, a block for each of the first where there are two."""
+    cells = {tuple(choice): cell for cell, choice in enumerate(results.cells.tolist())}
+    rows = {int(cell): row for row, cell in enumerate(results.frame["cell"])}
+    axis = results.axes[-1]
+    firsts = range(len(results.axes[0].labels)) if len(results.axes) == 2 else [None]
+    blocks = []
+    for first in firsts:
+        found = []
+        for measure in measures:
+            entries = []
+            for last in range(len(axis.labels)):
+                cell = cells.get((last,) if first is None else (first, last))
+                entries.append(Entry("") if cell is None else _entry(results, measure, cell, rows.get(cell)))
+            found.append(Row((measure.name, measure.unit), tuple(entries)))
+        title = "" if first is None else f"{results.axes[0].name} {results.axes[0].labels[first]}"
+        if any(entry.text for row in found for entry in row.entries):
+            blocks.append(Block(title, tuple(found)))
+    block = "" if len(results.axes) == 1 else results.axes[0].name
+    return Table(name, caption, ("", "unit"), axis.labels, tuple(blocks), axis.name, block, notes)
+
+
+def _below(results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]) -> Table:
+    """A row for each cell, as far as they can be read."""
+    found = []
+    for row in range(min(len(results.frame), MOST_ROWS)):
+        cell = int(results.frame["cell"].to_numpy()[row])
+        labels = tuple(axis.labels[k] for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True))
+        entries = tuple(_entry(results, measure, cell, row) for measure in measures)
+        found.append(Row((str(cell), *labels), entries))
+    more = len(results.frame) - len(found)
+    if more > 0:
+        notes = (f"{more} cells more are not shown here; ballplate export gives all.", *notes)
+    headings = ("cell", *(axis.name for axis in results.axes))
+    columns = tuple(measure.title for measure in measures)
+    return Table(name, caption, headings, columns, (Block("", tuple(found)),), notes=notes)
+
+
+def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> Entry:
+    if row is None:
+        return Entry(NOT_DONE, None, cell, measure.figure)
+    if results.statuses[row] != "done":
+        return Entry(results.statuses[row], None, cell, measure.figure)
+    value = results.value(measure.figure, row)
+    if math.isnan(value) and not _is_open(results, measure, row):
+        # Not recorded of this cell, as opposed to undetermined.
+        return Entry("", value, cell, measure.figure)
+    if measure.is_count:
+        text = "-" if math.isnan(value) else f"{value:.0f}"
+    elif measure.error:
+        text = with_error(Figure(value, results.value(measure.error, row)), measure.factor)
+    else:
+        text = number(measure.factor * value, DIGITS)
+    return Entry(text, value, cell, measure.figure)
+
+
+def _is_open(results: Results, measure: Measure, row: int) -> bool:
+    """Whether the observations of a cell leave open all that a measure tells of."""
+    column = f"{symbol_column(measure.symbol)}_undetermined"
+    return column in results.frame and results.value(column, row) > 0
