@@ -24,7 +24,8 @@ KINDS: tuple[tuple[Unit, Callable[[object], float]], ...] = (
 def label(node: Node) -> str:
     """A value as a short text.
 
-    >>> label(Sequence(Mark("", 1, 1), (Scalar(Mark("", 1, 1), 5), Scalar(Mark("", 1, 1), "750 mm"))))
+    >>> from simulator.experiment.yamltree import parse_tree
+    >>> label(parse_tree("[5, 750 mm]", ""))
     '[5, 750 mm]'
     """
     return shorten(_text(to_python(node)), 200)
