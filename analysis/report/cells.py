@@ -34,11 +34,12 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
     names = [name for name, _ in bundle.files]
     if bundle.source not in names or bundle.base not in names:
         raise NoExperimentError("the store does not hold the sweep's files")
-    if any(PurePosixPath(name).is_absolute() or ".." in name.split("/") or "\\" in name for name in names):
-        raise NoExperimentError("the store names files outside its own folder")
     with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
         try:
             source = unpack(bundle, Path(folder))
+        except ValueError as error:
+            raise NoExperimentError(f"the store is not to be trusted: {error}") from None
+        try:
             if not run_modules and _has_code(bundle, Path(folder)):
                 text = "the experiment has an error model in Python, which is run only with --run-modules"
                 raise NoExperimentError(text)

@@ -73,9 +73,15 @@ def _named(folder: Path, text: str) -> Iterator[Path]:
 
 
 def unpack(bundle: Bundle, folder: Path) -> Path:
-    """Write the files below a folder and return the sweep file there."""
+    """Write the files below a folder and return the sweep file there.
+
+    :raises ValueError: a path that leads out of the folder.
+    """
     for name, content in bundle.files:
-        path = folder / PurePosixPath(name)
+        place = PurePosixPath(name)
+        if place.is_absolute() or ".." in place.parts or "\\" in name:
+            raise ValueError(f'"{name}" leads out of the folder')
+        path = folder / place
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     return folder / PurePosixPath(bundle.source)

@@ -188,7 +188,7 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
             store.connection.execute("DELETE FROM bundle")
             rows = [(1, "made-up.yaml", b""), (1, "base.yaml", b""), (1, name, b"x")]
             store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
-        with pytest.raises(NoExperimentError, match="outside"):
+        with pytest.raises(NoExperimentError, match="leads out of the folder"):
             experiments(store, read_results(store, 1), [0])
         assert not (tmp_path / "out.yaml").exists()
 
