@@ -59,6 +59,13 @@ def message_at(source: Path, steps: Steps, text: str) -> Message:
 
 def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
     """Return the experiment of a tree without variants and no messages, or None and what is wrong."""
+    try:
+        return _build(root, source, name)
+    except ExperimentError as too_many:
+        return None, list(too_many.messages)
+
+
+def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
     problems = Problems(root)
     sections = validate_sections(root, problems)
     references = resolve_references(sections, source.parent, problems)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..geometry.artefacts import MOST_BALLS, ArtefactSettings, BallLayout, BallsSettings, coincident_balls
 from ..quantities import format_length
-from ..settings import hint, listing
+from ..settings import hint, listing, shorten
 from .messages import ExperimentError, Steps
 from .model import Floats, Indices
 from .problems import Problems, written, written_keys, written_text
@@ -70,23 +70,25 @@ class References:
                 choice = listing(self.probes)
                 self.problems.add((*steps, "probes"), f'missing; add "probes", some of: {choice}')
             return self.probes if len(self.probes) == 1 else None
-        found = [self._once("probe", self.probes, names, (*steps, "probes"), i) for i in range(len(names))]
-        return names if all(found) else None
+        return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
     def ball_indices(self, names: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
         """Return the indices of listed balls, or None after saying what is wrong."""
-        found = [self._once("ball", layout.names, names, steps, i) for i in range(len(names))]
         index = {name: i for i, name in enumerate(layout.names)}
-        return np.array([index[name] for name in names], dtype=np.intp) if all(found) else None
+        if not self._known_once("ball", index, names, steps):
+            return None
+        return np.array([index[name] for name in names], dtype=np.intp)
 
-    def _once(self, what: str, known: Sequence[str], names: Sequence[str], steps: Steps, i: int) -> bool:
-        if names[i] not in known:
-            self.problems.add((*steps, i), f'unknown {what} "{names[i]}"; {hint(names[i], known)}')
-            return False
-        if names[i] in names[:i]:
-            self.problems.add((*steps, i), f'{what} "{names[i]}" is listed twice; remove one of the two')
-            return False
-        return True
+    def _known_once(self, what: str, known: Collection[str], names: Sequence[str], steps: Steps) -> bool:
+        seen: set[str] = set()
+        before = len(self.problems.messages)
+        for i, name in enumerate(names):
+            if name not in known:
+                self.problems.add((*steps, i), f'unknown {what} "{shorten(name)}"; {hint(name, known)}')
+            elif name in seen:
+                self.problems.add((*steps, i), f'{what} "{shorten(name)}" is listed twice; remove one of the two')
+            seen.add(name)
+        return len(self.problems.messages) == before
 
     def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
         """Say what is wrong unless it is right; return whether it is."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from ..quantities import LENGTH_UNITS, QuantityError, exact_number
+from ..quantities import LENGTH_UNITS, QuantityError, exact_quantity
 from ..settings import hint, listing, shorten
-from .messages import ExperimentError, Message
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .yamltree import Mark, read_text
 
 CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
@@ -57,6 +57,9 @@ def read_table(
     rows = []
     for number, line in lines[1 : MOST_ROWS + 1]:
         mark = Mark(file, number, 1)
+        if len(messages) >= MOST_MESSAGES:
+            messages.append(mark.message("", ENOUGH))
+            break
         cells = _cells(line)
         if cells is None or len(cells) != len(places):
             messages.append(mark.message("", _wrong_count(line, cells, len(places))))
@@ -66,7 +69,7 @@ def read_table(
         for name in (*lengths, *optional):
             column, cell = by_name.get(name, (1, "0"))
             try:
-                row_lengths.append(float(exact_number(cell) * factors.get(name, Fraction(1))))
+                row_lengths.append(float(exact_quantity(cell, factors.get(name, Fraction(1)))))
             except QuantityError as error:
                 messages.append(Mark(file, number, column).message("", _wrong_number(cell, name) or str(error)))
                 row_lengths.append(float("nan"))

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from ..settings import describe, hint, listing, shorten
-from .messages import Steps
+from .messages import MOST_MESSAGES, Steps
 from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python
 
 Schema = AnyMapping[str, Any]
@@ -49,7 +49,8 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
     """Explain errors of validating ``node``; ``schema`` is the JSON schema of what it should be."""
     explanations: list[Explanation] = []
     choices: dict[Steps, dict[str, list[tuple[Explanation, bool]]]] = {}
-    for error in errors:
+    # What is explained beyond would not be told.
+    for error in errors[: 2 * MOST_MESSAGES]:
         place = _place(error, node)
         # Pydantic counts entries that are wrong in themselves as missing.
         items = getattr(place.node, "items", ())
