@@ -213,7 +213,7 @@ def parse_length_function(value: object) -> LengthFunction:
         )
     if not 1 <= divisor <= 1 / SMALLEST:
         raise QuantityError(
-            f'"{shorten(value)}" grows too fast or too slowly; divide L by 1 to {1 / float(SMALLEST):g}, or leave it out'
+            f'"{shorten(value)}" grows too fast or too slowly; divide L by 1 to {float(1 / SMALLEST):g}'
         )
     return LengthFunction(constant, float(1 / divisor))
 

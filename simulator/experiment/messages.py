@@ -46,13 +46,18 @@ class ExperimentError(Exception):
         return type(self), (self.messages,)
 
 
+def _by_number(found: re.Match[str]) -> str:
+    number = ord(found[0])
+    return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
+
+
 def in_one_line(text: str) -> str:
     r"""Write characters that are no part of a line by their numbers.
 
     >>> in_one_line("a\nb")
     'a\\x0ab'
     """
-    return UNPRINTABLE.sub(lambda found: f"\\x{ord(found[0]):02x}" if found[0] < "\xa0" else ascii(found[0])[1:-1], text)
+    return UNPRINTABLE.sub(_by_number, text)
 
 
 def format_path(steps: Iterable[Step]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,17 @@ from .yamltree import Sequence as SequenceNode
 
 DEFAULT_PROBE = "probe"
 
+# Of all artefacts together, and of all positions with their repeats: about what a gigabyte has room for.
+MOST_BALLS_OF_ALL = 100_000
+MOST_READINGS = 2_000_000
+
+
+@dataclass
+class Tally:
+    """What has been counted so far."""
+
+    readings: int = 0
+
 
 @dataclass(frozen=True, eq=False)
 class References:
@@ -39,6 +50,19 @@ class References:
     artefact_names: tuple[str, ...]
     artefacts: dict[str, ArtefactSettings]
     layouts: dict[str, BallLayout]
+    tally: Tally = field(default_factory=Tally)
+
+    def count_readings(self, count: int, steps: Steps) -> bool:
+        """Count further readings; tell whether there is room for them, after saying once that there is not."""
+        before = self.tally.readings
+        self.tally.readings += count
+        if before <= MOST_READINGS < self.tally.readings:
+            text = (
+                f"there are {self.tally.readings} readings up to here, repeats counted; at most {MOST_READINGS} are "
+                "possible: read fewer balls, or less often"
+            )
+            self.problems.add(steps, text)
+        return self.tally.readings <= MOST_READINGS
 
     def artefact(self, name: str | None, steps: Steps) -> str | None:
         """Return the artefact that a position or calibration is about, or None after saying what is wrong."""
@@ -106,12 +130,18 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
         probes = (DEFAULT_PROBE,)
     artefacts: dict[str, ArtefactSettings] = {}
     layouts: dict[str, BallLayout] = {}
+    balls = 0
     for key, settings in sections.entries("artefacts").items():
         name, steps = str(key), ("artefacts", str(key))
         listed = _with_coordinates(settings, folder, steps, problems)
         if listed is None:
             continue
         layout = listed.layout()
+        balls += len(layout.names)
+        if balls > MOST_BALLS_OF_ALL:
+            text = f"there are {balls} balls up to here; at most {MOST_BALLS_OF_ALL} of all artefacts are possible"
+            problems.add(steps, text)
+            break
         twins = coincident_balls(layout)
         for i, j in twins[:3]:
             text = f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct one of them'

@@ -96,7 +96,8 @@ def _place(error: ErrorDetails, root: Node) -> _Place:
     for i, step in enumerate(error["loc"]):
         is_last = i == len(error["loc"]) - 1
         below = child(node, step)
-        if isinstance(step, str) and step.startswith("<"):
+        # The tag of a form, unless the file has such a key.
+        if below is None and isinstance(step, str) and step.startswith("<"):
             continue
         if not tagged and isinstance(node, Mapping) and _kind(node) == step:
             tagged = True
@@ -154,6 +155,8 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         return Explanation(steps, f"{describe(value)} is out of range; give one {word} {context[bound]}")
     if kind == "finite_number":
         return Explanation(steps, f"{describe(value)} is not finite; give a finite number")
+    if kind == "string_pattern_mismatch":
+        return Explanation(steps, f"{describe(value)} holds a control character; remove it")
     if kind == "value_error":
         return Explanation(steps, str(context["error"]))
     return Explanation(steps, error["msg"][:1].lower() + error["msg"][1:])

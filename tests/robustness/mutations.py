@@ -390,7 +390,9 @@ TEXT_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
     "tabs": lambda _, content: content.replace(b"  ", b"\t"),
     "NUL at the end": lambda _, content: content + b"\0",
     "twice": lambda _, content: content + b"---\n" + content,
-    "YAML version": lambda random, content: random.choice((b"%YAML 1.1\n---\n", b"%YAML 3.0\n---\n", b"%A b\n")) + content,
+    "YAML version": lambda random, content: (
+        random.choice((b"%YAML 1.1\n---\n", b"%YAML 3.0\n---\n", b"%A b\n")) + content
+    ),
     "one line": lambda _, content: content.replace(b"\n", b" "),
     "emptied": lambda random, _: random.choice((b"", b"\n", b"# nothing\n", b"---\n", b"null", b"...", b"\0")),
 }
@@ -441,6 +443,103 @@ def mutants(files: Sequence[Path], words: Vocabulary, seed: int, numbers: range)
     """Mutants of the files, one for each number."""
     for number in numbers:
         yield mutant(files, words, seed, number)
+
+
+def _by_cells(change: Callable[[Random, list[list[bytes]]], None]) -> Callable[[Random, bytes], bytes]:
+    def changed(random: Random, content: bytes) -> bytes:
+        rows = [line.split(b",") for line in content.splitlines()] or [[b""]]
+        change(random, rows)
+        return b"\n".join(b",".join(row) for row in rows) + b"\n"
+
+    return changed
+
+
+def _column(random: Random, rows: list[list[bytes]]) -> int:
+    return random.randrange(len(rows[0]))
+
+
+def _column_away(random: Random, rows: list[list[bytes]]) -> None:
+    at = _column(random, rows)
+    rows[:] = [row[:at] + row[at + 1 :] or [b""] for row in rows]
+
+
+def _column_twice(random: Random, rows: list[list[bytes]]) -> None:
+    at = _column(random, rows)
+    rows[:] = [row[: at + 1] + row[at:] for row in rows]
+
+
+def _columns_exchanged(random: Random, rows: list[list[bytes]]) -> None:
+    at, to = _column(random, rows), _column(random, rows)
+    for row in rows if random.random() < 0.5 else rows[:1]:
+        if max(at, to) < len(row):
+            row[at], row[to] = row[to], row[at]
+
+
+def _heading(random: Random, rows: list[list[bytes]]) -> None:
+    names = (b"u_um", b"x_MM", b"x", b"x_in", b"x_m", b"probe", b"", b"x_um", b"y_pm", b"position", b'"x_mm"', b"\x1b")
+    rows[0][_column(random, rows)] = random.choice(names)
+
+
+CELLS = (
+    *(b"", b"nan", b"inf", b"1e300", b"1e-300", b"1e999999", b"-1e9", b"0", b"9" * 5000, b"1e6", b"-500", b"1;5"),
+    *(b'"', b'""', b'"a', b'a"b', b'"1,5"', b"1,5", b"0x10", b"1_0", b"\xd9\xa1", b"\xe2\x80\xa8", b"\0", b"\xff"),
+    *(b"# comment", b"x" * 100_000, b"r1c1", b"\r", b"\n", b"\t", b" ", b"=1+1", b"a", b"z low", b"down"),
+)
+
+
+def _cell(random: Random, rows: list[list[bytes]]) -> None:
+    for _ in range(random.choice((1, 1, 5))):
+        row = random.choice(rows)
+        row[random.randrange(len(row))] = random.choice(CELLS)
+
+
+def _column_of_one(random: Random, rows: list[list[bytes]]) -> None:
+    at, cell = _column(random, rows), random.choice(CELLS)
+    for row in rows[1:]:
+        if at < len(row):
+            row[at] = cell
+
+
+def _column_added(random: Random, rows: list[list[bytes]]) -> None:
+    cell = random.choice((b"0.2", b"0", b"1e-300", b"1e-12", b"1e12", b"1000000", b"a"))
+    rows[:] = [[*rows[0], b"u_um"], *([*row, cell] for row in rows[1:])]
+
+
+def _rows_mixed(random: Random, rows: list[list[bytes]]) -> None:
+    below = rows[1:]
+    random.shuffle(below)
+    rows[1:] = below[: random.choice((0, 1, 3, len(below), len(below)))]
+
+
+TABLE_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
+    "column away": _by_cells(_column_away),
+    "column twice": _by_cells(_column_twice),
+    "columns exchanged": _by_cells(_columns_exchanged),
+    "heading": _by_cells(_heading),
+    "cells": _by_cells(_cell),
+    "column of one value": _by_cells(_column_of_one),
+    "uncertainties": _by_cells(_column_added),
+    "rows mixed": _by_cells(_rows_mixed),
+    "decimal commas": lambda _, content: content.replace(b".", b","),
+    "semicolons": lambda _, content: content.replace(b",", b";"),
+    "tabs between": lambda _, content: content.replace(b",", b"\t"),
+    "in quotes": lambda _, content: b'"' + content.replace(b",", b'","').replace(b"\n", b'"\n"'),
+    "a million columns": lambda random, content: random.choice((b",", b"a,", b"x_mm,")) * 10**6 + content,
+    "a thousand copies": lambda _, content: content * 1000,
+}
+
+
+def table_mutants(tables: Sequence[Path], seed: int, numbers: range) -> Iterator[Mutant]:
+    """Mutants of comma-separated tables, one for each number."""
+    for number in numbers:
+        random = Random(f"{seed}-{number}")
+        origin = random.choice(tables)
+        content, changes = origin.read_bytes(), list[str]()
+        for _ in range(random.choice((1, 1, 2))):
+            every = TABLE_CHANGES if random.random() < 0.7 else TEXT_CHANGES
+            changes.append(random.choice(list(every)))
+            content = every[changes[-1]](random, content)
+        yield Mutant(origin, number, tuple(changes), content)
 
 
 def trees(words: Vocabulary) -> st.SearchStrategy[Any]:

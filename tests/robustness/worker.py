@@ -59,7 +59,10 @@ def complaint(arguments: Sequence[str], files: Path) -> str | None:
     # Every kind of line end counts.
     lines = err.splitlines()
     # What was expected is what would be right.
-    form = re.compile(re.escape(str(files)) + r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*")
+    form = re.compile(
+        re.escape(str(files))
+        + r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*"
+    )
     ill = [line for line in lines if not form.fullmatch(line) or any(category(letter) in CONTROL for letter in line)]
     if not lines:
         return "status 3, and no error"
