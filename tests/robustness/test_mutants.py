@@ -100,6 +100,7 @@ def test_some_trees(folder: Path) -> None:
     try_trees(60, folder)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("trial", "files", "numbers"),
@@ -113,11 +114,13 @@ def test_many_mutants(trial: Any, files: list[Path], numbers: range, folder: Pat
     try_experiments(trial, files, numbers, folder)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_many_tables_of_readings(folder: Path) -> None:
     try_readings(range(1000), folder)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_many_trees(folder: Path) -> None:
     try_trees(1000, folder)
