@@ -21,6 +21,7 @@ Trial = Callable[[Path], str | None]
 """Tries a file and says what is wrong with what came of it, None where nothing is."""
 
 GIGABYTE = 2**30
+WAIT = 6.0
 
 # Control characters, half characters, and ends of lines and paragraphs.
 CONTROL = ("Cc", "Cs", "Zl", "Zp")
@@ -76,7 +77,7 @@ def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) ->
     import analysis.study  # noqa: F401
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGALRM, _out_of_time)
+    signal.signal(signal.SIGPROF, _out_of_time)
     warnings.simplefilter("error")
     trial(Path(connection.recv()))
     if sys.platform == "linux":
@@ -90,16 +91,16 @@ def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) ->
         path = connection.recv()
         if path is None:
             return
-        signal.setitimer(signal.ITIMER_REAL, seconds)
+        signal.setitimer(signal.ITIMER_PROF, seconds)
         try:
             found = trial(Path(path))
         except OutOfTimeError:
-            found = f"more than {seconds} s:\n{traceback.format_exc()[-3000:]}"
+            found = f"more than {seconds} s of processor time:\n{traceback.format_exc()[-3000:]}"
         except BaseException:
             found = traceback.format_exc()
             found = found if len(found) < 5000 else f"{found[:1000]}\n…\n{found[-3500:]}"
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.setitimer(signal.ITIMER_PROF, 0)
         connection.send((found, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024))
 
 
@@ -108,7 +109,11 @@ def _out_of_time(*_: Any) -> None:
 
 
 class Worker:
-    """A process that tries one file after the other; `warm_up` is a good file, tried before bounds are set."""
+    """A process that tries one file after the other; `warm_up` is a good file, tried before bounds are set.
+
+    `seconds` are of processor time, which does not depend on what else the computer does; the process is waited for
+    six times as long.
+    """
 
     def __init__(self, trial: Trial, warm_up: Path, seconds: float = 10.0, memory: int = GIGABYTE) -> None:
         self.trial, self.warm_up, self.seconds, self.memory = trial, warm_up, seconds, memory
@@ -130,7 +135,7 @@ class Worker:
         self.connection.send(str(path))
         found: str | None
         try:
-            if self.connection.poll(2.0 * self.seconds + 10.0):
+            if self.connection.poll(WAIT * self.seconds):
                 found, peak = self.connection.recv()
                 self.peak = max(self.peak, peak)
                 if peak > self.memory:
@@ -139,7 +144,7 @@ class Worker:
                     self._start()
                     found = found or f"{peak / GIGABYTE:.2f} GB of memory"
                 return found
-            found = f"no answer after {2.0 * self.seconds + 10.0} s"
+            found = f"no answer after {WAIT * self.seconds} s"
         except EOFError:
             found = "the process has died"
         self._stop()
