@@ -11,7 +11,7 @@ from ..machines.kinematic import TRANSLATIONS
 from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_quantity
 from ..settings import hint, listing, shorten
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from .tables import _cells
+from .tables import _cells, refuse_columns
 from .yamltree import Mark, read_text
 
 POSITION = "position"
@@ -70,6 +70,7 @@ def _columns(mark: Mark, header: str) -> tuple[list[str], list[Fraction]]:
     messages: list[Message] = []
     names: list[str] = []
     factors: list[Fraction] = []
+    refuse_columns(mark, header, EXAMPLE)
     for column, cell in _cells(header) or []:
         place = Mark(mark.file, mark.line, column)
         name, _, unit = cell.rpartition("_")

@@ -15,6 +15,8 @@ from .yamltree import Mark, read_text
 
 CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
 MOST_ROWS = 1_000_000
+# Far more than there are names for.
+MOST_COLUMNS = 1000
 
 
 @dataclass(frozen=True)
@@ -86,13 +88,25 @@ def read_table(
     return tuple(rows)
 
 
+def refuse_columns(mark: Mark, header: str, example: str) -> None:
+    """Refuse a first line of so many columns that saying what is wrong with each would take long.
+
+    :raises ExperimentError: there are more than a thousand.
+    """
+    count = header.count(",") + 1
+    if count > MOST_COLUMNS:
+        text = f"{count} columns are too many; the first line should be {example}"
+        raise ExperimentError([mark.message("", text)])
+
+
 def column_names(path: Path) -> tuple[str, ...]:
     """Names of a table's columns without their units; none where the file has no line.
 
     :raises ExperimentError: the file cannot be read.
     """
     lines = (line for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    cells = _cells(next(lines, "")) or []
+    header = next(lines, "")
+    cells = _cells(header) or [] if header.count(",") < MOST_COLUMNS else []
     return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
 
 
@@ -130,6 +144,7 @@ def _columns(
     messages: list[Message] = []
     names: list[str] = []
     factors: dict[str, Fraction] = {}
+    refuse_columns(mark, header, example)
     cells = _cells(header) or []
     if len(cells) == 1 and re.search("[;\t]", header):
         raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])

@@ -152,6 +152,17 @@ def test_a_table_of_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
     assert refusals(tmp_path, text)[-1].endswith("balls.csv:502:1: more than 1000 errors; mend these first")
 
 
+def test_tables_of_a_million_columns(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("x_mm," * 10**6 + "\n1,2\n")
+    text = replaced("{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: t.csv}")
+    text += "true_machine: {kind: curves, files: [t.csv]}\n"
+    lines = refusals(tmp_path, text)
+    assert lines == [
+        f"{tmp_path}/t.csv:1:1: 1000001 columns are too many; the first line should be {example}"
+        for example in ("ball,x_mm,y_mm", "position_mm,EXX_um,EYX_um,EAX_urad")
+    ]
+
+
 def test_names_with_ends_of_lines_and_control_characters(tmp_path: Path) -> None:
     text = replaced("name: low,", r'name: low, artefact: "a\n\e[31m\u2028b",')
     (line,) = refusals(tmp_path, text)
