@@ -125,7 +125,7 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
 def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
     """Refuse readings that lie outside the volume by more than its own size: their unit is not what it says."""
     size = float((design.upper - design.lower).max())
-    messages = []
+    messages: list[Message] = []
     for i, axis in np.argwhere((x < design.lower - size) | (x > design.upper + size)).tolist():
         if len(messages) >= MOST_MESSAGES:
             messages.append(rows[i].mark.message("", ENOUGH))
