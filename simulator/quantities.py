@@ -86,16 +86,18 @@ def exact_number(text: str) -> Fraction:
     return Fraction(decimal)
 
 
-def exact_quantity(number: str, factor: Fraction, kind: str = "length") -> Fraction:
-    """Read a decimal number of a unit, and return it in metres or radians.
+def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> float:
+    """Read a decimal number of a unit that is `factor` metres or radians; the result is the nearest float.
 
     :raises QuantityError: not a decimal number, or more or less than there is.
 
-    >>> exact_quantity("750", LENGTH_UNITS["mm"])
-    Fraction(3, 4)
+    >>> metres_or_radians("750", LENGTH_UNITS["mm"])
+    0.75
     """
-    value = exact_number(number) * factor
-    if value and not SMALLEST <= abs(value) <= LARGEST:
+    exact = exact_number(number) * factor
+    # Compared as a float, which takes a fraction of the time: tables have millions of numbers.
+    value = float(exact)
+    if exact and not float(SMALLEST) <= abs(value) <= LARGEST:
         unit = BASE_UNITS[kind]
         raise QuantityError(
             f'"{number}" is beyond what can be computed with; '
@@ -245,7 +247,7 @@ def _parse(value: object, kind: str) -> float:
                     f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example "{example}"'
                 )
         raise QuantityError(f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}')
-    return float(exact_quantity(number, units[plain], kind))
+    return metres_or_radians(number, units[plain], kind)
 
 
 def _positive(value: object, length: float) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..machines.curves import NAMES, Points
 from ..machines.kinematic import TRANSLATIONS
-from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_quantity
+from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .tables import _cells, refuse_columns
@@ -46,7 +46,7 @@ def read_curves(path: Path) -> dict[str, Points]:
         row = []
         for (column, cell), factor in zip(cells, factors, strict=True):
             try:
-                row.append(float(exact_quantity(cell, factor)))
+                row.append(metres_or_radians(cell, factor))
             except QuantityError as error:
                 messages.append(Message(file, number, column, "", str(error)))
         rows.append((number, row))

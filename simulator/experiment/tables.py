@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from ..quantities import LENGTH_UNITS, QuantityError, exact_quantity
+from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .yamltree import Mark, read_text
@@ -71,7 +71,7 @@ def read_table(
         for name in (*lengths, *optional):
             column, cell = by_name.get(name, (1, "0"))
             try:
-                row_lengths.append(float(exact_quantity(cell, factors.get(name, Fraction(1)))))
+                row_lengths.append(metres_or_radians(cell, factors.get(name, Fraction(1))))
             except QuantityError as error:
                 messages.append(Mark(file, number, column).message("", _wrong_number(cell, name) or str(error)))
                 row_lengths.append(float("nan"))

@@ -529,6 +529,10 @@ TABLE_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
 }
 
 
+# Changes of changes may multiply.
+MOST_BYTES = 20_000_000
+
+
 def table_mutants(tables: Sequence[Path], seed: int, numbers: range) -> Iterator[Mutant]:
     """Mutants of comma-separated tables, one for each number."""
     for number in numbers:
@@ -538,7 +542,7 @@ def table_mutants(tables: Sequence[Path], seed: int, numbers: range) -> Iterator
         for _ in range(random.choice((1, 1, 2))):
             every = TABLE_CHANGES if random.random() < 0.7 else TEXT_CHANGES
             changes.append(random.choice(list(every)))
-            content = every[changes[-1]](random, content)
+            content = every[changes[-1]](random, content)[:MOST_BYTES]
         yield Mutant(origin, number, tuple(changes), content)
 
 

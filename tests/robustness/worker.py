@@ -82,7 +82,7 @@ def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) ->
     trial(Path(connection.recv()))
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+        resident = _peak()
         # Address space that is only reserved is no memory used.
         limit = pages * resource.getpagesize() - resident + memory
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
@@ -101,7 +101,15 @@ def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) ->
             found = found if len(found) < 5000 else f"{found[:1000]}\n…\n{found[-3500:]}"
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-        connection.send((found, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024))
+        connection.send((found, _peak()))
+
+
+def _peak() -> int:
+    """Most memory that the process has had, in bytes; what getrusage tells is also of the process that started it."""
+    if sys.platform != "linux":
+        return 0
+    found = re.search(r"VmHWM:\s*([0-9]+) kB", Path("/proc/self/status").read_text())
+    return int(found[1]) * 1024 if found else 0
 
 
 def _out_of_time(*_: Any) -> None:
