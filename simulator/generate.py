@@ -64,19 +64,31 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     balls = design.balls.copy()
     tied = distance_rows(design, nominal_state(design))
     known = design.coordinates
-    columns = design.dimension * np.stack([design.distances.first, design.distances.second])
-    rows = np.zeros((len(tied.residual) + len(known), balls.size))
-    at = np.arange(len(tied.residual))
-    for axis in range(design.dimension):
-        rows[at, columns[0] + axis] = tied.derivative[:, axis]
-        rows[at, columns[1] + axis] = -tied.derivative[:, axis]
-    at = len(at) + np.arange(len(known))
-    rows[at, design.dimension * known.ball + known.axis] = 1.0 / known.uncertainty
-    used = np.flatnonzero(rows.any(axis=0))
+    stated = design.dimension * known.ball + known.axis
     off = np.concatenate([tied.residual, (balls[known.ball, known.axis] - known.value) / known.uncertainty])
-    wanted = generator.standard_normal(len(rows)) - off
-    if len(rows):
-        balls.flat[used] += np.linalg.lstsq(rows[:, used], wanted, rcond=None)[0]
+    wanted = generator.standard_normal(len(off)) - off
+    # Balls that no distance ties to others vary by themselves, however many there are.
+    ends = np.unique(np.concatenate([design.distances.first, design.distances.second]))
+    alone = ~np.isin(known.ball, ends)
+    weight = 1.0 / known.uncertainty[alone]
+    pull = np.bincount(stated[alone], weight * wanted[len(tied.residual) :][alone], balls.size)
+    stiffness = np.bincount(stated[alone], weight**2, balls.size)
+    balls += np.divide(pull, stiffness, out=np.zeros(balls.size), where=stiffness > 0).reshape(balls.shape)
+    among = np.zeros(len(design.balls), np.int64)
+    among[ends] = np.arange(len(ends))
+    together = ~np.concatenate([np.zeros(len(tied.residual), bool), alone])
+    if len(tied.residual):
+        rows = np.zeros((int(together.sum()), design.dimension * len(ends)))
+        at = np.arange(len(tied.residual))
+        for axis in range(design.dimension):
+            rows[at, design.dimension * among[design.distances.first] + axis] = tied.derivative[:, axis]
+            rows[at, design.dimension * among[design.distances.second] + axis] = -tied.derivative[:, axis]
+        at = len(at) + np.arange(len(rows) - len(at))
+        rows[at, design.dimension * among[known.ball[~alone]] + known.axis[~alone]] = 1.0 / known.uncertainty[~alone]
+        used = np.flatnonzero(rows.any(axis=0))
+        move = np.zeros(rows.shape[1])
+        move[used] = np.linalg.lstsq(rows[:, used], wanted[together], rcond=None)[0]
+        balls[ends] += move.reshape(-1, design.dimension)
     given = design.lengths
     ends = np.stack([design.readings.ball[given.first], design.readings.ball[given.second]])
     pairs, first = np.unique(ends, axis=1, return_index=True)

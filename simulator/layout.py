@@ -206,6 +206,7 @@ def _distances(
                     projected.append(item.form == "projection")
                     scatter.append(item.repeatability == "included")
                     certificate.append((number, row) if scatter[-1] else (-1, len(first)))
+    certificates = {one: i for i, one in enumerate(dict.fromkeys(certificate))}
     lengths = Lengths(
         np.array(first, np.int64),
         np.array(second, np.int64),
@@ -214,7 +215,7 @@ def _distances(
         np.array(projected, bool),
         np.array(direction, float).reshape(-1, experiment.dimension),
         np.array(scatter, bool),
-        np.array([list(dict.fromkeys(certificate)).index(one) for one in certificate], np.int64),
+        np.array([certificates[one] for one in certificate], np.int64),
     )
     distances = Distances(
         _integers([pairs[:, 0] for _, pairs in plates]),
@@ -297,7 +298,9 @@ def _null_space(rows: Array) -> Array:
     """Orthonormal columns that span what the rows leave free."""
     if not len(rows):
         return np.eye(rows.shape[1])
-    _, values, directions = np.linalg.svd(rows)
+    # What the triangular factor leaves free, the rows do; their own decomposition grows with their number squared.
+    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    _, values, directions = np.linalg.svd(triangle)
     rank = int((values > FLAT * values[0]).sum())
     return np.asarray(directions[rank:].T)
 

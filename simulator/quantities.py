@@ -49,6 +49,9 @@ RATIO_UNITS: Mapping[str, Fraction] = {
     "um/m": Fraction(1, 10**6),
     "nm/m": Fraction(1, 10**9),
 }
+# Beyond these, squares and their sums are no numbers any more; nothing real is there.
+LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
+BASE_UNITS: Mapping[str, str] = {"length": "m", "angle": "rad", "ratio": "m/m"}
 # Kind of quantity → its units and an example for the messages.
 UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "length": LENGTH_UNITS,
@@ -81,6 +84,26 @@ def exact_number(text: str) -> Fraction:
     if decimal and not -300 <= decimal.adjusted() <= 300:
         raise QuantityError(f'"{text}" is beyond what can be computed with; write a number of usual size')
     return Fraction(decimal)
+
+
+def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> float:
+    """Read a decimal number of a unit that is `factor` metres or radians; the result is the nearest float.
+
+    :raises QuantityError: not a decimal number, or more or less than there is.
+
+    >>> metres_or_radians("750", LENGTH_UNITS["mm"])
+    0.75
+    """
+    exact = exact_number(number) * factor
+    # Compared as a float, which takes a fraction of the time: tables have millions of numbers.
+    value = float(exact)
+    if exact and not float(SMALLEST) <= abs(value) <= LARGEST:
+        unit = BASE_UNITS[kind]
+        raise QuantityError(
+            f'"{number}" is beyond what can be computed with; '
+            f"write 0, or {_article(kind)} of {float(SMALLEST):g} {unit} to {LARGEST:g} {unit}"
+        )
+    return value
 
 
 def parse_length(value: object) -> float:
@@ -190,6 +213,10 @@ def parse_length_function(value: object) -> LengthFunction:
         raise QuantityError(
             f'"{shorten(value)}" has a negative part or divides by zero; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
         )
+    if not 1 <= divisor <= 1 / SMALLEST:
+        raise QuantityError(
+            f'"{shorten(value)}" grows too fast or too slowly; divide L by 1 to {float(1 / SMALLEST):g}'
+        )
     return LengthFunction(constant, float(1 / divisor))
 
 
@@ -220,7 +247,7 @@ def _parse(value: object, kind: str) -> float:
                     f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example "{example}"'
                 )
         raise QuantityError(f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}')
-    return float(exact_number(number) * units[plain])
+    return metres_or_radians(number, units[plain], kind)
 
 
 def _positive(value: object, length: float) -> float:

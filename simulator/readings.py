@@ -11,7 +11,7 @@ from typing import TextIO
 import numpy as np
 
 from .design import Design, Integers, Readings
-from .experiment.messages import ExperimentError, Message
+from .experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .experiment.tables import Row, column_names, read_table
 from .experiment.yamltree import Mark
 from .machines.protocol import Array
@@ -68,7 +68,8 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
     lengths = np.array([row.lengths for row in rows])
     if "u" in columns:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
-        messages += [row.mark.message("", text) for row in rows if row.lengths[d] <= 0.0]
+        wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
+        messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
     x, stated = lengths[:, :d], lengths[:, d]
@@ -101,6 +102,9 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
     index = np.zeros((len(rows), 3), np.int64)
     unknown: dict[str, list[Row]] = {}
     for i, row in enumerate(rows):
+        if len(unknown) >= MOST_MESSAGES:
+            unknown.setdefault(ENOUGH, []).append(row)
+            break
         position, ball, probe = (*row.texts, design.probe_names[0])[:3]
         if position not in positions:
             unknown.setdefault(f'unknown position "{position}"; {hint(position, positions)}', []).append(row)
@@ -121,8 +125,11 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
 def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
     """Refuse readings that lie outside the volume by more than its own size: their unit is not what it says."""
     size = float((design.upper - design.lower).max())
-    messages = []
+    messages: list[Message] = []
     for i, axis in np.argwhere((x < design.lower - size) | (x > design.upper + size)).tolist():
+        if len(messages) >= MOST_MESSAGES:
+            messages.append(rows[i].mark.message("", ENOUGH))
+            break
         text = f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the column's name"
         messages.append(rows[i].mark.message("", text))
     if messages:
@@ -138,7 +145,8 @@ def _refuse_repeated(rows: tuple[Row, ...], readings: Readings, design: Design) 
     messages = []
     for (position, ball, probe), found in places.items():
         allowed = max(planned[position, ball, probe], 1)
-        for row in found[allowed:]:
+        # Some of each ball's, so that no ball is left out and no list is endless.
+        for row in found[allowed : allowed + 10]:
             text = (
                 f'ball "{design.ball_label(ball)}" is repeated in position "{design.position_names[position]}" '
                 f'with probe "{design.probe_names[probe]}" (first in line {found[0].mark.line}); remove the line, '

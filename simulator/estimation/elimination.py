@@ -34,6 +34,10 @@ ROWS_AT_ONCE = 2048
 # Columns that are eliminated before the rest is multiplied by them.
 PANEL = 16
 
+# Calibrated distances absorbed at once, and columns below which a plain decomposition is as fast.
+DISTANCES_AT_ONCE = 1024
+SMALL = 500
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -107,19 +111,24 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     columns = d * len(kept)
     distances = distance_rows(design, state)
     total += float(distances.residual @ distances.residual)
-    last = np.zeros((columns + len(design.distances) + len(shared), columns + s + 1))
-    for place in range(len(kept)):
-        last[d * place : d * place + d, d * place : d * place + d] = root[is_kept][place]
-    last[:columns, columns:] = top[is_kept].reshape(columns, s + 1)
+    # Triangular already but for the distances, which are absorbed some at a time: there may be far more than columns.
+    triangle = np.zeros((columns + s + 1, columns + s + 1), order="F")
+    for place, own in enumerate(root[is_kept]):
+        triangle[d * place : d * place + d, d * place : d * place + d] = own
+    triangle[:columns, columns:] = top[is_kept].reshape(columns, s + 1)
+    triangle[columns:, columns:] = _square(_triangle(shared), s + 1)
     place_of = np.zeros(len(design.ball_names), np.int64)
     place_of[kept] = np.arange(len(kept))
-    rows_at = columns + np.arange(len(design.distances))
-    for axis in range(d):
-        last[rows_at, d * place_of[design.distances.first] + axis] = distances.derivative[:, axis]
-        last[rows_at, d * place_of[design.distances.second] + axis] = -distances.derivative[:, axis]
-    last[rows_at, -1] = distances.residual
-    last[columns + len(design.distances) :, columns:] = shared
-    triangle = _square(_triangle(last), columns + s + 1)
+    for start in range(0, len(design.distances), DISTANCES_AT_ONCE):
+        some = slice(start, start + DISTANCES_AT_ONCE)
+        first, second = design.distances.first[some], design.distances.second[some]
+        rows = np.zeros((len(first), len(triangle)), order="F")
+        at = np.arange(len(first))
+        for axis in range(d):
+            rows[at, d * place_of[first] + axis] = distances.derivative[some, axis]
+            rows[at, d * place_of[second] + axis] = -distances.derivative[some, axis]
+        rows[:, -1] = distances.residual[some]
+        triangle = _with_rows(triangle, rows)
     return Factor(
         layout=layout,
         eliminated=balls[~is_kept],
@@ -146,6 +155,17 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
     above = np.asfortranarray(_square(triangle, rows.shape[1]))
     found, _, _, _ = dtpqrt(0, min(PANEL, rows.shape[1]), above, np.asfortranarray(rows), overwrite_a=1, overwrite_b=1)
     return np.triu(found)
+
+
+def _with_rows(triangle: Array, rows: Array) -> Array:
+    """Triangular factor of a square `triangle` with `rows` below it, in place of both where they are large."""
+    if len(triangle) < SMALL:
+        return _square(_triangle(np.concatenate([triangle, rows])), len(triangle))
+    from scipy.linalg.lapack import dtpqrt
+
+    found: Array
+    found, _, _, _ = dtpqrt(0, min(2 * PANEL, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1)
+    return found
 
 
 def _triangle(rows: Array) -> Array:

@@ -56,13 +56,7 @@ def _distances(
     indices = _pairs(settings.pairs, layout, (*steps, "pairs"), references)
     if indices is None or references.dimension is None:
         return None
-    tied = len(np.unique(indices))
-    if tied > MOST_TIED_BALLS:
-        text = (
-            f"distances tie {tied} balls together, at most {MOST_TIED_BALLS} are possible; "
-            "calibrate fewer distances, such as corner sides, or co-ordinates"
-        )
-        references.problems.add((*steps, "pairs"), text)
+    if not _can_be_tied(len(np.unique(indices)), (*steps, "pairs"), references):
         return None
     difference = (layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]])[:, :dimensions]
     nominal = np.linalg.norm(difference, axis=1)
@@ -88,10 +82,21 @@ def _distances(
     )
 
 
+def _can_be_tied(balls: int, steps: Steps, references: References) -> bool:
+    text = (
+        f"distances tie {balls} balls together, at most {MOST_TIED_BALLS} are possible; "
+        "calibrate fewer distances, such as corner sides, or co-ordinates"
+    )
+    return references.require(balls <= MOST_TIED_BALLS, steps, text)
+
+
 def _pairs(
     selection: str | tuple[tuple[str, str], ...], layout: BallLayout, steps: Steps, references: References
 ) -> Indices | None:
     if isinstance(selection, str):
+        # Pairs of all these balls would fill the memory before they can be refused.
+        if selection == "all" and not _can_be_tied(len(layout.names), steps, references):
+            return None
         try:
             found = pairs(layout, selection)
         except ValueError as error:
@@ -141,11 +146,11 @@ def _certified_distances(
             (entry.balls, entry.distance, mark_of(problems.root, (*steps, i)), (*steps, i))
             for i, entry in enumerate(settings.values)
         ]
-    before = len(problems.messages)
+    before, known = len(problems.messages), set(layout.names)
     by_pair: dict[frozenset[str], float] = {}
     for names, distance, mark, place in entries:
         for name in names:
-            if name not in layout.names:
+            if name not in known:
                 problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
         pair = frozenset(names)
         if len(pair) == 1:
@@ -229,11 +234,11 @@ def _certified_coordinates(
     except ExperimentError as error:
         problems.take(error, steps)
         return None
-    before = len(problems.messages)
+    before, known = len(problems.messages), set(layout.names)
     by_ball: dict[str, tuple[float, ...]] = {}
     for row in rows:
         name = row.texts[0]
-        if name not in layout.names:
+        if name not in known:
             problems.add_at(row.mark, steps, f'unknown ball "{name}"; {hint(name, layout.names)}')
         if name in by_ball:
             problems.add_at(row.mark, steps, f'ball "{name}" is listed twice; remove one of the two lines')

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..design import pose_size
 from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
@@ -23,6 +24,11 @@ from .structure import Sections
 from .yamltree import Mark
 
 TOLERANCE = 1e-9
+
+# Parameters besides those of the balls: their time grows with the cube of the number, their memory with its square.
+MOST_SHARED = 3500
+# Lengths that the standards contribute, each a row over the machine's errors.
+MOST_LENGTHS = 20_000
 AXES = ("x", "y", "z")
 
 
@@ -210,6 +216,42 @@ def check_calibration_read(
         references.problems.add(
             (*steps, key), f"no position reads {_balls(len(unread))} {names}; read them, or leave them out"
         )
+
+
+def check_size(
+    sections: Sections,
+    machine: Machine | None,
+    positions: dict[int, Position],
+    calibrations: Mapping[int, Calibration],
+    offset_uncertainties: Mapping[str, Floats],
+    references: References,
+) -> None:
+    """Report what would take more memory than a computer usually has, or hours."""
+    problems, settings = references.problems, sections.get("error_model")
+    if settings is None or machine is None or problems.has_below(("error_model",)):
+        return
+    d = machine.dimension
+    poses = sum(references.artefacts[one.artefact].role == "plate" for one in positions.values())
+    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    shared = errors + pose_size(d) * poses + d * len(offset_uncertainties)
+    if shared > MOST_SHARED:
+        text = (
+            f"{poses} poses, {errors} machine errors and {len(offset_uncertainties)} probe offsets make "
+            f"{shared} parameters besides the balls; at most {MOST_SHARED} are "
+            "possible: leave positions out, or give the machine fewer coefficients"
+        )
+        problems.add(("positions",), text, of_key=True)
+    for i, calibration in calibrations.items():
+        name = calibration.artefact
+        if references.artefacts[name].role == "length_standard" and isinstance(calibration, DistanceCalibration):
+            probes = [{probe for group in one.readings for probe in group.probes} for one in positions.values()]
+            times = sum(len(own) for own, one in zip(probes, positions.values(), strict=True) if one.artefact == name)
+            if len(calibration.pairs) * times > MOST_LENGTHS:
+                text = (
+                    f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too many; at most '
+                    f"{MOST_LENGTHS} lengths are possible"
+                )
+                problems.add(("calibration", i, "pairs"), text)
 
 
 def check_points(

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from ..machines.curves import NAMES, Points
 from ..machines.kinematic import TRANSLATIONS
-from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number
+from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
-from .messages import ExperimentError, Message
-from .tables import _cells
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from .tables import _cells, refuse_columns
 from .yamltree import Mark, read_text
 
 POSITION = "position"
@@ -35,6 +35,9 @@ def read_curves(path: Path) -> dict[str, Points]:
     messages: list[Message] = []
     rows: list[tuple[int, list[float]]] = []
     for number, line in lines[1:]:
+        if len(messages) >= MOST_MESSAGES:
+            messages.append(Message(file, number, 1, "", ENOUGH))
+            break
         cells = _cells(line)
         if cells is None or len(cells) != len(names):
             text = f"{0 if cells is None else len(cells)} columns instead of {len(names)}; separate them by commas"
@@ -43,7 +46,7 @@ def read_curves(path: Path) -> dict[str, Points]:
         row = []
         for (column, cell), factor in zip(cells, factors, strict=True):
             try:
-                row.append(float(exact_number(cell) * factor))
+                row.append(metres_or_radians(cell, factor))
             except QuantityError as error:
                 messages.append(Message(file, number, column, "", str(error)))
         rows.append((number, row))
@@ -67,6 +70,7 @@ def _columns(mark: Mark, header: str) -> tuple[list[str], list[Fraction]]:
     messages: list[Message] = []
     names: list[str] = []
     factors: list[Fraction] = []
+    refuse_columns(mark, header, EXAMPLE)
     for column, cell in _cells(header) or []:
         place = Mark(mark.file, mark.line, column)
         name, _, unit = cell.rpartition("_")

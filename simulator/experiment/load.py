@@ -6,10 +6,18 @@ import os
 from pathlib import Path
 
 from .calibrations import resolve_calibration
-from .checks import check_calibration_read, check_error_model, check_inside, check_names, check_true_machine, check_use
+from .checks import (
+    check_calibration_read,
+    check_error_model,
+    check_inside,
+    check_names,
+    check_size,
+    check_true_machine,
+    check_use,
+)
 from .machine import resolve_evaluation, resolve_machine
 from .messages import ExperimentError, Message, Steps, format_path
-from .model import Experiment
+from .model import Calibration, Experiment
 from .placements import resolve_position
 from .priors import resolve_priors
 from .problems import Problems, written, written_count
@@ -71,6 +79,13 @@ def place_in(source: Path, variant: str | None, steps: Steps) -> Mark:
 
 def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
     """Return the experiment of a tree without variants and no messages, or None and what is wrong."""
+    try:
+        return _build(root, source, name)
+    except ExperimentError as too_many:
+        return None, list(too_many.messages)
+
+
+def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
     problems = Problems(root)
     sections = validate_sections(root, problems)
     references = resolve_references(sections, source.parent, problems)
@@ -93,15 +108,16 @@ def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None
             if machine is not None and machine.dimension == references.dimension:
                 check_inside(position, ("positions", i), machine.volume, references)
     check_use(sections, positions, position_count, references)
-    calibrations = []
+    calibrations: dict[int, Calibration] = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
         calibration = resolve_calibration(settings, ("calibration", i), references)
         if calibration is not None:
-            calibrations.append(calibration)
+            calibrations[i] = calibration
             check_calibration_read(calibration, ("calibration", i), positions, position_count, references)
     priors = resolve_priors(sections, machine, positions, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
+    check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
     evaluation = resolve_evaluation(sections, machine, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
@@ -117,7 +133,7 @@ def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None
         artefacts=references.artefacts,
         layouts=references.layouts,
         positions=tuple(positions.values()),
-        calibration=tuple(calibrations),
+        calibration=tuple(calibrations.values()),
         evaluation=evaluation,
         target_accuracy=sections.get("target_accuracy"),
         sigma=sections.get("sigma"),

@@ -13,7 +13,7 @@ from .messages import ExperimentError, Steps
 from .model import Evaluation, Floats, Machine, Volume
 from .problems import Problems
 from .references import References, frozen
-from .sections import MachineSettings, PointsSettings
+from .sections import MOST_POINTS, MachineSettings, PointsSettings
 from .structure import Sections
 from .tables import read_table
 
@@ -105,6 +105,9 @@ def _points_of_file(file: str, steps: Steps, machine: Machine | None, references
         rows = read_table(references.folder / file, [], AXES[: references.dimension])
     except ExperimentError as error:
         references.problems.take(error, steps)
+        return None
+    text = f"{len(rows)} points are too many; at most {MOST_POINTS} are possible"
+    if not references.require(len(rows) <= MOST_POINTS, steps, text):
         return None
     points = np.array([row.lengths for row in rows])
     if machine is not None and machine.dimension == references.dimension:

@@ -9,6 +9,13 @@ from dataclasses import dataclass
 Step = str | int
 Steps = tuple[Step, ...]
 
+# Errors of a file that are told; beyond, some slip repeats itself.
+MOST_MESSAGES = 1000
+ENOUGH = f"more than {MOST_MESSAGES} errors; mend these first"
+
+# Names of a file may hold what would break a line in two or reach the terminal as a command.
+UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
 
 @dataclass(frozen=True, order=True)
 class Message:
@@ -25,7 +32,7 @@ class Message:
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
-        return ": ".join(part for part in (place, self.path, self.text) if part)
+        return in_one_line(": ".join(part for part in (place, self.path, self.text) if part))
 
 
 class ExperimentError(Exception):
@@ -37,6 +44,20 @@ class ExperimentError(Exception):
 
     def __reduce__(self) -> tuple[type[ExperimentError], tuple[tuple[Message, ...]]]:
         return type(self), (self.messages,)
+
+
+def _by_number(found: re.Match[str]) -> str:
+    number = ord(found[0])
+    return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
+
+
+def in_one_line(text: str) -> str:
+    r"""Write characters that are no part of a line by their numbers.
+
+    >>> in_one_line("a\nb")
+    'a\\x0ab'
+    """
+    return UNPRINTABLE.sub(_by_number, text)
 
 
 def format_path(steps: Iterable[Step]) -> str:

@@ -69,6 +69,8 @@ def _group(
     if layout is None:
         return None
     names = layout.names if balls == "all" else balls
+    if not references.count_readings(len(probe_names or ()) * len(names) * settings.repeats, steps):
+        return None
     indices = (
         np.arange(len(layout.names)) if balls == "all" else references.ball_indices(names, layout, (*steps, "balls"))
     )

@@ -10,12 +10,13 @@ from ..machines.settings import build_error_model, dimension_of
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import hint, shorten
 from .messages import Steps, format_path
-from .model import Machine, Position, Prior
+from .model import Floats, Machine, Position, Prior
 from .references import References
 from .sections import PriorSettings
 from .structure import Sections
 from .yamltree import mark_of
 
+MOST_PRIORS = 5000
 PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
 
@@ -23,19 +24,23 @@ def resolve_priors(
     sections: Sections, machine: Machine | None, positions: dict[int, Position], references: References
 ) -> tuple[Prior, ...]:
     """Return what is known beforehand; what is wrong goes to the problems."""
-    settings = sections.get("error_model")
-    if settings is None or machine is None or dimension_of(settings) != machine.dimension:
+    settings, entries = sections.get("error_model"), sections.entries("priors")
+    if not entries or settings is None or machine is None or dimension_of(settings) != machine.dimension:
         return ()
     lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
     known = _known(build_error_model(settings, lower, upper), positions, references)
     found: list[Prior] = []
-    for i, entry in sections.entries("priors").items():
+    for i, entry in entries.items():
         found += _prior(entry, ("priors", int(i)), known, references)
+        if len(found) > MOST_PRIORS:
+            text = f"there are {len(found)} priors up to here, coefficients counted; at most {MOST_PRIORS} are possible"
+            references.problems.add(("priors", int(i)), text)
+            break
     return tuple(found)
 
 
 # What a name stands for: name of the parameter, position, probe, component, row over the model, unit, nominal value.
-_Known = tuple[str, str | None, str | None, int, tuple[float, ...], Unit, float]
+_Known = tuple[str, str | None, str | None, int, Floats, Unit, float]
 
 
 def _known(model: ErrorModel, positions: dict[int, Position], references: References) -> dict[str, tuple[_Known, ...]]:
@@ -43,20 +48,21 @@ def _known(model: ErrorModel, positions: dict[int, Position], references: Refere
     known: dict[str, tuple[_Known, ...]] = {}
     own = np.eye(len(model.parameters))
     for row, parameter in zip(own, model.parameters, strict=True):
-        one: _Known = (parameter.name, None, None, -1, tuple(row), parameter.unit, 0.0)
+        one: _Known = (parameter.name, None, None, -1, row, parameter.unit, 0.0)
         known[parameter.name] = (one,)
         if parameter.function != parameter.name:
             known[parameter.function] = (*known.get(parameter.function, ()), one)
     reported = model.reported()
     for name, unit, row in zip(reported.names, reported.units, reported.matrix, strict=True):
-        known.setdefault(name, ((name, None, None, -1, tuple(row), unit, 0.0),))
+        known.setdefault(name, ((name, None, None, -1, row, unit, 0.0),))
+    of_no_error = np.zeros(len(own))
     for position in positions.values():
         if references.artefacts[position.artefact].role != "plate":
             continue
         for k, word in enumerate(pose_parameter_names(model.dimension)):
             name = f"{position.name}: {word}"
             unit, nominal = ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
-            known[name] = ((name, position.name, None, k, (0.0,) * len(own), unit, nominal),)
+            known[name] = ((name, position.name, None, k, of_no_error, unit, nominal),)
     return known
 
 

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .messages import ExperimentError, Message, Step, Steps, format_path
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
 from .yamltree import Mapping, Mark, Node, Sequence, child, mark_of, to_python
 
 
 @dataclass(eq=False)
 class Problems:
-    """Messages about the tree below ``root``."""
+    """Messages about the tree below ``root``.
+
+    Adding one too many raises an ``ExperimentError`` with all of them: each takes time to word, and a file may have
+    hundreds of thousands.
+    """
 
     root: Node
     messages: list[Message] = field(default_factory=list)
+    _known: set[Message] = field(default_factory=set)
 
     def add(self, steps: Steps, text: str, of_key: bool = False) -> None:
         """Add a message about a path; ``of_key`` places it at the key instead of the value."""
@@ -22,8 +27,12 @@ class Problems:
     def add_at(self, mark: Mark, steps: Steps, text: str) -> None:
         """Add a message about a path, placed elsewhere, such as in a table that the path names."""
         message = mark.message(format_path(steps), text)
-        if message not in self.messages:
-            self.messages.append(message)
+        if message in self._known:
+            return
+        if len(self.messages) >= MOST_MESSAGES:
+            raise ExperimentError([*self.messages, mark.message("", ENOUGH)])
+        self._known.add(message)
+        self.messages.append(message)
 
     def take(self, error: ExperimentError, steps: Steps) -> None:
         """Add the messages about a table that a path names."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..geometry.artefacts import MOST_BALLS, ArtefactSettings, BallLayout, BallsSettings, coincident_balls
 from ..quantities import format_length
-from ..settings import hint, listing
+from ..settings import hint, listing, shorten
 from .messages import ExperimentError, Steps
 from .model import Floats, Indices
 from .problems import Problems, written, written_keys, written_text
@@ -22,6 +22,17 @@ from .yamltree import Mapping, Node
 from .yamltree import Sequence as SequenceNode
 
 DEFAULT_PROBE = "probe"
+
+# Of all artefacts together, and of all positions with their repeats: about what a gigabyte has room for.
+MOST_BALLS_OF_ALL = 100_000
+MOST_READINGS = 2_000_000
+
+
+@dataclass
+class Tally:
+    """What has been counted so far."""
+
+    readings: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +50,19 @@ class References:
     artefact_names: tuple[str, ...]
     artefacts: dict[str, ArtefactSettings]
     layouts: dict[str, BallLayout]
+    tally: Tally = field(default_factory=Tally)
+
+    def count_readings(self, count: int, steps: Steps) -> bool:
+        """Count further readings; tell whether there is room for them, after saying once that there is not."""
+        before = self.tally.readings
+        self.tally.readings += count
+        if before <= MOST_READINGS < self.tally.readings:
+            text = (
+                f"there are {self.tally.readings} readings up to here, repeats counted; at most {MOST_READINGS} are "
+                "possible: read fewer balls, or less often"
+            )
+            self.problems.add(steps, text)
+        return self.tally.readings <= MOST_READINGS
 
     def artefact(self, name: str | None, steps: Steps) -> str | None:
         """Return the artefact that a position or calibration is about, or None after saying what is wrong."""
@@ -70,23 +94,25 @@ class References:
                 choice = listing(self.probes)
                 self.problems.add((*steps, "probes"), f'missing; add "probes", some of: {choice}')
             return self.probes if len(self.probes) == 1 else None
-        found = [self._once("probe", self.probes, names, (*steps, "probes"), i) for i in range(len(names))]
-        return names if all(found) else None
+        return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
     def ball_indices(self, names: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
         """Return the indices of listed balls, or None after saying what is wrong."""
-        found = [self._once("ball", layout.names, names, steps, i) for i in range(len(names))]
         index = {name: i for i, name in enumerate(layout.names)}
-        return np.array([index[name] for name in names], dtype=np.intp) if all(found) else None
+        if not self._known_once("ball", index, names, steps):
+            return None
+        return np.array([index[name] for name in names], dtype=np.intp)
 
-    def _once(self, what: str, known: Sequence[str], names: Sequence[str], steps: Steps, i: int) -> bool:
-        if names[i] not in known:
-            self.problems.add((*steps, i), f'unknown {what} "{names[i]}"; {hint(names[i], known)}')
-            return False
-        if names[i] in names[:i]:
-            self.problems.add((*steps, i), f'{what} "{names[i]}" is listed twice; remove one of the two')
-            return False
-        return True
+    def _known_once(self, what: str, known: Collection[str], names: Sequence[str], steps: Steps) -> bool:
+        seen: set[str] = set()
+        before = len(self.problems.messages)
+        for i, name in enumerate(names):
+            if name not in known:
+                self.problems.add((*steps, i), f'unknown {what} "{shorten(name)}"; {hint(name, known)}')
+            elif name in seen:
+                self.problems.add((*steps, i), f'{what} "{shorten(name)}" is listed twice; remove one of the two')
+            seen.add(name)
+        return len(self.problems.messages) == before
 
     def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
         """Say what is wrong unless it is right; return whether it is."""
@@ -104,12 +130,18 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
         probes = (DEFAULT_PROBE,)
     artefacts: dict[str, ArtefactSettings] = {}
     layouts: dict[str, BallLayout] = {}
+    balls = 0
     for key, settings in sections.entries("artefacts").items():
         name, steps = str(key), ("artefacts", str(key))
         listed = _with_coordinates(settings, folder, steps, problems)
         if listed is None:
             continue
         layout = listed.layout()
+        balls += len(layout.names)
+        if balls > MOST_BALLS_OF_ALL:
+            text = f"there are {balls} balls up to here; at most {MOST_BALLS_OF_ALL} of all artefacts are possible"
+            problems.add(steps, text)
+            break
         twins = coincident_balls(layout)
         for i, j in twins[:3]:
             text = f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct one of them'

@@ -16,6 +16,8 @@ Text = Annotated[str, StringConstraints(min_length=1)]
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 Count = Annotated[int, Field(ge=1, le=10_000)]
+# U6 follows every pair of points.
+MOST_POINTS = 40_000
 Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
@@ -249,7 +251,7 @@ AnyProbe = Annotated[
 class PointsSettings(Settings):
     """Evaluation points that are not listed: drawn at random, or read from a file."""
 
-    random: Annotated[int, Field(ge=1, le=1_000_000)] | None = Field(
+    random: Annotated[int, Field(ge=1, le=MOST_POINTS)] | None = Field(
         None, description="number of points drawn evenly in the volume"
     )
     seed: Seed | None = Field(None, description="seed of the draw; default 1")
@@ -261,7 +263,7 @@ class EvaluationSettings(Settings):
 
     points: Annotated[
         Annotated[PointsSettings, Tag("<mapping>")]
-        | Annotated[Annotated[tuple[Coordinates, ...], Field(min_length=1)], Tag("<list>")]
+        | Annotated[Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)], Tag("<list>")]
         | Annotated[PointsSettings, Tag("<one>")],
         FORM,
     ] = Field(description="{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates")

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from ..quantities import LENGTH_UNITS, QuantityError, exact_number
+from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
-from .messages import ExperimentError, Message
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .yamltree import Mark, read_text
 
 CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
 MOST_ROWS = 1_000_000
+# Far more than there are names for.
+MOST_COLUMNS = 1000
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ def read_table(
     rows = []
     for number, line in lines[1 : MOST_ROWS + 1]:
         mark = Mark(file, number, 1)
+        if len(messages) >= MOST_MESSAGES:
+            messages.append(mark.message("", ENOUGH))
+            break
         cells = _cells(line)
         if cells is None or len(cells) != len(places):
             messages.append(mark.message("", _wrong_count(line, cells, len(places))))
@@ -66,7 +71,7 @@ def read_table(
         for name in (*lengths, *optional):
             column, cell = by_name.get(name, (1, "0"))
             try:
-                row_lengths.append(float(exact_number(cell) * factors.get(name, Fraction(1))))
+                row_lengths.append(metres_or_radians(cell, factors.get(name, Fraction(1))))
             except QuantityError as error:
                 messages.append(Mark(file, number, column).message("", _wrong_number(cell, name) or str(error)))
                 row_lengths.append(float("nan"))
@@ -83,13 +88,25 @@ def read_table(
     return tuple(rows)
 
 
+def refuse_columns(mark: Mark, header: str, example: str) -> None:
+    """Refuse a first line of so many columns that saying what is wrong with each would take long.
+
+    :raises ExperimentError: there are more than a thousand.
+    """
+    count = header.count(",") + 1
+    if count > MOST_COLUMNS:
+        text = f"{count} columns are too many; the first line should be {example}"
+        raise ExperimentError([mark.message("", text)])
+
+
 def column_names(path: Path) -> tuple[str, ...]:
     """Names of a table's columns without their units; none where the file has no line.
 
     :raises ExperimentError: the file cannot be read.
     """
     lines = (line for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    cells = _cells(next(lines, "")) or []
+    header = next(lines, "")
+    cells = _cells(header) or [] if header.count(",") < MOST_COLUMNS else []
     return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
 
 
@@ -127,6 +144,7 @@ def _columns(
     messages: list[Message] = []
     names: list[str] = []
     factors: dict[str, Fraction] = {}
+    refuse_columns(mark, header, example)
     cells = _cells(header) or []
     if len(cells) == 1 and re.search("[;\t]", header):
         raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])

@@ -11,6 +11,7 @@ from .problems import Problems
 from .sections import ExperimentSettings
 from .yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
 
+MOST_VARIANTS = 1000
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
 
 
@@ -23,6 +24,10 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
     if not isinstance(section, Mapping) or not section.items:
         found = "nothing" if isinstance(section, Mapping) else describe(_shallow(section))
         problems.add(("variants",), f"expected a mapping, name: {{path: new value}}, found {found}")
+        return trees
+    if len(section.items) > MOST_VARIANTS:
+        text = f"{len(section.items)} variants are too many; at most {MOST_VARIANTS} are possible"
+        problems.add(("variants",), text)
         return trees
     base = replace(
         root,

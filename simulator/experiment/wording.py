@@ -10,7 +10,7 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from ..settings import describe, hint, listing, shorten
-from .messages import Steps
+from .messages import MOST_MESSAGES, Steps
 from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python
 
 Schema = AnyMapping[str, Any]
@@ -49,7 +49,8 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
     """Explain errors of validating ``node``; ``schema`` is the JSON schema of what it should be."""
     explanations: list[Explanation] = []
     choices: dict[Steps, dict[str, list[tuple[Explanation, bool]]]] = {}
-    for error in errors:
+    # What is explained beyond would not be told.
+    for error in errors[: 2 * MOST_MESSAGES]:
         place = _place(error, node)
         # Pydantic counts entries that are wrong in themselves as missing.
         items = getattr(place.node, "items", ())
@@ -95,7 +96,8 @@ def _place(error: ErrorDetails, root: Node) -> _Place:
     for i, step in enumerate(error["loc"]):
         is_last = i == len(error["loc"]) - 1
         below = child(node, step)
-        if isinstance(step, str) and step.startswith("<"):
+        # The tag of a form, unless the file has such a key.
+        if below is None and isinstance(step, str) and step.startswith("<"):
             continue
         if not tagged and isinstance(node, Mapping) and _kind(node) == step:
             tagged = True
@@ -153,6 +155,8 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         return Explanation(steps, f"{describe(value)} is out of range; give one {word} {context[bound]}")
     if kind == "finite_number":
         return Explanation(steps, f"{describe(value)} is not finite; give a finite number")
+    if kind == "string_pattern_mismatch":
+        return Explanation(steps, f"{describe(value)} holds a control character; remove it")
     if kind == "value_error":
         return Explanation(steps, str(context["error"]))
     return Explanation(steps, error["msg"][:1].lower() + error["msg"][1:])

@@ -8,6 +8,7 @@ The tree is built from PyYAML's events, because its constructors follow YAML 1.1
 from __future__ import annotations
 
 import re
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,11 +16,13 @@ from typing import Any
 
 import yaml
 
-from ..settings import shorten
-from .messages import ExperimentError, Message, Step, Steps
+from ..settings import listing, shorten
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps
 
 DEEPEST = 50
 MOST_NODES = 500_000
+# Room for a table of a million rows.
+MOST_BYTES = 200_000_000
 
 # What YAML 1.2 does not allow even in quotes.
 NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -102,7 +105,14 @@ def read_text(path: Path) -> str:
     """
     file = str(path)
     try:
-        content = path.read_bytes()
+        kind = path.stat().st_mode
+        if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
+            raise _refusal(file, "this is a device; name a file")
+        # A pipe of the shell's has a writer; any other may wait for one for ever.
+        if stat.S_ISFIFO(kind) and not file.startswith(("/dev/", "/proc/")):
+            raise _refusal(file, "this is a pipe, to which nobody may write; name a file")
+        with path.open("rb") as stream:
+            content = stream.read(MOST_BYTES + 1)
     except FileNotFoundError:
         raise _refusal(file, "there is no such file; check the name and the folder") from None
     except IsADirectoryError:
@@ -110,6 +120,8 @@ def read_text(path: Path) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise _refusal(file, f"cannot be read ({reason}); check its name and permissions") from None
+    if len(content) > MOST_BYTES:
+        raise _refusal(file, f"has more than {MOST_BYTES // 10**6} MB; leave some of it out")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -238,6 +250,8 @@ class _Open:
     # A key that cannot be used; its value is read and dropped.
     key_is_refused: bool = False
     size: int = 1
+    # Levels below it so far, those of aliases included.
+    height: int = 0
 
 
 class _Builder:
@@ -249,9 +263,12 @@ class _Builder:
         self.root: Node | None = None
         self.documents = 0
         self.stack: list[_Open] = []
-        self.anchors: dict[str, tuple[Node, int]] = {}
+        # With the number of values in it and of levels below it.
+        self.anchors: dict[str, tuple[Node, int, int]] = {}
 
     def refuse(self, mark: Mark, text: str) -> None:
+        if len(self.messages) >= MOST_MESSAGES:
+            raise ExperimentError([*sorted(self.messages), mark.message("", ENOUGH)])
         self.messages.append(mark.message("", text))
 
     def stop(self, mark: Mark, text: str) -> None:
@@ -279,7 +296,7 @@ class _Builder:
                 if opened.entries is None
                 else Mapping(opened.mark, opened.entries, opened.key_marks or {})
             )
-            self._add(node, opened.anchor, opened.size)
+            self._add(node, opened.anchor, opened.size, opened.height)
 
     def _tagged(self, event: Any, mark: Mark) -> None:
         if event.tag not in (None, "!", "tag:yaml.org,2002:str"):
@@ -312,7 +329,7 @@ class _Builder:
                 value = 0
         if value is None and self.root is None and not self.stack:
             return
-        self._add(Scalar(mark, value), event.anchor, 1)
+        self._add(Scalar(mark, value), event.anchor)
 
     def _key(self, parent: _Open, key: str, is_plain: bool, mark: Mark) -> None:
         entries, key_marks = parent.entries, parent.key_marks
@@ -333,26 +350,29 @@ class _Builder:
 
     def _alias(self, anchor: str, mark: Mark) -> None:
         if anchor in self.anchors:
-            node, size = self.anchors[anchor]
-            self._add(replace(node, mark=mark), None, size)
+            node, size, height = self.anchors[anchor]
+            self._add(replace(node, mark=mark), None, size, height)
             return
         if any(opened.anchor == anchor for opened in self.stack):
             self.stop(mark, f"the alias *{anchor} stands inside what it refers to; write the value out")
-        known = ", ".join(f"&{name}" for name in self.anchors)
+        known = listing(f"&{name}" for name in self.anchors)
         self.refuse(
             mark,
             f"nothing is anchored as &{anchor}; " + (f"known: {known}" if known else "write the value out"),
         )
-        self._add(Scalar(mark, "?"), None, 1)
+        self._add(Scalar(mark, "?"), None)
 
-    def _add(self, node: Node, anchor: str | None, size: int) -> None:
+    def _add(self, node: Node, anchor: str | None, size: int = 1, height: int = 0) -> None:
         if anchor:
-            self.anchors[anchor] = (node, size)
+            self.anchors[anchor] = (node, size, height)
         if not self.stack:
             self.root = node
             return
         parent = self.stack[-1]
         parent.size += size
+        parent.height = max(parent.height, height + 1)
+        if len(self.stack) + height > DEEPEST:
+            self.stop(node.mark, f"nested more than {DEEPEST} deep by this alias; write less of it")
         if parent.size > MOST_NODES:
             self.stop(
                 node.mark,

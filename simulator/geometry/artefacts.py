@@ -62,19 +62,21 @@ def corners(layout: BallLayout) -> NDArray[np.intp]:
     return np.array(layout.corner_set, dtype=np.intp)
 
 
-def coincident_balls(layout: BallLayout) -> list[tuple[int, int]]:
-    """Return the pairs of balls nearer than a nanometre to each other."""
+def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, int]]:
+    """Return pairs of balls nearer than a nanometre to each other, not many more than asked for."""
     found: list[tuple[int, int]] = []
-    order = np.lexsort(layout.coordinates.T)
-    last = layout.coordinates[order, -1]
+    # Along a line askew to all that balls are usually in rows along, only coinciding balls are as far as one another.
+    along = layout.coordinates @ (0.6139, 0.5243, 0.5901)
+    order = np.argsort(along, kind="stable")
+    along = along[order]
     for shift in range(1, len(order)):
-        # Only balls as high as one another, and therefore near in this order, can coincide.
-        apart = last[shift:] - last[:-shift]
-        if not (apart < COINCIDENT).any():
+        near = np.flatnonzero(along[shift:] - along[:-shift] < COINCIDENT)
+        if not len(near) or len(found) >= at_most:
             break
-        differences = layout.coordinates[order[shift:]] - layout.coordinates[order[:-shift]]
+        first, second = order[near], order[near + shift]
+        differences = layout.coordinates[second] - layout.coordinates[first]
         near = np.flatnonzero(np.linalg.norm(differences, axis=1) < COINCIDENT)
-        found += [(int(min(pair)), int(max(pair))) for pair in zip(order[near], order[near + shift], strict=True)]
+        found += [(int(min(pair)), int(max(pair))) for pair in zip(first[near], second[near], strict=True)]
     return sorted(found)
 
 

@@ -183,9 +183,11 @@ class Spline:
         if self.order < 2:
             raise ValueError("a spline's order is 2 (broken lines) at least")
         if any(not 0.0 < knot < 1.0 for knot in self.knots) or list(self.knots) != sorted(self.knots):
-            raise ValueError("interior knots are between 0 and 1, in ascending order")
+            raise ValueError("interior knots are out of order or range; give them between 0 and 1, in ascending order")
         if max(Counter(self.knots).values(), default=0) >= self.order:
-            raise ValueError(f"a knot may stand at one place {self.order - 1} times at most, one less than the order")
+            raise ValueError(
+                f"a knot stands too often at one place; give it {self.order - 1} times at most, one less than the order"
+            )
 
     @property
     def count(self) -> int:

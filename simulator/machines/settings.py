@@ -17,7 +17,7 @@ from .arrangement import ARRANGEMENTS, AXES, Arrangement
 from .bases import Basis, Monomial, Polynomial, Spline
 from .curves import Interpolation, Points, curves_model
 from .custom import custom_model
-from .empirical import empirical_model
+from .empirical import FrameError, empirical_model
 from .kinematic import kinematic_model_of
 from .metric import MetricModel, Scale
 from .protocol import ErrorModel
@@ -42,7 +42,9 @@ class ArrangementSettings(Settings):
     @model_validator(mode="after")
     def _each_axis_once(self) -> Self:
         if sorted(self.probe_side + self.workpiece_side) != list(AXES):
-            raise ValueError("name each of the axes x, y and z exactly once on the two sides together")
+            raise ValueError(
+                "an axis is missing or stands twice; name each of x, y and z exactly once on the two sides together"
+            )
         return self
 
 
@@ -65,7 +67,9 @@ class SplineSettings(Settings):
 
     order: int = Field(default=4, ge=2, le=12, description="Order of the splines, degree plus one: 4 for cubic ones.")
     knots: tuple[float, ...] = Field(
-        default=(), description="Interior knots in ascending order, in fractions of the axis between 0 and 1."
+        default=(),
+        max_length=100,
+        description="Interior knots in ascending order, in fractions of the axis between 0 and 1.",
     )
 
     @model_validator(mode="after")
@@ -128,8 +132,18 @@ class RadialSettings(Settings):
 
     centres: tuple[Centres, Centres, Centres] = Field(description="Number of centres along x, y and z.")
     constant: float = Field(
-        default=0.5, gt=0, le=10, description="Constant c of sqrt(r^2 + c^2), in fractions of the volume."
+        default=0.5, ge=1e-3, le=10, description="Constant c of sqrt(r^2 + c^2), in fractions of the volume."
     )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        try:
+            empirical_model(Radial(self.centres, self.constant), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+        except FrameError:
+            raise ValueError(
+                "these functions are too much alike to be told apart; give fewer centres or a smaller constant"
+            ) from None
+        return self
 
 
 class EmpiricalSettings(Settings):

@@ -75,7 +75,8 @@ SECTIONS = [
      "error_model: {kind: kinematic, arrangement: {probe_side: [x, w], workpiece_side: []}}", [
         '5:62: error_model.arrangement.probe_side[1]: unknown value "w"; allowed: x, y, z']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4, knots: [0.5, 1]}}", [
-        "5:39: error_model.basis: interior knots are between 0 and 1, in ascending order"]),
+        "5:39: error_model.basis: interior knots are out of order or range; give them between 0 and 1, in "
+        "ascending order"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: spline}", [
         '5:39: error_model.basis: unknown value "spline"; allowed: chebyshev, monomial']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4}, rotation_coefficients: 3}", [

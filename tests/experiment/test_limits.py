@@ -1,0 +1,247 @@
+"""Files that ask for more than there is room or time for, or that hold what is no text: what is said, and soon."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simulator.estimation.elimination import SMALL, eliminate
+from simulator.estimation.parameters import shared_layout
+from simulator.experiment import ExperimentError, load
+from simulator.experiment.messages import MOST_MESSAGES
+from simulator.experiment.yamltree import parse_tree, read_text
+from simulator.generate import true_artefacts
+from simulator.geometry.artefacts import BallLayout, coincident_balls
+from simulator.layout import lay_out
+
+GOOD = """\
+title: good
+machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}
+error_model: {kind: kinematic}
+probes: {down: [0 mm, 0 mm, -50 mm]}
+artefacts:
+  plate: {kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}
+positions:
+  - {name: low, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}
+calibration:
+  - {kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}
+"""
+
+
+def refusals(folder: Path, text: str) -> list[str]:
+    path = folder / "e.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ExperimentError) as caught:
+        load(path)
+    return [line.removeprefix(f"{path}:") for line in str(caught.value).split("\n")]
+
+
+def replaced(old: str, new: str) -> str:
+    assert GOOD.count(old) == 1
+    return GOOD.replace(old, new)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        (
+            "corner: {x: 0 mm, y: 0 mm}}",
+            "corner: {x: 0 mm, y: 0 mm}, readings: &r [{repeats: 10000}, {repeats: 10000}]}\n"
+            + "\n".join(
+                f"  - {{name: p{k}, plane: z, level: 0 mm, corner: {{x: 0 mm, y: 0 mm}}, readings: *r}}"
+                for k in range(20)
+            ),
+            "8:82: positions[11].readings[0]: there are 2070000 readings up to here, repeats counted; at most 2000000 "
+            "are possible: read fewer balls, or less often",
+        ),
+        (
+            "[3, 3]",
+            "[200, 200]",
+            "10:30: calibration[0].pairs: distances tie 40000 balls together, at most 3000 are possible; calibrate "
+            "fewer distances, such as corner sides, or co-ordinates",
+        ),
+        (
+            "title: good",
+            "title: good\nevaluation: {points: {random: 40001}}",
+            "2:31: evaluation.points.random: the number 40001 is out of range; give one at most 40000",
+        ),
+        (
+            "title: good",
+            "title: good\nvariants: {" + ", ".join(f"v{k}: {{title: a}}" for k in range(1001)) + "}",
+            "2:11: variants: 1001 variants are too many; at most 1000 are possible",
+        ),
+        (
+            "title: good",
+            "title: good\npriors:\n" + "  - {parameter: EXX, standard_uncertainty: 1 um}\n" * 1251,
+            "1253:5: priors[1250]: there are 5004 priors up to here, coefficients counted; at most 5000 are possible",
+        ),
+        (
+            "  - {name: low,",
+            "\n".join(f"  - {{name: p{k}, plane: z, level: 0 mm, corner: {{x: 0 mm, y: 0 mm}}}}" for k in range(580))
+            + "\n  - {name: low,",
+            "7:1: positions: 581 poses, 69 machine errors and 0 probe offsets make 3555 parameters besides the balls; "
+            "at most 3500 are possible: leave positions out, or give the machine fewer coefficients",
+        ),
+        (
+            "plate: {kind: grid",
+            "a: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n"
+            "  b: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n"
+            "  c: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n  plate: {kind: grid",
+            "8:6: artefacts.c: there are 120000 balls up to here; at most 100000 of all artefacts are possible",
+        ),
+        (
+            "error_model: {kind: kinematic}",
+            "error_model: {kind: empirical, terms: {centres: [8, 8, 8]}}",
+            "3:39: error_model.terms: these functions are too much alike to be told apart; give fewer centres or a "
+            "smaller constant",
+        ),
+    ],
+)
+def test_too_much(tmp_path: Path, old: str, new: str, line: str) -> None:
+    text = replaced(old, new)
+    if "tie 40000" in line:
+        text = text.replace("corner sides", "all")
+    assert line in refusals(tmp_path, text)
+
+
+def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
+    bar = "  bar: {kind: grid, balls: [20, 20], size: [500 mm, 500 mm], role: length_standard}\npositions:"
+    text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
+    text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
+    text = text.replace(
+        "calibration:",
+        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\ncalibration:\n"
+        "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 1 um}",
+    )
+    assert refusals(tmp_path, text) == [
+        '12:45: calibration[0].pairs: 79800 distances of "bar", read 1 times, are too many; at most 20000 lengths are '
+        "possible"
+    ]
+
+
+@pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
+def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
+    (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))
+    assert line.endswith("is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m")
+
+
+def test_the_slope_of_an_uncertainty_that_nothing_has(tmp_path: Path) -> None:
+    (line,) = refusals(tmp_path, f"{GOOD}target_accuracy: 0.2 um + L/1e-3\n")
+    assert line.endswith('"0.2 um + L/1e-3" grows too fast or too slowly; divide L by 1 to 1e+18')
+
+
+def test_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
+    lines = refusals(tmp_path, replaced("balls: [3, 3]", f"balls: [{', '.join(['a'] * 60_000)}]"))
+    assert len(lines) <= 2 * MOST_MESSAGES
+    balls = f"corner: {{x: 0 mm, y: 0 mm}}, balls: [{', '.join(f'b{k}' for k in range(60_000))}]}}"
+    lines = refusals(tmp_path, replaced("corner: {x: 0 mm, y: 0 mm}}", balls))
+    assert len(lines) == MOST_MESSAGES + 1 and lines[-1].endswith(": more than 1000 errors; mend these first")
+    lines = refusals(tmp_path, "a: [" + "~, " * 60_000 + "]")
+    assert len(lines) == MOST_MESSAGES + 1
+    lines = refusals(tmp_path, "a: [" + "*a, " * 60_000 + "]")
+    assert len(lines) == MOST_MESSAGES + 1
+
+
+def test_a_table_of_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
+    (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\n" + "a,b,c\n" * 100_000)
+    text = replaced("{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: balls.csv}")
+    assert refusals(tmp_path, text)[-1].endswith("balls.csv:502:1: more than 1000 errors; mend these first")
+
+
+def test_tables_of_a_million_columns(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("x_mm," * 10**6 + "\n1,2\n")
+    text = replaced("{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: t.csv}")
+    text += "true_machine: {kind: curves, files: [t.csv]}\n"
+    lines = refusals(tmp_path, text)
+    assert lines == [
+        f"{tmp_path}/t.csv:1:1: 1000001 columns are too many; the first line should be {example}"
+        for example in ("ball,x_mm,y_mm", "position_mm,EXX_um,EYX_um,EAX_urad")
+    ]
+
+
+def test_names_with_ends_of_lines_and_control_characters(tmp_path: Path) -> None:
+    text = replaced("name: low,", r'name: low, artefact: "a\n\e[31m\u2028b",')
+    (line,) = refusals(tmp_path, text)
+    assert line == r'8:27: positions[0].artefact: unknown artefact "a\x0a\x1b[31m\u2028b"; known: plate'
+    (line,) = refusals(tmp_path, replaced("name: low,", r'name: low, "a\nb": 1,'))
+    assert line.startswith(r"8:17: positions[0][a\x0ab]: unknown key")
+    (line,) = refusals(tmp_path, replaced("title: good", r'title: "a\tb"'))
+    assert line == '1:8: title: the text "a b" holds a control character; remove it'
+
+
+def test_a_key_that_looks_like_a_merge(tmp_path: Path) -> None:
+    (line,) = refusals(tmp_path, replaced("name: low,", 'name: low, "<<": 1,'))
+    assert line.startswith("8:17: positions[0].<<: unknown key")
+
+
+def test_aliases_count_for_depth() -> None:
+    lines = ["a0: &a0 [1]"] + [f"a{k + 1}: &a{k + 1} {'[' * 40}*a{k}{']' * 40}" for k in range(40)]
+    with pytest.raises(ExperimentError) as caught:
+        parse_tree("\n".join(lines), "f")
+    assert str(caught.value) == "f:3:49: nested more than 50 deep by this alias; write less of it"
+
+
+def _device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def _loop(path: Path) -> None:
+    path.symlink_to(path.name)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (_device, "this is a device; name a file"),
+        (os.mkfifo, "this is a pipe, to which nobody may write; name a file"),
+        (_loop, "cannot be read (Too many levels of symbolic links); check its name and permissions"),
+    ],
+)
+def test_what_is_no_file(tmp_path: Path, make: Callable[[Path], None], text: str) -> None:
+    path = tmp_path / "odd"
+    make(path)
+    with pytest.raises(ExperimentError) as caught:
+        read_text(path)
+    assert str(caught.value) == f"{path}: {text}"
+
+
+def test_many_balls_at_one_place() -> None:
+    names = tuple(map(str, range(40_000)))
+    assert len(coincident_balls(BallLayout(names, np.zeros((40_000, 3))))) >= 3
+    flat = np.random.default_rng(1).random((40_000, 3)) * (1, 1, 0)
+    assert coincident_balls(BallLayout(names, flat)) == []
+
+
+def test_certified_coordinates_of_many_balls(tmp_path: Path) -> None:
+    """Frame, estimate and synthetic artefact of 10,000 balls need no matrix over all of them."""
+    text = replaced("[3, 3]", "[100, 100]").replace("distances, pairs: corner sides", "coordinates, balls: all")
+    (tmp_path / "e.yaml").write_text(text)
+    design = lay_out(load(tmp_path / "e.yaml")[0])
+    off = true_artefacts(design, np.random.default_rng(1)) - design.balls
+    assert 0.99 < off.std() / 0.2e-6 < 1.01 and abs(off.mean()) < 0.01e-6
+
+
+def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = replaced("[3, 3]", "[14, 14]").replace("corner sides", "neighbours")
+    (tmp_path / "e.yaml").write_text(text)
+    design = lay_out(load(tmp_path / "e.yaml")[0])
+    arguments = design, shared_layout(design)
+    from simulator.design import nominal_state
+
+    state = nominal_state(design)
+    assert SMALL < 3 * 196
+    some = eliminate(*arguments, state)
+    monkeypatch.setattr("simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
+    few = eliminate(*arguments, state)
+    monkeypatch.setattr("simulator.estimation.elimination.SMALL", 10_000)
+    plain = eliminate(*arguments, state)
+    for one in (some, few):
+        np.testing.assert_allclose(
+            one.root.T @ one.root, plain.root.T @ plain.root, atol=1e-7 * abs(plain.root).max() ** 2
+        )
+        whole = one.kept_root.T @ one.kept_root
+        np.testing.assert_allclose(whole, plain.kept_root.T @ plain.kept_root, atol=1e-12 * abs(whole).max())

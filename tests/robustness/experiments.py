@@ -1,0 +1,114 @@
+"""Which files are changed, what is tried in them that they are not made for, and the commands that then read them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from simulator.experiment.schema import schema
+from tests.robustness.mutations import vocabulary
+from tests.robustness.worker import complaint
+
+SEED = 1
+FILES = Path(__file__).parent / "files"
+QUICKSTART = Path("designs/quickstart.yaml")
+QUICK = [QUICKSTART, *sorted(Path("designs/hocken_borchardt").glob("*.yaml")), *sorted(FILES.glob("*.yaml"))]
+# Those that are planned in no time are tried more often.
+EXPERIMENTS = [*sorted(Path("designs/npl").glob("*.yaml")), *5 * QUICK]
+
+SIZES = ["0 mm", "-1 m", "1 nm", "1 pm", "1e-300 m", "1e300 m", "1e9 m", "1e-9 pm", "999999 m", "5", 5, "1e-18 m"]
+WILD: dict[str, list[Any]] = {
+    "balls": [
+        [500, 500],
+        [200, 200],
+        [2, 500],
+        [10**5, 10**5],
+        [10**9, 2],
+        10**9,
+        500,
+        2,
+        [1, 1],
+        ["r1c1"] * 3,
+        "corners",
+    ],
+    "size": [*SIZES, ["1e300 m", "1 m"], ["1 nm", "1 nm"]],
+    "volume": [
+        *(["1e300 m"] * 3, ["1 nm"] * 3, ["1e-300 m"] * 2, ["1 m"] * 4, ["1e6 m"] * 3, ["1e-17 m"] * 3),
+        {"x": ["0 m", "0 m"], "y": ["0 m", "1e300 m"]},
+        {"x": ["-1e6 m", "1e6 m"], "y": ["-1 m", "1 m"], "z": ["-1e-18 m", "1 m"]},
+    ],
+    "repeatability": [*SIZES, ["1e-300 m", "1e300 m", "1 um"], ["1e-18 m", "1e6 m", "1 um"]],
+    "standard_uncertainty": [*SIZES, "1e-300 m + L/1e-300", "1e300 um + L/1", {"z": "1 um"}, ["1 um", "1e300 m"]],
+    "target_accuracy": [*SIZES, "1e-300 m + L/1e300"],
+    "level": SIZES,
+    "length": SIZES,
+    "repeats": [10_000, 10_001, 10**12, 0],
+    "random": [10**9, 40_000, 1_000_001, 0],
+    "seed": [10**290, 2**64, -1, 1.5],
+    "quarter_turns": [10**18, -(10**18), 10**290, 3],
+    "position_coefficients": [10**6, 30, 31, 2],
+    "rotation_coefficients": [10**6, 30, 31, 1],
+    "coefficients": [10**6, 12, 13, 2],
+    "order": [10**6, 12, 13, 2],
+    "knots": [
+        *([k / 30_001 for k in range(1, 30_001)], [k / 50 for k in range(1, 50)], [0.5] * 11, [0.5] * 3),
+        *([1e-300], [1e-9, 2e-9], [5e-324, 0.5], [0.5, 0.5 + 1e-16], [1 - 1e-16]),
+    ],
+    "centres": [[8, 8, 8], [9, 9, 9], [2, 2, 8], [10**9] * 3],
+    "constant": [1e-300, 1e-9, 10, 1e-3],
+    "terms": [{"centres": [8, 8, 8]}, "tensor", "quadratic", {"centres": [4, 4, 4], "constant": 1e-3}],
+    "pairs": ["all", "braced", "neighbours", [["r1c1", "r1c1"]], [[f"r1c{k}", f"r2c{k}"] for k in range(20_000)]],
+    "origin": [["1e300 m"] * 3, ["-1e300 m", "0 m"], ["0 m"] * 2],
+    "rotation": ["1e300 rad", ["1e300 rad"] * 3, ["90 deg"] * 3, "90 deg", ["1e6 rad"] * 3],
+    "rotations": ["full", "linearised"],
+    "offset": [["1e300 m"] * 3, ["1e6 m", "0 m", "0 m"]],
+    "object": [
+        "json:loads",
+        "os:getcwd",
+        "no_such:build",
+        "math:pi",
+        ":",
+        "a:b:c",
+        "os.path:join",
+        "mutant",
+        "x" * 5000,
+    ],
+    "options": [{"a": 10**290}, {"": 1}],
+    "values": [
+        *({"EXX t^2": "1e300 m"}, {"EXX[1]": "1e-300 m"}, {"EXX[1]": "1e6 m"}, {"EAX t^1": "1e5 rad"}, {"x": "1 um"}),
+        {f"EXX t^{k}": "1 um" for k in range(9)},
+    ],
+    "position": ["1e300 m", "1e6 m", "10 m", "1e-300 m"],
+    "expected_rank_deficiency": [10**290, 10**9, 5],
+    "variants": [
+        *({str(k): {"title": "a"} for k in range(3)}, {f"v{k}": {"title": "a"} for k in range(30)}),
+        *({"a": {"positions[0]": 5}}, {f"v{k}": {"title": "a"} for k in range(1001)}),
+    ],
+    "parameter": ["EXX", "EAX", "x" * 5000, "EXX[1]", "EXX t^2", "low: rotation x"],
+    "value": ["1e300 m", "1 um", "1e5 rad", "1e6 m"],
+}
+WORDS = vocabulary(schema(), WILD)
+
+
+def _json(path: Path) -> list[str]:
+    return ["--json"] if path.stat().st_size % 2 else []
+
+
+def check(path: Path) -> str | None:
+    """What is wrong with what `ballplate check` makes of a file."""
+    return complaint(["check", *_json(path), str(path)], path.parent)
+
+
+def run(path: Path) -> str | None:
+    """What is wrong with what `ballplate run` makes of a file."""
+    return complaint(["run", *_json(path), str(path)], path.parent)
+
+
+def simulate(path: Path) -> str | None:
+    """What is wrong with the readings that `ballplate simulate` makes of a file."""
+    return complaint(["simulate", str(path), "-o", "-"], path.parent)
+
+
+def fit(path: Path) -> str | None:
+    """What is wrong with what `ballplate fit` makes of a table of readings, the experiment's file beside it."""
+    return complaint(["fit", *_json(path), str(path.with_suffix(".yaml")), str(path)], path.parent)
