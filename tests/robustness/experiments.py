@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from analysis.sweeps.schema import schema as sweep_schema
 from simulator.experiment.schema import schema
 from tests.robustness.mutations import vocabulary
 from tests.robustness.worker import complaint
@@ -89,6 +90,64 @@ WILD: dict[str, list[Any]] = {
 }
 WORDS = vocabulary(schema(), WILD)
 
+SWEEPS = sorted((FILES / "sweeps").glob("*.yaml"))
+PATHS = [
+    "seed",
+    "positions",
+    "positions[0].level",
+    "artefacts",
+    "artefacts.plate.balls",
+    "a..b",
+    "[",
+    "x" * 5000,
+    "variants",
+]
+SWEEP_WORDS = vocabulary(
+    sweep_schema(),
+    {
+        "base": [
+            "quickstart.yaml",
+            "mutant.yaml",
+            ".",
+            "no.yaml",
+            "loop.csv",
+            "pipe.csv",
+            "/dev/zero",
+            "x" * 5000,
+            "balls.csv",
+        ],
+        "path": PATHS,
+        "paths": [PATHS, [], PATHS[:2], ["seed", "seed"]],
+        "from": [*SIZES, 10**290, -1, 0, "1e-300 m", "5 deg"],
+        "to": [*SIZES, 10**290, 10**9, "1e300 m", "100001 mm"],
+        "count": [2, 100_000, 100_001, 10**18, 0, -1],
+        "step": [*SIZES, 1e-300, 10**290, 0, -1],
+        "values": [
+            *([], {}, [1] * 3, list(range(100_001)), [None], [[]], [{}], [True, "true"], ["1 mm", "1 deg", 5]),
+            {str(k): k for k in range(2000)},
+        ],
+        "together": [{}, {path: [1, 2] for path in PATHS}, {"seed": [1], "title": [1, 2]}, {"seed": 5}],
+        "names": [[], ["a"] * 2, ["a", "b"], [1, 2], ["x" * 5000, "y"]],
+        "sizes": [[1], list(range(1, 7)), [10**18], [0], [3] * 3],
+        "always": [["z low"] * 2, ["nobody"], [f"{k}" for k in range(1000)]],
+        "among": [["z low"], [], ["nobody"]],
+        "variants": ["all", ["one"], [], ["nobody"] * 1000],
+        "variant": ["nobody", "one"],
+        "skip": [[{}], [{"size": "500 mm"}] * 1000, [{"balls": {"above": 1}}], [{"level": {"above": "1 deg"}}]],
+        "only": [[{}], [{"size": "5 mm"}], [{"level": {"below": "1 m", "above": "1 m"}}]],
+        "trials": [2, 1, 10**7, 10**18],
+        "seed": [10**290, 2**64, -1, 1.5],
+        "record": [["U1"] * 100, ["U7"], []],
+        "axes": [
+            {f"a{k}": {"path": f"positions[{k}].level", "from": "1 mm", "to": "9 mm", "count": 1000} for k in range(6)},
+            {
+                "a": {"path": "seed", "from": 1, "to": 100_000, "step": 1},
+                "b": {"path": "sigma", "values": list(range(11))},
+            },
+        ],
+    },
+)
+
 
 def _json(path: Path) -> list[str]:
     return ["--json"] if path.stat().st_size % 2 else []
@@ -112,3 +171,8 @@ def simulate(path: Path) -> str | None:
 def fit(path: Path) -> str | None:
     """What is wrong with what `ballplate fit` makes of a table of readings, the experiment's file beside it."""
     return complaint(["fit", *_json(path), str(path.with_suffix(".yaml")), str(path)], path.parent)
+
+
+def sweep(path: Path) -> str | None:
+    """What is wrong with what `ballplate sweep --dry-run` makes of a file."""
+    return complaint(["sweep", "--dry-run", "--workers", "1", str(path)], path.parent)

@@ -13,7 +13,21 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
 from analysis.cli import main
-from tests.robustness.experiments import EXPERIMENTS, FILES, QUICK, QUICKSTART, SEED, WORDS, check, fit, run, simulate
+from tests.robustness.experiments import (
+    EXPERIMENTS,
+    FILES,
+    QUICK,
+    QUICKSTART,
+    SEED,
+    SWEEP_WORDS,
+    SWEEPS,
+    WORDS,
+    check,
+    fit,
+    run,
+    simulate,
+    sweep,
+)
 from tests.robustness.mutations import Mutant, emit_file, mutants, table_mutants, trees
 from tests.robustness.worker import Worker
 
@@ -26,6 +40,8 @@ def folder(tmp_path: Path) -> Path:
     """Where mutants are tried, with the tables that they name, and other things that can be named."""
     for table in FILES.glob("*.csv"):
         shutil.copy(table, tmp_path)
+    shutil.copy(QUICKSTART, tmp_path)
+    shutil.copy(FILES / "splines.yaml", tmp_path)
     (tmp_path / "loop.csv").symlink_to("loop.csv")
     os.mkfifo(tmp_path / "pipe.csv")
     return tmp_path
@@ -47,6 +63,12 @@ def faults(worker: Worker, found: Iterable[Mutant], folder: Path) -> Iterator[st
 def try_experiments(trial: Any, files: list[Path], numbers: range, folder: Path) -> None:
     with Worker(trial, QUICKSTART) as worker:
         found = list(islice(faults(worker, mutants(files, WORDS, SEED, numbers), folder), ENOUGH))
+    assert not found, "\n\n".join(found)
+
+
+def try_sweeps(numbers: range, folder: Path) -> None:
+    with Worker(sweep, Path("designs/sweeps/plate-size.yaml")) as worker:
+        found = list(islice(faults(worker, mutants(SWEEPS, SWEEP_WORDS, SEED, numbers), folder), ENOUGH))
     assert not found, "\n\n".join(found)
 
 
@@ -92,6 +114,10 @@ def test_some_mutants(trial: Any, numbers: range, folder: Path) -> None:
     try_experiments(trial, QUICK, numbers, folder)
 
 
+def test_some_sweeps(folder: Path) -> None:
+    try_sweeps(range(120), folder)
+
+
 def test_some_tables_of_readings(folder: Path) -> None:
     try_readings(range(60), folder)
 
@@ -112,6 +138,12 @@ def test_some_trees(folder: Path) -> None:
 )
 def test_many_mutants(trial: Any, files: list[Path], numbers: range, folder: Path) -> None:
     try_experiments(trial, files, numbers, folder)
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_many_sweeps(folder: Path) -> None:
+    try_sweeps(range(3000), folder)
 
 
 @pytest.mark.slow
