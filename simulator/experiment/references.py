@@ -23,7 +23,7 @@ from .yamltree import Sequence as SequenceNode
 
 DEFAULT_PROBE = "probe"
 
-# Of all artefacts together, and of all positions with their repeats: about what a gigabyte has room for.
+# Of all artefacts together, and of all positions with their repeats: half a million readings take half a gigabyte.
 MOST_BALLS_OF_ALL = 100_000
 MOST_READINGS = 2_000_000
 

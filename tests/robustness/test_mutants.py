@@ -108,7 +108,7 @@ def try_trees(count: int, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("trial", "numbers"), [(check, range(160)), (run, range(20_000, 20_040)), (simulate, range(30_000, 30_040))]
+    ("trial", "numbers"), [(check, range(120)), (run, range(20_000, 20_020)), (simulate, range(30_000, 30_020))]
 )
 def test_some_mutants(trial: Any, numbers: range, folder: Path) -> None:
     try_experiments(trial, QUICK, numbers, folder)
@@ -119,11 +119,11 @@ def test_some_sweeps(folder: Path) -> None:
 
 
 def test_some_tables_of_readings(folder: Path) -> None:
-    try_readings(range(60), folder)
+    try_readings(range(40), folder)
 
 
 def test_some_trees(folder: Path) -> None:
-    try_trees(60, folder)
+    try_trees(40, folder)
 
 
 @pytest.mark.slow
