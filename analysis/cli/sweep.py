@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
 WRONG_USAGE, BAD_FILE, INTERRUPTED = 2, 3, 130
 
-# Cells that an estimate of time tries.
-TRIED = 3
-
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
@@ -55,9 +52,9 @@ def run(options: Namespace) -> int:
     from ..sweeps.store import StoreError, open_store
 
     sweep = load_sweep(options.file)
-    bundle = bundle_of(sweep)
     if options.dry_run:
-        return _dry_run(sweep, bundle, options)
+        return _dry_run(sweep, options)
+    bundle = bundle_of(sweep)
     path = options.store or options.file.with_suffix(".sqlite")
     if path.resolve() in (options.file.resolve(), sweep.base.resolve()):
         print(f"ballplate sweep: --store {path} is the sweep's own file; name another", file=sys.stderr)
@@ -152,28 +149,16 @@ def _tell(store: Store, number: int, summary: Summary) -> None:
             print(f"and {len(reasons) - 10} reasons more; see ballplate export", file=sys.stderr)
 
 
-def _dry_run(sweep: Sweep, bundle: Bundle, options: Namespace) -> int:
+def _dry_run(sweep: Sweep, options: Namespace) -> int:
     import os
-    import time
 
-    from ..sweeps.task import Task, blocks_of, compute
+    from ..sweeps.estimate import seconds_of
     from .progress import duration
 
     for number in range(len(sweep.cells)):
         print(f"{number}: {sweep.label(number)}")
-    last = len(sweep.cells) - 1
-    tried = sorted({0, last // 2, last})[:TRIED]
-    seconds = []
-    for number in tried:
-        start = time.perf_counter()
-        # One block stands for all of a cell's.
-        compute(sweep, Task(number, 1 if blocks_of(sweep) else 0))
-        seconds.append((time.perf_counter() - start) * max(blocks_of(sweep), 1))
     workers = options.workers or len(os.sched_getaffinity(0))
-    total = sum(seconds) / len(seconds) * len(sweep.cells) / workers
-    print(
-        f"{len(sweep.cells)} cells, about {duration(total)} with {workers} worker{'s' if workers > 1 else ''}, "
-        f"judged by {len(tried)} of them",
-        file=sys.stderr,
-    )
+    seconds, tried = seconds_of(sweep)
+    words = f"with {workers} worker{'s' if workers > 1 else ''}, judged by {tried} of them"
+    print(f"{len(sweep.cells)} cells, about {duration(seconds / workers)} {words}", file=sys.stderr)
     return 0

@@ -77,7 +77,7 @@ def of_range(
     if unit_of_last != unit:
         raise ValueError(f'from and to have the units "{unit}" and "{unit_of_last}"; write both in the same unit')
     if (count is None) == (step is None):
-        raise ValueError("a range needs count or step, and one of them only")
+        raise ValueError("a range needs count or step; give one of the two")
     if count is None:
         difference, unit_of_step = _exact(step, "step")
         if unit_of_step != unit:
@@ -107,7 +107,7 @@ def _exact(value: object, key: str) -> tuple[Fraction, str]:
     text = str(value)
     found = QUANTITY.fullmatch(text.strip()) if len(text) < 100 else None
     if found is None:
-        raise ValueError(f'{key}: "{shorten(text)}" is neither a number nor a quantity such as "300 mm"')
+        raise ValueError(f'{key}: "{shorten(text)}" is neither a number nor a quantity; write for example "300 mm"')
     return exact_number(found[1]), (found[2] or "").strip()
 
 

@@ -67,7 +67,8 @@ def try_experiments(trial: Any, files: list[Path], numbers: range, folder: Path)
 
 
 def try_sweeps(numbers: range, folder: Path) -> None:
-    with Worker(sweep, Path("designs/sweeps/plate-size.yaml")) as worker:
+    # Data sets of designs that hardly determine anything take long, and rightly so.
+    with Worker(sweep, Path("designs/sweeps/plate-size.yaml"), seconds=60.0) as worker:
         found = list(islice(faults(worker, mutants(SWEEPS, SWEEP_WORDS, SEED, numbers), folder), ENOUGH))
     assert not found, "\n\n".join(found)
 
