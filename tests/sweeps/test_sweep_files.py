@@ -143,7 +143,7 @@ def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
         ("axes:\n  a: {path: seed, values: [1], to: 5}\n", ["s.yaml:4:32: axes.a.to: does not go with values"]),
         (
             "axes:\n  a: {path: seed, from: 1, to: 5}\n",
-            ["s.yaml:4:6: axes.a: a range needs count or step; give one of the two"],
+            ["s.yaml:4:6: axes.a: a range needs count or step;"],
         ),
         (
             "axes:\n  a: {path: seed, from: 1 mm, to: 5 m, count: 3}\n",
