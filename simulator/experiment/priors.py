@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..estimation.parameters import AXIS_NAMES, pose_parameter_names
+from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
@@ -25,10 +26,17 @@ def resolve_priors(
 ) -> tuple[Prior, ...]:
     """Return what is known beforehand; what is wrong goes to the problems."""
     settings, entries = sections.get("error_model"), sections.entries("priors")
-    if not entries or settings is None or machine is None or dimension_of(settings) != machine.dimension:
+    if not entries or settings is None or machine is None:
+        return ()
+    if dimension_of(settings) not in (machine.dimension, None):
         return ()
     lower, upper = (tuple(map(float, end)) for end in (machine.volume.lower, machine.volume.upper))
-    known = _known(build_error_model(settings, lower, upper), positions, references)
+    try:
+        model = build_error_model(settings, lower, upper)
+    except CustomModelError:
+        # Told already, with the error model.
+        return ()
+    known = _known(model, positions, references)
     found: list[Prior] = []
     for i, entry in entries.items():
         found += _prior(entry, ("priors", int(i)), known, references)

@@ -166,3 +166,13 @@ def test_a_jacobian_is_compared_with_differences_of_full_rotations() -> None:
 
     model = kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True)
     custom._check("own", model, np.zeros(3), np.ones(3))
+
+
+def test_priors_about_a_model_of_ones_own(tmp_path: Path) -> None:
+    file, _ = written(tmp_path, GOOD)
+    prior = "priors: [{parameter: squareness xz, standard_uncertainty: 1 urad}]\n"
+    file.write_text(file.read_text(encoding="utf-8") + prior, encoding="utf-8")
+    (experiment,) = load(file)
+    assert [one.name for one in experiment.priors] == ["squareness xz"]
+    file.write_text(file.read_text(encoding="utf-8").replace("squareness xz, s", "squarness xz, s"), encoding="utf-8")
+    assert 'unknown parameter "squarness xz"; did you mean "squareness xz"?' in refusal(file)
