@@ -21,7 +21,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "best and the worst design. With --format text, markdown, csv or latex the tables alone.",
     )
     add_store(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="page or tables; default: the screen")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="page or tables; default, and -: the screen")
     parser.add_argument(
         "--format",
         choices=("html", "text", "markdown", "csv", "latex"),
@@ -44,7 +44,14 @@ def run(options: Namespace) -> int:
     if output is not None and output.resolve() == options.store.resolve():
         print(f"ballplate report: -o {output} is the store itself; name another file", file=sys.stderr)
         return WRONG_USAGE
-    form = options.format or SUFFIXES.get("" if output is None else output.suffix.lower(), "html")
+    if str(output) == "-":
+        output = None
+    suffix = "" if output is None else output.suffix.lower()
+    if options.format is None and suffix not in ("", *SUFFIXES):
+        endings = ", ".join(SUFFIXES)
+        print(f"ballplate report: {output} should end in one of {endings}; or state --format", file=sys.stderr)
+        return WRONG_USAGE
+    form = options.format or SUFFIXES.get(suffix, "html")
     try:
         store = open_store(options.store)
         try:

@@ -78,13 +78,14 @@ def run(options: Namespace) -> int:
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     from ..sweeps.bundle import bundle_of, changes, definition
     from ..sweeps.execute import run_sweep
-    from ..sweeps.store import add_sweep, forget_keys, keys, sweeps
+    from ..sweeps.store import add_sweep, forget_keys, keys, statuses, sweeps
     from .progress import ProgressBar
 
     new = definition(sweep, bundle)
     stored = sweeps(store)
     number = next((k for k, old in stored.items() if not changes(old, new)), None)
-    if number is None and stored and not options.beside:
+    has_results = "done" in statuses(store).values()
+    if number is None and has_results and not options.beside:
         print(f"{store.path}: holds another sweep; what has changed:", file=sys.stderr)
         for line in changes(stored[max(stored)], new)[:20]:
             print(f"  {line}", file=sys.stderr)
@@ -95,7 +96,10 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     bar, before = ProgressBar("cells"), set(keys(store, number))
 
     def report(summary: Summary) -> None:
-        remark = f"{summary.failed} failed" if summary.failed else ""
+        remark = ", ".join(
+            ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
+            + ([f"{summary.failed} failed"] if summary.failed else [])
+        )
         bar.show(summary.done + summary.failed, summary.cells, remark, summary.before)
 
     try:
@@ -132,7 +136,8 @@ def _tell(store: Store, number: int, summary: Summary) -> None:
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
-    print(f"{store.path}: {summary.cells} cells, {summary.done} done, {summary.failed} failed{before}{left}")
+    counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
+    print(f"{store.path}: {counted}, {summary.done} done, {summary.failed} failed{before}{left}")
     found = results(store, number)
     versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:
@@ -158,7 +163,11 @@ def _dry_run(sweep: Sweep, options: Namespace) -> int:
     for number in range(len(sweep.cells)):
         print(f"{number}: {sweep.label(number)}")
     workers = options.workers or len(os.sched_getaffinity(0))
-    seconds, tried = seconds_of(sweep)
-    words = f"with {workers} worker{'s' if workers > 1 else ''}, judged by {tried} of them"
-    print(f"{len(sweep.cells)} cells, about {duration(seconds / workers)} {words}", file=sys.stderr)
-    return 0
+    seconds, rows = seconds_of(sweep)
+    words = f"with {workers} worker{'s' if workers > 1 else ''}, judged by {len(rows)} of them"
+    cells = f"{len(sweep.cells)} cell{'s' if len(sweep.cells) > 1 else ''}"
+    print(f"{cells}, about {duration(seconds / workers)} {words}", file=sys.stderr)
+    failed = [row for row in rows if row.status == "failed"]
+    for row in failed:
+        print(f"cell {row.number} fails: {row.reason}", file=sys.stderr)
+    return 1 if failed else 0

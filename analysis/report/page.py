@@ -132,8 +132,8 @@ def _facts(results: Results) -> list[tuple[str, str]]:
                   f"{results.left} left"),
         ("Recorded", ", ".join(stored["record"])),
         ("Monte Carlo", f"{stored['trials']} data sets of each cell" if stored["trials"] else "none"),
-        ("Seed", str(stored["seed"])),
     ]  # fmt: skip
+    facts += [("Seed", str(stored["seed"]))] if stored["trials"] else []
     names = [name for name in results.frame.columns if name.endswith("_version")]
     counts = Counter(zip(*(results.frame[name].tolist() for name in names), strict=True))
     for versions, count in counts.items():
@@ -171,9 +171,9 @@ def _designs(store: Store, results: Results, run_modules: bool) -> dict[str, Any
         which = ("Smallest", "Largest")[k] if len(cells) > 1 else "The only"
         row = int(np.flatnonzero(results.frame["cell"] == cell)[0])
         value, open_ = (results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined"))
-        told = f"{number(1e6 * value, 3)} µm" if judged[0].endswith("_m") else number(1e6 * value, 3)
+        told = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
         told += f", {open_:.0f} undetermined" if open_ else ""
-        heading = f"{which} average of {symbol}, {told}: cell {cell}, {results.label(cell)}"
+        heading = f"{which} average of {symbol}{told}: cell {cell}, {results.label(cell)}"
         designs.append(_drawn_design(experiment, cell, heading, k))
     return {"designs": designs, "no_designs": "", "error_map": _drawn_map(found[0], results, cells[0])}
 

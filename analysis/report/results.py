@@ -146,16 +146,21 @@ def best_and_worst(results: Results) -> tuple[int, ...]:
 
     One cell if there is only one, none if none is done or nothing is recorded.
     """
+    rows = ranked(results)
+    cells = results.frame["cell"].to_numpy()[rows]
+    return tuple(dict.fromkeys((int(cells[0]), int(cells[-1])))) if len(rows) else ()
+
+
+def ranked(results: Results) -> Integers:
+    """Rows of the cells that are done, best first: those that leave less open, then of smaller average uncertainty."""
     judged = criterion(results)
     done = np.flatnonzero(results.done)
-    if judged is None or not len(done):
-        return ()
+    if judged is None:
+        return done[:0]
     column, name = judged
     average = np.nan_to_num(results.figure(column)[done], nan=math.inf)
     open_ = results.figure(f"{name}_undetermined")[done]
-    order = np.lexsort((done, average, open_))
-    cells = results.frame["cell"].to_numpy()[done[order]]
-    return tuple(dict.fromkeys((int(cells[0]), int(cells[-1]))))
+    return np.asarray(done[np.lexsort((done, average, open_))])
 
 
 def cell_list(cells: Iterable[int], most: int = 12) -> str:

@@ -17,12 +17,13 @@ from .measures import (
     trial_measures,
     uncertainty_measures,
 )
-from .results import Results
+from .results import Results, criterion, ranked
 
 DIGITS = 3
 
 # Columns beside each other, blocks below each other and rows of a table that can still be read.
 MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
+MOST_BEST = 10
 
 NOT_DONE = "left"
 
@@ -80,16 +81,34 @@ def report_tables(results: Results) -> tuple[Table, ...]:
     """All tables of figures: the uncertainties and, where trials were made, those of Monte Carlo."""
     beside = _is_beside(results)
     measures = [*rank_measures(results), *uncertainty_measures(results, beside)]
-    found = [_table(results, "uncertainties", "Standard uncertainties", measures, beside)] if measures else []
+    open_ = "Maxima and averages leave out what is undetermined."
+    notes = (open_,) if rank_measures(results) else ()
+    found = [_table(results, "uncertainties", "Standard uncertainties", measures, beside, notes)] if measures else []
+    if not beside and len(results.frame) > 1:
+        found = [*_best(results), *found]
     of_trials = trial_measures(results, beside)
     if of_trials:
         caption = "Monte Carlo beside the uncertainties"
         note = (
             "In parentheses the standard error in units of the last digit; actual is the root mean square of the "
-            "errors, averaged as U is; covered is the share of true values within the expanded uncertainty for 95 %."
+            "errors, averaged as U is; covered is the share of true values within the expanded uncertainty for 95 %. "
+            "U5 and U6 are followed over 1000 distances where there are more, of which actual is the average and which "
+            "spread / U compares with their own U."
         )
         found.append(_table(results, "monte-carlo", caption, of_trials, beside, (note,)))
     return tuple(found)
+
+
+def _best(results: Results) -> list[Table]:
+    """The best cells first, where cells do not stand beside each other anyway."""
+    judged = criterion(results)
+    if judged is None:
+        return []
+    own = [one for one in uncertainty_measures(results, of_parts=False) if one.symbol == judged[1]]
+    measures = [*rank_measures(results), *own]
+    rows = ranked(results)[:MOST_BEST].tolist()
+    note = f"By average {judged[1]}; cells that leave less undetermined come first."
+    return [_below(results, "best", "Best cells", measures, (note,), rows)] if rows else []
 
 
 def _is_beside(results: Results) -> bool:
@@ -138,16 +157,23 @@ def _beside(results: Results, name: str, caption: str, measures: Sequence[Measur
     return Table(name, caption, ("", "unit"), axis.labels, tuple(blocks), axis.name, block, notes)
 
 
-def _below(results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]) -> Table:
-    """A row for each cell, as far as they can be read."""
+def _below(
+    results: Results,
+    name: str,
+    caption: str,
+    measures: Sequence[Measure],
+    notes: tuple[str, ...],
+    rows: Sequence[int] | None = None,
+) -> Table:
+    """A row for each cell, as far as they can be read, or for some of them."""
     found = []
-    for row in range(min(len(results.frame), MOST_ROWS)):
+    for row in range(min(len(results.frame), MOST_ROWS)) if rows is None else rows:
         cell = int(results.frame["cell"].to_numpy()[row])
         labels = tuple(axis.labels[k] for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True))
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
         found.append(Row((str(cell), *labels), entries))
     more = len(results.frame) - len(found)
-    if more > 0:
+    if more > 0 and rows is None:
         notes = (f"{more} cells more are not shown here; ballplate export gives all.", *notes)
     headings = ("cell", *(axis.name for axis in results.axes))
     columns = tuple(measure.title for measure in measures)

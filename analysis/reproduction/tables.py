@@ -384,6 +384,9 @@ def _summary(found: Reproduction) -> list[Block]:
     ):
         if ones:
             parts.append((words, f"{sum(ones)} of {len(ones)}"))
+    unexplained = sum(len(under) for one, under in _excepted(found) if one.open)
+    if unexplained:
+        parts.append(("open differences, unexplained", f"{unexplained} figures"))
     text = "Everything compared agrees within what is stated." if found.agrees else "NOT everything compared agrees."
     blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), Paragraph(text)]
     if regular:

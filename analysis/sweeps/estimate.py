@@ -5,22 +5,24 @@ from __future__ import annotations
 from dataclasses import replace
 
 from .model import Sweep
-from .task import Task, compute
+from .task import Row, Task, compute
 
 # Data sets by which the others are judged.
 SOME = 256
 
 
-def seconds_of(sweep: Sweep) -> tuple[float, int]:
-    """Seconds that all cells take in one process, and the number of cells that were tried: first, middle and last."""
+def seconds_of(sweep: Sweep) -> tuple[float, list[Row]]:
+    """Seconds that all cells take in one process, and the rows of the cells that were tried: first, middle and last."""
     last = len(sweep.cells) - 1
     numbers = sorted({0, last // 2, last})
-    total = 0.0
+    total, rows = 0.0, []
     for number in numbers:
-        alone = compute(replace(sweep, trials=None), Task(number)).seconds
+        row = compute(replace(sweep, trials=None), Task(number))
+        alone = row.seconds
         total += alone
-        if sweep.trials is not None:
+        if sweep.trials is not None and row.status == "done":
             some = min(sweep.trials, SOME)
-            together = compute(replace(sweep, trials=some), Task(number)).seconds
-            total += max(together - alone, 0.0) * sweep.trials / some
-    return total / len(numbers) * len(sweep.cells), len(numbers)
+            row = compute(replace(sweep, trials=some), Task(number))
+            total += max(row.seconds - alone, 0.0) * sweep.trials / some
+        rows.append(row)
+    return total / len(numbers) * len(sweep.cells), rows

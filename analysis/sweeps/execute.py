@@ -16,14 +16,22 @@ from .task import KEY_ONLY, Row, Task, blocks_of
 Runner = Callable[[Sequence[Task]], Iterator[Row]]
 
 
+# Replicate blocks that are done before the cells that they belong to.
+BLOCKS_AT_ONCE = 16
+
+
 @dataclass(frozen=True)
 class Summary:
-    """How far a sweep has come: cells in all, done or failed, `before` of them in an earlier run."""
+    """How far a sweep has come: cells in all, done or failed, `before` of them in an earlier run.
+
+    `blocks` counts the replicate blocks done in this run.
+    """
 
     cells: int
     before: int
     done: int
     failed: int
+    blocks: int = 0
 
     @property
     def left(self) -> int:
@@ -71,28 +79,40 @@ def run_sweep(
         run.known |= fresh
     done_with = ("done",) if retry_failed else ("done", "failed")
     left = [k for k in range(run.cells) if run.status(k) not in done_with]
-    summary = run.summary()
-    run.before = summary.done + summary.failed
-    summary = run.summary()
+    run.before = run.cells - len(left)
+    summary = run.summary() if not retry_failed else Summary(run.cells, run.before, run.before, 0)
     report(summary)
-    blocks = range(1, blocks_of(sweep) + 1)
-    parts = [Task(k, block) for k in left for block in blocks if run.status(k, block) != "done"]
-    for tasks in (parts, [Task(k) for k in left]):
-        if tasks and tasks[0].block == 0 and blocks:
-            tasks = [Task(one.number, 0, _total(run, one.number, blocks)) for one in tasks]
-        done, failed = summary.done, summary.failed
-        rows = runner(tasks) if tasks else iter(())
-        for row in rows:
-            before = run.found.get((row.key, row.block))
-            add_rows(store, number, [row])
-            run.known[row.number], run.found[row.key, row.block] = row.key, row.status
-            if row.block == 0:
-                done += row.status == "done"
-                failed += (row.status == "failed") - (before == "failed")
-                report(Summary(run.cells, run.before, done, failed))
-            if row.status == "failed" and fail_fast:
-                return run.summary()
+    for cells in _groups(left, blocks_of(sweep)):
+        for tasks in _waves(run, cells, blocks_of(sweep)):
+            for row in runner(tasks) if tasks else ():
+                add_rows(store, number, [row])
+                run.known[row.number], run.found[row.key, row.block] = row.key, row.status
+                of_cells = (row.block == 0, row.status)
+                summary = Summary(
+                    run.cells,
+                    run.before,
+                    summary.done + (of_cells == (True, "done")),
+                    summary.failed + (of_cells == (True, "failed")),
+                    summary.blocks + (row.block > 0),
+                )
+                report(summary)
+                if row.status == "failed" and fail_fast:
+                    return run.summary()
     return run.summary()
+
+
+def _groups(cells: list[int], blocks: int) -> Iterator[list[int]]:
+    """Cells whose replicate blocks are done together, before the cells themselves; all at once where there are none."""
+    size = max(BLOCKS_AT_ONCE // blocks, 1) if blocks else max(len(cells), 1)
+    for start in range(0, len(cells), size):
+        yield cells[start : start + size]
+
+
+def _waves(run: _Run, cells: list[int], blocks: int) -> Iterator[list[Task]]:
+    """Tasks of the blocks that are not done yet, then those of the cells, which take the blocks' sums."""
+    numbers = range(1, blocks + 1)
+    yield [Task(k, block) for k in cells for block in numbers if run.status(k, block) != "done"]
+    yield [Task(k, 0, _total(run, k, numbers) if blocks else None) for k in cells]
 
 
 def _total(run: _Run, cell: int, blocks: range) -> Tally | None:

@@ -18,7 +18,7 @@ from simulator.experiment.model import Experiment
 from simulator.experiment.problems import Problems
 from simulator.experiment.variants import is_same_place, override, variant_trees
 from simulator.experiment.wording import explain
-from simulator.experiment.yamltree import Node, Scalar, read_tree, to_python, walk
+from simulator.experiment.yamltree import Mapping, Node, Scalar, read_tree, to_python, walk
 from simulator.settings import hint, listing
 
 from .axes import read_axis
@@ -37,6 +37,9 @@ def load_sweep(path: str | os.PathLike[str]) -> Sweep:
     source = Path(path)
     root = read_tree(source)
     problems = Problems(root)
+    if isinstance(root, Mapping) and "axes" not in root.items and "machine" in root.items:
+        text = "this is an experiment file; use it with ballplate run, or name it as base: of a sweep"
+        raise ExperimentError([root.mark.message("", text)])
     settings = _settings(root, problems)
     if settings is None:
         raise ExperimentError(sorted(problems.messages))

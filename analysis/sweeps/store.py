@@ -81,14 +81,14 @@ def open_store(path: Path, create: bool = False) -> Store:
     except sqlite3.Error as error:
         raise _told(path, error) from None
     if known is None or known[0] != FORMAT:
-        raise StoreError(f"{path}: is no store of this version of ballplate; name another file with --store")
+        raise StoreError(f"{path}: is no store of this version of ballplate sweep; name one that it has made")
     return Store(path, connection, {})
 
 
 def _told(path: Path, error: sqlite3.Error) -> StoreError:
     text = str(error)
     if "not a database" in text or "no such table" in text or "malformed" in text:
-        return StoreError(f"{path}: is no store of ballplate sweep ({text}); name another file with --store")
+        return StoreError(f"{path}: is no store of ballplate sweep ({text}); name one that it has made")
     if "full" in text or "disk I/O" in text:
         return StoreError(f"{path}: cannot be written ({text}); make room, then start again: nothing done is lost")
     if "locked" in text:
@@ -197,7 +197,10 @@ def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
                 "INSERT OR REPLACE INTO cell (sweep, number, key) VALUES (?, ?, ?)", [sweep, row.number, row.key]
             )
             if row.block == 0 and row.status == "done":
-                # The sums over blocks have been used.
+                # The sums over blocks have been used, but for the time that they took.
+                spent = "SELECT coalesce(sum(seconds), 0) FROM result WHERE key = ? AND block > 0"
+                update = f"UPDATE result SET seconds = seconds + ({spent}) WHERE key = ? AND block = 0"
+                connection.execute(update, [row.key, row.key])
                 connection.execute("DELETE FROM result WHERE key = ? AND block > 0", [row.key])
 
 

@@ -148,5 +148,17 @@ def subsets(
         for chosen in combinations(free, size - len(fixed)):
             kept = sorted([*fixed, *chosen])
             items = tuple(node.items[k] for k in kept)
-            found.append((" + ".join(names[k] for k in kept), Sequence(node.mark, items)))
+            found.append((_subset_label(names, kept), Sequence(node.mark, items)))
     return found
+
+
+def _subset_label(names: list[str], kept: list[int]) -> str:
+    """What is kept, or what is left out where that is shorter.
+
+    >>> _subset_label(["a", "b", "c", "d"], [0, 1, 3]), _subset_label(["a", "b", "c", "d"], [0, 3])
+    ('all but c', 'a + d')
+    """
+    without = [name for k, name in enumerate(names) if k not in kept]
+    if 2 * len(without) < len(kept):
+        return f"all but {' and '.join(without)}" if without else "all"
+    return " + ".join(names[k] for k in kept)

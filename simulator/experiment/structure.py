@@ -49,6 +49,9 @@ def validate_sections(root: Node, problems: Problems) -> Sections:
         text = f"expected a mapping that begins with title: …, found {describe(to_python(root))}"
         problems.add((), text)
         return Sections(values)
+    if "axes" in root.items and "machine" not in root.items:
+        problems.add((), "this is a sweep of experiments; use it with ballplate sweep")
+        return Sections(values)
     for steps, node in walk(root):
         if isinstance(node, Scalar) and node.value is None:
             problems.add(steps, "empty; give a value, or leave it out")

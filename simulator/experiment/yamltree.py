@@ -38,7 +38,10 @@ REMEDIES = (
     ("unexpected end of stream", "a quotation mark is never closed; close it"),
     ("cannot start any token", "a text cannot begin with this character; put it in quotes"),
     ("',' or ']'", "a list in brackets is never closed or lacks a comma; write [a, b]"),
-    ("',' or '}'", "a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}"),
+    (
+        "',' or '}'",
+        "a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}, quotes about a text with brackets",
+    ),
     ("could not find expected ':'", "a key without “: ”; write key: value"),
     ("did not find expected key", "a key is expected here; check the indentation and the quotes"),
     ("'-' indicator", "a list entry is expected here; begin it with “- ” and check the indentation"),

@@ -119,7 +119,10 @@ def test_aliases_stand_where_they_are_used() -> None:
         ),
         (
             "a: {b: 1\n",
-            ["f:1:4: not valid YAML: a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}"],
+            [
+                "f:1:4: not valid YAML: a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}, "
+                "quotes about a text with brackets"
+            ],
         ),
         ("x: 1\na: 'b\n", ["f:2:4: not valid YAML: a quotation mark is never closed; close it"]),
         (

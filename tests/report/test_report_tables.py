@@ -11,7 +11,7 @@ import pytest
 from analysis.cli import main
 from analysis.report.formats import FORMATS
 from analysis.report.results import best_and_worst, read_results
-from analysis.report.tables import MOST_ROWS, report_tables
+from analysis.report.tables import MOST_BEST, MOST_ROWS, report_tables
 from analysis.sweeps.store import Store
 from tests.report.stores import axis, done, failed, made_up
 
@@ -80,7 +80,10 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
     values = [0.001 * (k + 1) for k in range(MOST_ROWS + 50)]
     axes = [axis("level", [f"{1000 * value:g} mm" for value in values], values, "m")]
     store = made_up(tmp_path / "many.sqlite", "levels", axes, (done(k, figures(1.0 + k)) for k in range(len(values))))
-    table = report_tables(read_results(store, 1))[0]
+    best, table, *_ = report_tables(read_results(store, 1))
+    assert (best.name, best.size) == ("best", MOST_BEST)
+    assert [row.headings[0] for row in best.blocks[0].rows] == [str(k) for k in range(MOST_BEST)]
+    assert {column.partition(" ")[0] for column in best.columns} == {"U4"}
     assert table.size == MOST_ROWS and table.headings == ("cell", "level")
     assert table.notes[0] == "50 cells more are not shown here; ballplate export gives all."
 

@@ -104,7 +104,7 @@ def test_subsets_of_positions(written: Written) -> None:
         )
     )
     assert len(sweep.cells) == 10 + 1
-    assert sweep.axes[0].choices[0].label == "z low + z high + x low"
+    assert [sweep.axes[0].choices[k].label for k in (0, 10)] == ["z low + z high + x low", "all"]
     assert [one.name for one in experiment_of(sweep, 0).positions] == ["z low", "z high", "x low"]
     assert len(experiment_of(sweep, 10).positions) == 6
 

@@ -193,8 +193,10 @@ def test_a_fingerprint_tells_what_matters(tmp_path: Path, old: str, new: str, di
 
 def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = small_sweep(tmp_path, 2)
-    assert sweep(path, "--dry-run") == 0
+    assert sweep(path, "--dry-run") == 1
     out, err = capsys.readouterr()
+    # The last of the cells that were tried does not fit.
+    assert "judged by 3 of them\ncell 3 fails: " in err
     assert out.splitlines()[1] == "1: size 600 mm, balls 5" and len(out.splitlines()) == 4
     assert err.startswith("4 cells, about ") and not (tmp_path / "small.sqlite").exists()
 
