@@ -45,3 +45,11 @@ def _deaf(function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result
     # An interruption from the keyboard reaches every process; the one that started the workers answers it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return function(*arguments)
+
+
+def processors() -> int:
+    """Number of processors that this process may use."""
+    import os
+
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1

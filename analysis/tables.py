@@ -31,6 +31,8 @@ def number(value: float, digits: int = 4) -> str:
     """
     if math.isnan(value):
         return "-"
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
     if value == 0:
         return "0"
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)

@@ -43,6 +43,9 @@ def run(options: Namespace) -> int:
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
         print(f"ballplate export: {options.output} should end in .csv or .parquet", file=sys.stderr)
         return WRONG_USAGE
+    if options.output.resolve() == options.store.resolve():
+        print(f"ballplate export: -o {options.output} is the store itself; name another file", file=sys.stderr)
+        return WRONG_USAGE
     try:
         store = open_store(options.store)
         known = sweeps(store)

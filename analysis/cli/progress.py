@@ -22,6 +22,8 @@ class ProgressBar:
 
     def show(self, done: int, wanted: int, remark: str = "", before: int = 0) -> None:
         """Report, unless the last report is recent; the rate leaves out what was done `before`."""
+        if sys.stderr is None:
+            return
         now = time.monotonic()
         is_terminal = sys.stderr.isatty()
         due = now - self.last >= (OFTEN if is_terminal else SELDOM)

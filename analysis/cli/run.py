@@ -91,11 +91,11 @@ def run(options: Namespace) -> int:
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
-    import os
     import signal
 
     from ..montecarlo.study import trials
     from ..montecarlo.trials import MOST_TRIALS, Progress
+    from ..processes import processors
     from .progress import ProgressBar
 
     bar = ProgressBar("data sets")
@@ -120,7 +120,7 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
             options.trials or MOST_TRIALS,
             options.seed,
             options.until,
-            options.workers or len(os.sched_getaffinity(0)),
+            options.workers or processors(),
             report,
         )
     finally:

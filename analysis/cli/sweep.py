@@ -76,9 +76,10 @@ def run(options: Namespace) -> int:
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ..sweeps.bundle import bundle_of, changes, definition
+    from ..sweeps.bundle import changes, definition
     from ..sweeps.execute import run_sweep
-    from ..sweeps.store import add_sweep, forget_keys, keys, statuses, sweeps
+    from ..sweeps.local import ChangedError
+    from ..sweeps.store import add_sweep, statuses, sweeps
     from .progress import ProgressBar
 
     new = definition(sweep, bundle)
@@ -93,7 +94,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         return BAD_FILE
     if number is None:
         number = add_sweep(store, new, bundle.files)
-    bar, before = ProgressBar("cells"), set(keys(store, number))
+    bar = ProgressBar("cells")
 
     def report(summary: Summary) -> None:
         remark = ", ".join(
@@ -105,38 +106,39 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     try:
         with _runner(sweep, bundle, options) as runner:
             summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
+    except ChangedError:
+        bar.close()
+        text = "the files of the sweep have been changed while it ran; what is done is stored, start it again"
+        print(f"{options.file}: {text}", file=sys.stderr)
+        return BAD_FILE
     except KeyboardInterrupt:
         bar.close()
         print(f"interrupted; what is done is in {store.path}, and the same command goes on from there", file=sys.stderr)
         return INTERRUPTED
     finally:
         bar.close()
-    if bundle_of(sweep) != bundle:
-        forget_keys(store, number, set(keys(store, number)) - before)
-        text = "the files of the sweep were changed while it ran; what was computed meanwhile does not count"
-        print(f"{options.file}: {text}, so start it again", file=sys.stderr)
-        return BAD_FILE
     _tell(store, number, summary)
     return 1 if summary.failed or summary.left else 0
 
 
 def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
-    import os
-
+    from ..processes import processors
     from ..sweeps.cluster import cluster_runner
     from ..sweeps.local import local_runner
 
     if options.scheduler is not None:
         return cluster_runner(options.scheduler, sweep, bundle)
-    return nullcontext(local_runner(sweep, options.workers or len(os.sched_getaffinity(0))))
+    return nullcontext(local_runner(sweep, bundle, options.workers or processors()))
 
 
 def _tell(store: Store, number: int, summary: Summary) -> None:
-    from ..sweeps.store import results
+    from ..sweeps.store import results, sweeps
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
     counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
+    if len(sweeps(store)) > 1:
+        counted += f" of sweep {number}"
     print(f"{store.path}: {counted}, {summary.done} done, {summary.failed} failed{before}{left}")
     found = results(store, number)
     versions = set(zip(*found.versions.values(), strict=True))
@@ -155,14 +157,13 @@ def _tell(store: Store, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    import os
-
+    from ..processes import processors
     from ..sweeps.estimate import seconds_of
     from .progress import duration
 
     for number in range(len(sweep.cells)):
         print(f"{number}: {sweep.label(number)}")
-    workers = options.workers or len(os.sched_getaffinity(0))
+    workers = options.workers or processors()
     seconds, rows = seconds_of(sweep)
     words = f"with {workers} worker{'s' if workers > 1 else ''}, judged by {len(rows)} of them"
     cells = f"{len(sweep.cells)} cell{'s' if len(sweep.cells) > 1 else ''}"

@@ -204,8 +204,8 @@ def _subset_choices(
         problems.add((*here, "subsets"), f"{count} subsets; {MOST_VALUES} are the limit, so take fewer of them")
         return []
     mark = mark_of(root, (*here, "subsets"))
-    found = subsets(place, names, wanted.always, among, wanted.sizes)
-    return [Choice(text, ((path, node, mark),)) for text, node in found]
+    found = subsets(names, wanted.always, among, wanted.sizes)
+    return [Choice(text, (), kept=(path, kept, mark)) for text, kept in found]
 
 
 def _check_paths(here: Steps, choices: list[Choice], trees: dict[str | None, Node], problems: Problems) -> None:

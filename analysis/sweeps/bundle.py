@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.yamltree import Node, Scalar, read_tree, to_python, walk
 
 from .model import Sweep
 
 MODULE = ".py"
+MOST_MODULES = 1000
 
 
 @dataclass(frozen=True)
@@ -40,14 +43,27 @@ def bundle_of(sweep: Sweep) -> Bundle:
     A file that is named by its place from the root of the file system is not taken along: it must be there, wherever
     the sweep is computed.
     """
-    source, base = Path(os.path.abspath(sweep.source)), Path(os.path.abspath(sweep.base))
+    source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
+    paths = files_of(sweep)
+    root = Path(os.path.commonpath([path.parent for path in paths]))
+    names = {path: path.relative_to(root).as_posix() for path in paths}
+    return Bundle(names[source], names[base], tuple((name, path.read_bytes()) for path, name in names.items()))
+
+
+def files_of(sweep: Sweep) -> list[Path]:
+    """Absolute paths of the files of a sweep's bundle.
+
+    :raises ExperimentError: a path that leads through a link and back, so that it means another file than it says.
+    """
+    source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
+    if not base.is_file() or not base.samefile(sweep.base):
+        text = f"{sweep.base} leads through a link to another folder and back; name the file from its real folder"
+        raise ExperimentError([Message(str(sweep.source), 0, 0, "base", text)])
     paths = {source, base}
     for file in (source, base):
         for text in _texts(read_tree(file)):
             paths |= set(_named(base.parent, text))
-    root = Path(os.path.commonpath([path.parent for path in paths]))
-    names = {path: path.relative_to(root).as_posix() for path in sorted(paths)}
-    return Bundle(names[source], names[base], tuple((name, path.read_bytes()) for path, name in names.items()))
+    return sorted(paths)
 
 
 def _texts(root: Node) -> Iterator[str]:
@@ -62,7 +78,11 @@ def _named(folder: Path, text: str) -> Iterator[Path]:
         return
     candidates = [text]
     if ":" in text:
-        candidates.append(text.partition(":")[0].replace(".", "/") + MODULE)
+        module = text.partition(":")[0].replace(".", "/")
+        if (folder / f"{module}{MODULE}").is_file() or (folder / module).is_dir():
+            # What it imports may stand beside it.
+            yield from (path for path in sorted(folder.glob(f"*{MODULE}"))[:MOST_MODULES] if path.is_file())
+            yield from sorted((folder / module.partition("/")[0]).rglob(f"*{MODULE}"))[:MOST_MODULES]
     for one in candidates:
         path = Path(os.path.abspath(folder / one))
         try:
@@ -85,6 +105,12 @@ def unpack(bundle: Bundle, folder: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     return folder / PurePosixPath(bundle.source)
+
+
+def code_digest(bundle: Bundle) -> str:
+    """A hash of everything but the YAML files: what a model written in Python may read or import."""
+    kept = tuple(item for item in bundle.files if item[0] not in (bundle.source, bundle.base))
+    return Bundle("", "", kept).digest
 
 
 def definition(sweep: Sweep, bundle: Bundle) -> dict[str, Any]:
@@ -130,7 +156,7 @@ def changes(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
     for part, name in (("sweep", new["source"]), ("experiment", new["base"])):
         before, after = (dict(_flat(one[part], "")) for one in (old, new))
         for path in dict.fromkeys([*before, *after]):
-            if path in WORDS or before.get(path) == after.get(path):
+            if path in WORDS or json.dumps(before.get(path)) == json.dumps(after.get(path)):
                 continue
             if path not in after:
                 found.append(f"{name}: {path}: {before[path]!r} is gone")

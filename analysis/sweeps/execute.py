@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 
@@ -82,19 +82,21 @@ def run_sweep(
     run.before = run.cells - len(left)
     summary = run.summary() if not retry_failed else Summary(run.cells, run.before, run.before, 0)
     report(summary)
+    failed: set[int] = set()
     for cells in _groups(left, blocks_of(sweep)):
         for tasks in _waves(run, cells, blocks_of(sweep)):
             for row in runner(tasks) if tasks else ():
+                # A block that fails is its cell's failure.
+                row = replace(row, block=0) if row.status == "failed" else row
+                was_failed = row.number in failed
                 add_rows(store, number, [row])
                 run.known[row.number], run.found[row.key, row.block] = row.key, row.status
-                of_cells = (row.block == 0, row.status)
-                summary = Summary(
-                    run.cells,
-                    run.before,
-                    summary.done + (of_cells == (True, "done")),
-                    summary.failed + (of_cells == (True, "failed")),
-                    summary.blocks + (row.block > 0),
-                )
+                if row.status == "failed":
+                    failed.add(row.number)
+                done = summary.done + (row.block == 0 and row.status == "done")
+                more = int(row.status == "failed" and not was_failed)
+                counted = summary.failed + more, summary.blocks + (row.block > 0)
+                summary = Summary(run.cells, run.before, done, *counted)
                 report(summary)
                 if row.status == "failed" and fail_fast:
                     return run.summary()
@@ -112,7 +114,8 @@ def _waves(run: _Run, cells: list[int], blocks: int) -> Iterator[list[Task]]:
     """Tasks of the blocks that are not done yet, then those of the cells, which take the blocks' sums."""
     numbers = range(1, blocks + 1)
     yield [Task(k, block) for k in cells for block in numbers if run.status(k, block) != "done"]
-    yield [Task(k, 0, _total(run, k, numbers) if blocks else None) for k in cells]
+    sound = [k for k in cells if not blocks or all(run.status(k, block) == "done" for block in numbers)]
+    yield [Task(k, 0, _total(run, k, numbers) if blocks else None) for k in sound]
 
 
 def _total(run: _Run, cell: int, blocks: range) -> Tally | None:

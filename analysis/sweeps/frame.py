@@ -16,8 +16,8 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
     """The cells of a sweep, the newest of the store unless told, in their order; those not done are not in it.
 
     Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name, or texts),
-    `status`, `reason`, the figures by name, `seed`, `fingerprint`, `duration_s`, and the versions. Figures that a cell
-    lacks are NaN.
+    `status`, `reason`, the figures by name, `data_set_seed`, `fingerprint`, `duration_s`, and the versions. Figures
+    that a cell lacks are NaN.
     """
     import pandas
 
@@ -33,6 +33,6 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]]
     columns |= {"status": found.statuses, "reason": found.reasons, **found.figures}
-    columns |= {"seed": found.seeds, "fingerprint": found.keys, "duration_s": found.seconds}
+    columns |= {"data_set_seed": found.seeds, "fingerprint": found.keys, "duration_s": found.seconds}
     columns |= {f"{name}_version": texts for name, texts in found.versions.items()}
     return pandas.DataFrame(columns)

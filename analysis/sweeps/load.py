@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -16,17 +18,26 @@ from simulator.experiment.load import build
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
 from simulator.experiment.problems import Problems
-from simulator.experiment.variants import is_same_place, override, variant_trees
+from simulator.experiment.variants import is_same_place, node_at, override, variant_trees
 from simulator.experiment.wording import explain
-from simulator.experiment.yamltree import Mapping, Node, Scalar, read_tree, to_python, walk
+from simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence, read_tree, to_python, walk
 from simulator.settings import hint, listing
 
 from .axes import read_axis
+from .bundle import bundle_of, code_digest
 from .conditions import holds
 from .model import Axis, Sweep
 from .settings import SweepSettings
+from .values import entry_names
 
 MOST_CELLS = 1_000_000
+
+# Columns of a sweep's table that no axis may be named like.
+RESERVED = (
+    *("cell", "status", "reason", "data_set_seed", "fingerprint", "duration_s", "parameters", "observations"),
+    *("rank_deficiency", "as_expected", "weakly_determined", "smallest_singular_value_per_um", "gap", "trials"),
+    *("not_converged", "degrees_of_freedom"),
+)
 
 
 def load_sweep(path: str | os.PathLike[str]) -> Sweep:
@@ -56,6 +67,7 @@ def load_sweep(path: str | os.PathLike[str]) -> Sweep:
         axes += [found] if found is not None else []
     if not problems.messages:
         _check_apart(axes, next(iter(trees.values())), problems)
+    _check_names(axes, problems)
     _check_conditions(settings, axes, problems)
     if problems.messages:
         raise ExperimentError(sorted(problems.messages))
@@ -80,7 +92,13 @@ def load_sweep(path: str | os.PathLike[str]) -> Sweep:
         settings.record,
     )
     _check_base(sweep)
+    if any(_has_code(tree) for tree in trees.values()):
+        sweep = replace(sweep, code=code_digest(bundle_of(sweep)))
     return sweep
+
+
+def _has_code(tree: Node) -> bool:
+    return any(isinstance(node, Scalar) and node.value == "python" for _, node in walk(tree))
 
 
 def experiment_of(sweep: Sweep, number: int) -> Experiment:
@@ -92,7 +110,8 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
     variant = next((choice.variant for choice in choices if choice.variant is not None), sweep.variant)
     tree = sweep.trees[variant]
     for choice in choices:
-        for path, node, mark in choice.changes:
+        changes = choice.changes if choice.kept is None else (*choice.changes, _subset(tree, *choice.kept))
+        for path, node, mark in changes:
             try:
                 tree = override(tree, path, node, mark)
             except ValueError as error:
@@ -101,6 +120,22 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
     if experiment is None:
         raise ExperimentError(sorted(messages))
     return experiment
+
+
+def _subset(tree: Node, path: str, kept: tuple[str, ...], mark: Mark) -> tuple[str, Node, Mark]:
+    """The list at a path with some of its entries only.
+
+    :raises ExperimentError: an entry that this variant does not have.
+    """
+    try:
+        place = node_at(tree, path)
+    except ValueError as error:
+        raise ExperimentError([mark.message(path, str(error))]) from None
+    names = (entry_names(place) if place is not None else None) or []
+    absent = next((name for name in kept if name not in names), None)
+    if absent is not None or not isinstance(place, Sequence):
+        raise ExperimentError([mark.message(path, f'no entry "{absent}" in this variant; {hint(str(absent), names)}')])
+    return path, Sequence(place.mark, tuple(place.items[names.index(name)] for name in kept)), mark
 
 
 def _settings(root: Node, problems: Problems) -> SweepSettings | None:
@@ -161,12 +196,28 @@ def _check_apart(axes: list[Axis], tree: Node, problems: Problems) -> None:
         except ValueError:
             return one == other
 
-    paths = [(axis.name, path) for axis in axes for path, _, _ in axis.choices[0].changes]
+    paths = [(axis.name, path) for axis in axes for path in axis.choices[0].paths]
     for k, (name, path) in enumerate(paths):
         other = next((one for one in paths[:k] if clash(one[1], path)), None)
         if other is not None:
             text = f'{path} is part of the same place as {other[1]} of the axis "{other[0]}"; change it once'
             problems.add(("axes", name), text)
+
+
+def _check_names(axes: list[Axis], problems: Problems) -> None:
+    """Refuse axes that would share a column with another one, or with what is recorded."""
+    columns: dict[str, str] = {}
+    for axis in axes:
+        if axis.column in RESERVED or re.fullmatch(r"U[1-6]([ _].*)?|.*_version|sum_of_squares.*", axis.column):
+            problems.add(("axes", axis.name), "is a column of every table; choose another name", of_key=True)
+        elif axis.column in columns:
+            text = f'would have the column "{axis.column}" of the axis "{columns[axis.column]}"; choose another name'
+            problems.add(("axes", axis.name), text, of_key=True)
+        columns[axis.column] = axis.name
+    chosen = [axis.name for axis in axes if axis.choices[0].variant is not None]
+    for name in chosen[1:]:
+        text = f'the axis "{chosen[0]}" chooses the variant already; name all variants there'
+        problems.add(("axes", name), text, of_key=True)
 
 
 def _check_conditions(settings: SweepSettings, axes: list[Axis], problems: Problems) -> None:

@@ -11,7 +11,10 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+from simulator.experiment.messages import ExperimentError
+
 from ..processes import in_processes
+from .bundle import Bundle, bundle_of, files_of
 from .execute import Runner
 from .load import load_sweep
 from .model import Sweep
@@ -23,21 +26,35 @@ DEATHS = 3
 TRIES = 2
 
 
-def local_runner(sweep: Sweep, workers: int) -> Runner:
-    """A runner in processes of this machine; with one worker in this process."""
-    source = Path(os.path.abspath(sweep.source))
+class ChangedError(Exception):
+    """The files of a sweep are no longer those that it was started with."""
+
+
+def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
+    """A runner in processes of this machine; with one worker in this process.
+
+    It raises ChangedError instead of a row that was computed from files other than those of the bundle.
+    """
+    source, digest = Path(os.path.abspath(sweep.source)), bundle.digest
 
     def run(tasks: Sequence[Task]) -> Iterator[Row]:
-        if workers == 1 or len(tasks) == 1:
-            for task in tasks:
-                yield _told(compute(sweep, task), sweep.source)
+        if workers > 1 and tasks:
+            yield from _in_workers(sweep, source, digest, tasks, workers)
             return
-        yield from _in_workers(sweep, source, tasks, workers)
+        paths = files_of(sweep)
+        before = _signature(paths)
+        if bundle_of(sweep).digest != digest:
+            raise ChangedError
+        for task in tasks:
+            row = compute(sweep, task)
+            if _signature(paths) != before:
+                raise ChangedError
+            yield told(row, sweep.source)
 
     return run
 
 
-def _in_workers(sweep: Sweep, source: Path, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
+def _in_workers(sweep: Sweep, source: Path, digest: str, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     left = {(task.number, task.block): task for task in tasks}
@@ -47,12 +64,12 @@ def _in_workers(sweep: Sweep, source: Path, tasks: Sequence[Task], workers: int)
             # One of those under way ends its process each time; each gets a process of its own.
             for task in list(left.values())[: 2 * workers]:
                 del left[task.number, task.block]
-                row = _alone(source, task)
+                row = _alone(source, digest, task)
                 yield row if row is not None else lost(sweep, task)
             deaths = 0
-        arguments = ((source, task) for task in list(left.values()))
+        arguments = ((source, digest, task) for task in list(left.values()))
         try:
-            for row in in_processes(compute_in, arguments, workers, ordered=False, batch_size="auto"):
+            for row in in_processes(compute_unchanged, arguments, workers, ordered=False, batch_size="auto"):
                 del left[row.number, row.block]
                 deaths = 0
                 yield row
@@ -60,28 +77,54 @@ def _in_workers(sweep: Sweep, source: Path, tasks: Sequence[Task], workers: int)
             deaths += 1
 
 
-def _alone(source: Path, task: Task) -> Row | None:
+def _alone(source: Path, digest: str, task: Task) -> Row | None:
     """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
         with ProcessPoolExecutor(1, mp_context=context) as pool:
             try:
-                return pool.submit(compute_in, source, task).result()
+                return pool.submit(compute_unchanged, source, digest, task).result()
             except BrokenProcessPool:
                 continue
     return None
 
 
-def compute_in(source: Path, task: Task) -> Row:
-    """Do a task of a sweep file, which is loaded once in each process."""
-    return _told(compute(_loaded(source), task), source)
+def compute_unchanged(source: Path, digest: str, task: Task) -> Row:
+    """Do a task of a sweep file, which is loaded once in each process.
+
+    :raises ChangedError: its files are not those of the bundle with this digest.
+    """
+    sweep, paths, before = _loaded(source, digest)
+    row = compute(sweep, task)
+    if _signature(paths) != before:
+        raise ChangedError
+    return told(row, source)
 
 
-def _told(row: Row, source: Path) -> Row:
+def told(row: Row, source: Path) -> Row:
     """The row with files told from the sweep file's folder, wherever that is."""
-    return replace(row, reason=row.reason.replace(f"{source.parent}/", "")) if row.reason else row
+    if not row.reason or source.parent == Path("."):
+        return row
+    return replace(row, reason=row.reason.replace(f"{source.parent}/", ""))
 
 
 @cache
-def _loaded(source: Path) -> Sweep:
-    return load_sweep(source)
+def _loaded(source: Path, digest: str) -> tuple[Sweep, list[Path], object]:
+    try:
+        sweep = load_sweep(source)
+        paths = files_of(sweep)
+        before = _signature(paths)
+        if bundle_of(sweep).digest == digest:
+            return sweep, paths, before
+    except (ExperimentError, OSError):
+        pass
+    raise ChangedError
+
+
+def _signature(paths: Sequence[Path]) -> object:
+    """What tells that files were written to."""
+    try:
+        found = [os.stat(path) for path in paths]
+    except OSError:
+        return None
+    return [(one.st_mtime_ns, one.st_size, one.st_ino) for one in found]

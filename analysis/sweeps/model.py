@@ -15,6 +15,8 @@ Unit = Literal["m", "rad", "1", ""]
 class Choice:
     """One value of an axis: `changes` are paths with the nodes to be put there, or `variant` a variant to begin with.
 
+    `kept` are the names of the entries that are kept of the list at a path.
+
     `value` is a number in metres, radians or without unit where the axis has such values, otherwise NaN.
     """
 
@@ -22,6 +24,12 @@ class Choice:
     changes: tuple[tuple[str, Node, Mark], ...]
     value: float = float("nan")
     variant: str | None = None
+    kept: tuple[str, tuple[str, ...], Mark] | None = None
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths at which something is changed."""
+        return (*(path for path, _, _ in self.changes), *([] if self.kept is None else [self.kept[0]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +50,8 @@ class Axis:
 class Sweep:
     """A sweep. `trees` are the base file's variants by name, or the whole file under None.
 
-    `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest.
+    `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest. `code` is a
+    hash of the files that an error model written in Python may use, empty without one.
     """
 
     source: Path
@@ -55,6 +64,7 @@ class Sweep:
     trials: int | None
     seed: int
     record: tuple[str, ...]
+    code: str = ""
 
     def choices(self, number: int) -> tuple[Choice, ...]:
         """The choices that make up a cell."""

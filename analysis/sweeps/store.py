@@ -65,10 +65,7 @@ def open_store(path: Path, create: bool = False) -> Store:
     if not create and not path.is_file():
         raise StoreError(f"{path}: there is no such store; make it with ballplate sweep")
     try:
-        # No thread of its own: what is written is on disk when the call returns.
-        connection = sqlite3.connect(path, isolation_level=None, timeout=20.0)
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
+        connection = _connected(path) if create else _readable(path)
         found = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         if not found and create:
             connection.execute("BEGIN IMMEDIATE")
@@ -83,6 +80,28 @@ def open_store(path: Path, create: bool = False) -> Store:
     if known is None or known[0] != FORMAT:
         raise StoreError(f"{path}: is no store of this version of ballplate sweep; name one that it has made")
     return Store(path, connection, {})
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, isolation_level=None, timeout=20.0)
+    connection.execute("PRAGMA journal_mode = WAL")
+    # What is written is on disk when the call returns.
+    connection.execute("PRAGMA synchronous = FULL")
+    return connection
+
+
+def _readable(path: Path) -> sqlite3.Connection:
+    """A connection that reads only, also where nothing can be written."""
+    address = path.resolve().as_uri()
+    connection = sqlite3.connect(f"{address}?mode=rw", uri=True, isolation_level=None, timeout=20.0)
+    try:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError:
+        # In a place that cannot be written, as long as nobody else writes to the store.
+        connection.close()
+        connection = sqlite3.connect(f"{address}?immutable=1", uri=True, isolation_level=None)
+    connection.execute("PRAGMA query_only = ON")
+    return connection
 
 
 def _told(path: Path, error: sqlite3.Error) -> StoreError:
@@ -159,12 +178,6 @@ def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
             "INSERT OR REPLACE INTO cell (sweep, number, key) VALUES (?, ?, ?)",
             [(sweep, number, key) for number, key in found.items()],
         )
-
-
-def forget_keys(store: Store, sweep: int, cells: Iterable[int]) -> None:
-    """Take back which results are those of some cells; the results stay."""
-    with _transaction(store) as connection:
-        connection.executemany("DELETE FROM cell WHERE sweep = ? AND number = ?", [(sweep, cell) for cell in cells])
 
 
 def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:

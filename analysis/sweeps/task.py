@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import platform
 import time
+import traceback
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from ..montecarlo.figures import Figure, Outcome
 from ..montecarlo.study import Trials, block_of_trials, combined, trials
 from ..montecarlo.tally import Tally
 from ..study import Plan, plan
+from .bundle import bundle_of
 from .fingerprint import fingerprint
 from .load import experiment_of
 from .model import Sweep
@@ -85,7 +88,7 @@ def _computed(sweep: Sweep, task: Task) -> Row:
         experiment = experiment_of(sweep, number)
     except ExperimentError as error:
         return Row(number, block, invalid_key(sweep, number), "failed", str(error))
-    key = fingerprint(experiment, sweep.trials, sweep.seed, sweep.record)
+    key = key_of(sweep, experiment)
     seed = seed_of(sweep, key)
     if block == KEY_ONLY:
         return Row(number, block, key, "done")
@@ -96,8 +99,11 @@ def _computed(sweep: Sweep, task: Task) -> Row:
         return _whole(sweep, experiment, task, key, seed)
     except ExperimentError as error:
         return Row(number, block, key, "failed", str(error), seed)
-    except (MemoryError, ArithmeticError, np.linalg.LinAlgError) as error:
-        return Row(number, block, key, "failed", f"{type(error).__name__}: {error}", seed)
+    except Exception as error:
+        # Of an error model written in Python anything may come; the other cells do not suffer from it.
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+        return Row(number, block, key, "failed", text, seed)
 
 
 def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int) -> Row:
@@ -120,11 +126,14 @@ def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int
 def lost(sweep: Sweep, task: Task) -> Row:
     """The row of a task whose process ends whenever it is tried."""
     reason = "the process that computed it was ended, by lack of memory perhaps"
-    try:
-        key = fingerprint(experiment_of(sweep, task.number), sweep.trials, sweep.seed, sweep.record)
-    except ExperimentError:
-        key = invalid_key(sweep, task.number)
-    return Row(task.number, task.block, key, "failed", reason, versions=versions())
+    # Without the experiment, which may be what ends the process.
+    return Row(task.number, task.block, invalid_key(sweep, task.number), "failed", reason, versions=versions())
+
+
+def key_of(sweep: Sweep, experiment: Experiment) -> str:
+    """Key of a cell: of its experiment, what is recorded, and the data sets if there are any."""
+    trials = None if sweep.trials is None else (sweep.trials, sweep.seed)
+    return fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code)
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:
@@ -132,6 +141,7 @@ def invalid_key(sweep: Sweep, number: int) -> str:
     text = "\n".join(
         f"{axis.name}={choice.label}" for axis, choice in zip(sweep.axes, sweep.choices(number), strict=True)
     )
+    text += f"\n{bundle_of(sweep).digest}"
     return "invalid " + hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
 
 

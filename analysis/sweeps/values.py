@@ -48,7 +48,8 @@ def numeric(value: object) -> tuple[float, Unit]:
     ((0.75, 'm'), (5.0, '1'), '')
     """
     if isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value) if abs(value) < 1e300 else math.nan
+        # Larger whole numbers are not the same as floats.
+        number = float(value) if abs(value) <= (2**53 if isinstance(value, int) else 1e300) else math.nan
         return (number, "1") if math.isfinite(number) else (math.nan, "")
     if isinstance(value, str) and len(value) < 100:
         for unit, parse in KINDS:
@@ -94,7 +95,10 @@ def of_range(
     if logarithmic:
         if low <= 0 or high <= 0:
             raise ValueError("spacing: logarithmic needs ends above zero")
-        ratio = float(high / low) ** (1.0 / (count - 1))
+        try:
+            ratio = float(high / low) ** (1.0 / (count - 1))
+        except OverflowError:
+            raise ValueError("the ends are too far apart; bring them nearer to each other") from None
         inner = [Fraction(f"{float(low) * ratio**k:.10g}") for k in range(1, count - 1)]
         return [_written(value, unit) for value in (low, *inner, high)]
     return [_written(low + k * difference, unit) for k in range(count)]
@@ -136,9 +140,9 @@ def subset_count(total: int, fixed: int, sizes: tuple[int, ...]) -> int:
 
 
 def subsets(
-    node: Sequence, names: list[str], always: tuple[str, ...], among: tuple[str, ...], sizes: tuple[int, ...]
-) -> list[tuple[str, Sequence]]:
-    """Subsets of a list with their names, in the order of sizes and then of the list."""
+    names: list[str], always: tuple[str, ...], among: tuple[str, ...], sizes: tuple[int, ...]
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Subsets of the entries of a list, each with its label, in the order of sizes and then of the list."""
     free = [k for k, name in enumerate(names) if name in among and name not in always]
     fixed = [k for k, name in enumerate(names) if name in always]
     found = []
@@ -147,8 +151,7 @@ def subsets(
             continue
         for chosen in combinations(free, size - len(fixed)):
             kept = sorted([*fixed, *chosen])
-            items = tuple(node.items[k] for k in kept)
-            found.append((_subset_label(names, kept), Sequence(node.mark, items)))
+            found.append((_subset_label(names, kept), tuple(names[k] for k in kept)))
     return found
 
 

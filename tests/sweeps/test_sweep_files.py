@@ -126,9 +126,28 @@ def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
     )
 
 
+def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path) -> None:
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    variants = 'variants: {low: {"positions[z low].level": 100 mm}, high: {"positions[z low].level": 300 mm}}\n'
+    (tmp_path / "quickstart.yaml").write_text(text + variants, encoding="utf-8")
+    subsets = "kept: {path: positions, subsets: {sizes: [5], always: [z low]}}"
+    sweep = load_sweep(written(f"axes:\n  design: {{variants: all}}\n  {subsets}\n"))
+    levels = [experiment_of(sweep, k).positions[0].pose.origin[2] for k in range(len(sweep.cells))]
+    assert levels == [0.1] * 5 + [0.3] * 5
+    assert refusal(written("axes:\n  a: {variants: all}\n  b: {variants: [low]}\n")) == [
+        's.yaml:5:3: axes.b: the axis "a" chooses the variant already; name all variants there'
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
+        ("axes:\n  status: {path: seed, values: [1]}\n", ["s.yaml:4:3: axes.status: is a column of every table"]),
+        ("axes:\n  U4_size: {path: seed, values: [1]}\n", ["s.yaml:4:3: axes.U4_size: is a column of every table"]),
+        (
+            "axes:\n  a: {path: seed, from: 1e-200, to: 1e200, count: 5, spacing: logarithmic}\n",
+            ["s.yaml:4:6: axes.a: the ends are too far apart"],
+        ),
         ("axes: {}\n", ["s.yaml:3:7: axes: "]),
         ("axis: {a: {path: seed, values: [1]}}\n", ["s.yaml:1:1: axes: missing", "s.yaml:3:1: axis: unknown key"]),
         (

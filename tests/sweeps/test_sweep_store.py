@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import sqlite3
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +21,7 @@ from analysis.sweeps.store import details, files, keys, open_store, results, swe
 from analysis.sweeps.task import BLOCK, Row, Task, compute
 from simulator.experiment.load import load
 
-from .support import assert_same, rows, small_sweep
+from .support import ROOT, assert_same, command, rows, run, small_sweep
 
 
 def sweep(path: Path, *options: str) -> int:
@@ -41,13 +44,13 @@ def test_figures_are_those_of_the_experiments(tmp_path: Path, capsys: pytest.Cap
         expected = plan(experiment).quantities
         assert table["U4_maximum_m"][k] == expected["U4"].maximum
         assert table["U5_average_m"][k] == expected["U5"].average
-        outcome = trials(experiment, 64, int(table["seed"][k])).outcome
+        outcome = trials(experiment, 64, int(table["data_set_seed"][k])).outcome
         assert outcome is not None
         assert table["U4_spread_ratio"][k] == outcome.comparisons["U4"].spread.value
         assert table["U4_spread_ratio_standard_error"][k] == outcome.comparisons["U4"].spread.error
         assert table["trials"][k] == 64
     assert not [name for name in table if name.startswith(("U1", "U6"))]
-    assert table["seed"][:6].nunique() == 6
+    assert table["data_set_seed"][:6].nunique() == 6
     assert (table["ballplate_version"] == "0.1.0").all() and (table["blas_version"] != "").all()
 
 
@@ -110,8 +113,9 @@ def test_a_change_while_a_sweep_runs_is_noticed(
 
     monkeypatch.setattr("analysis.sweeps.local.compute", changing)
     assert sweep(path) == 3
-    assert "were changed while it ran" in capsys.readouterr().err
-    assert len(rows(tmp_path / "small.sqlite")) == 0
+    assert "have been changed while it ran" in capsys.readouterr().err
+    # What was computed before the change is there, and nothing else.
+    assert rows(tmp_path / "small.sqlite")["cell"].tolist() == [0]
     monkeypatch.undo()
     base.write_text(text, encoding="utf-8")
     assert sweep(path) == 1
@@ -130,7 +134,8 @@ def test_what_two_sweeps_share_is_computed_once(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr("analysis.sweeps.local.compute", counted)
     sweep(path, "--beside")
-    assert sorted(task.number for task in done if task.block == 0) == [2, 5]
+    # What is no valid experiment is judged anew.
+    assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
 
 
 def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
@@ -227,3 +232,100 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(store), "--sweep", "5", "-o", "-"]) == 3
     assert main(["export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
     assert "there is no such store" in capsys.readouterr().err
+
+
+MODEL = """
+from simulator.machines.arrangement import ARRANGEMENTS
+from simulator.machines.kinematic import kinematic_model
+from NAME_helper import SIZE
+
+
+def build(lower, upper, fails=False):
+    model = kinematic_model(ARRANGEMENTS["MB2"], SIZE, 3, lower, upper)
+    return Failing(model) if fails else model
+
+
+class Failing:
+    def __init__(self, model):
+        self.model, self.calls = model, 0
+
+    def __getattr__(self, name):
+        return getattr(self.model, name)
+
+    def error(self, x, a, p):
+        if len(x) > 30:
+            raise ValueError("no more than thirty")
+        return self.model.error(x, a, p)
+"""
+
+
+def with_own_model(folder: Path, name: str, values: str) -> Path:
+    """A sweep of an error model that imports another module."""
+    (folder / f"{name}.py").write_text(MODEL.replace("NAME", name), encoding="utf-8")
+    (folder / f"{name}_helper.py").write_text("SIZE = 3\n", encoding="utf-8")
+    path = small_sweep(folder, 2)
+    text = (folder / "quickstart.yaml").read_text(encoding="utf-8")
+    before, _, after = text.partition("error_model:\n")
+    model = f"error_model: {{kind: python, object: '{name}:build', options: {{fails: false}}}}"
+    (folder / "quickstart.yaml").write_text(before + model + after[after.index("\n\n") :], encoding="utf-8")
+    axes = f"axes: {{fails: {{path: error_model.options.fails, values: {values}}}}}"
+    path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\n", encoding="utf-8")
+    return path
+
+
+def test_what_a_users_model_imports_counts(tmp_path: Path) -> None:
+    path = with_own_model(tmp_path, "imports_another", "[false]")
+    assert run("sweep", path).returncode == 0
+    (tmp_path / "imports_another_helper.py").write_text("SIZE = 4\n", encoding="utf-8")
+    changed = run("sweep", path)
+    assert changed.returncode == 3 and "imports_another_helper.py: another content" in changed.stderr
+    assert run("sweep", path, "--beside").returncode == 0
+    store = open_store(tmp_path / "small.sqlite")
+    few, more = (results(store, k).figures["parameters"][0] for k in (1, 2))
+    store.close()
+    assert more > few
+
+
+def test_what_a_users_model_raises_is_the_rows_reason(tmp_path: Path) -> None:
+    path = with_own_model(tmp_path, "raises_late", "[true, false]")
+    for workers in (1, 2):
+        done = run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
+        assert done.returncode == 1 and "2 cells, 1 done, 1 failed" in done.stdout, done.stderr
+        assert "ValueError: no more than thirty (raises_late.py, line " in done.stderr
+    assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))
+
+
+def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    (tmp_path / "sweeps").mkdir()
+    text = path.read_text(encoding="utf-8").replace("base: quickstart.yaml", "base: ../quickstart.yaml")
+    (tmp_path / "sweeps" / "s.yaml").write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for workers, name, where in ((1, "s.yaml", tmp_path / "sweeps"), (2, "s.yaml", tmp_path / "sweeps")):
+        command_line = [*command("sweep", name, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")]
+        subprocess.run(command_line, cwd=where, env=environment, capture_output=True, check=False)
+    assert run("sweep", tmp_path / "sweeps" / "s.yaml", "--store", tmp_path / "3.sqlite").returncode == 1
+    first = rows(tmp_path / "1.sqlite")
+    assert first["reason"][2].startswith("../quickstart.yaml:41:5: positions[1]: ")
+    for k in (2, 3):
+        assert_same(first, rows(tmp_path / f"{k}.sqlite"))
+
+
+def test_a_store_is_read_where_nothing_can_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small_sweep(tmp_path, 2)
+    sweep(path)
+    before = sorted(file.name for file in tmp_path.iterdir())
+    assert main(["export", str(tmp_path / "small.sqlite"), "-o", "-"]) == 0
+    assert {file.name for file in tmp_path.iterdir()} <= {*before}
+    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        open_store(tmp_path / "small.sqlite").connection.execute("DELETE FROM result")
+    assert main(["export", str(tmp_path / "small.sqlite"), "-o", str(tmp_path / "small.sqlite")]) == 2
+
+
+def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
+    path = small_sweep(tmp_path, 2)
+    values = [3, 9007199254740993, 18446744073709551616]
+    axes = f"axes: {{noise: {{path: seed, values: {values}}}}}"
+    path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\nrecord: [U5]\n", encoding="utf-8")
+    assert sweep(path) == 0
+    assert rows(tmp_path / "small.sqlite")["noise"].tolist() == [str(value) for value in values]

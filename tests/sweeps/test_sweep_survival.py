@@ -137,6 +137,8 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
     assert done.returncode == 1, done.stderr
     assert "6 cells, 3 done, 3 failed" in done.stdout
     assert "the process that computed it was ended" in done.stderr and "Traceback" not in done.stderr
+    again = run("sweep", path, "--workers", "2", "--retry-failed")
+    assert again.returncode == 1 and "6 cells, 3 done, 3 failed (3 of them before)" in again.stdout, again.stderr
 
 
 def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
