@@ -204,6 +204,8 @@ def a_repository(top: Path) -> None:
     (top / "settings.yaml").write_text("colour: blue\n", encoding="utf-8")
     (top / "designs/sweeps").mkdir()
     (top / "designs/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
+    (top / "designs/old/sweeps").mkdir(parents=True)
+    (top / "designs/old/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
 
 
 def test_the_action_checks(tmp_path: Path) -> None:
