@@ -43,7 +43,8 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
             if not run_modules and _has_code(bundle, Path(folder)):
                 text = "the experiment has an error model in Python, which is run only with --run-modules"
                 raise NoExperimentError(text)
-            sweep = load_sweep(source)
+            # The stored file, whichever the sweep file names.
+            sweep = load_sweep(source, Path(folder) / PurePosixPath(bundle.base))
             if len(sweep.cells) != len(results.cells):
                 raise NoExperimentError("the stored files make other cells than those stored")
             return [experiment_of(sweep, cell) for cell in cells]

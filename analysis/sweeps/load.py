@@ -40,8 +40,8 @@ RESERVED = (
 )
 
 
-def load_sweep(path: str | os.PathLike[str]) -> Sweep:
-    """Load a sweep file and the experiment file that it starts from.
+def load_sweep(path: str | os.PathLike[str], base: Path | None = None) -> Sweep:
+    """Load a sweep file and the experiment file that it starts from, or `base` in its place.
 
     :raises ExperimentError: one of the two is wrong; holds everything that was found.
     """
@@ -54,7 +54,7 @@ def load_sweep(path: str | os.PathLike[str]) -> Sweep:
     settings = _settings(root, problems)
     if settings is None:
         raise ExperimentError(sorted(problems.messages))
-    base = source.parent / settings.base
+    base = source.parent / settings.base if base is None else base
     try:
         trees = _trees(base)
     except ExperimentError as error:

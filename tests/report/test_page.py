@@ -193,6 +193,21 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
         assert not (tmp_path / "out.yaml").exists()
 
 
+def test_a_base_other_than_the_one_told_is_not_loaded(tmp_path: Path) -> None:
+    store = made_up(tmp_path / "evil.sqlite", "evil", [axis("k", ["1"], [1.0], "1")], [])
+    good = Path("designs/quickstart.yaml").read_bytes()
+    model = b"error_model: {kind: python, object: 'this:s'}"
+    evil = re.sub(rb"error_model:\n(  .*\n)+", model + b"\n", good)
+    sweep = b"title: t\nbase: evil.yaml\naxes: {k: {path: seed, values: [1]}}\n"
+    with store.connection:
+        store.connection.execute("DELETE FROM bundle")
+        rows = [(1, "made-up.yaml", sweep), (1, "base.yaml", good), (1, "evil.yaml", evil)]
+        store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+    sys.modules.pop("this", None)
+    (found,) = experiments(store, read_results(store, 1), [0])
+    assert found.error_model.kind == "kinematic" and "this" not in sys.modules
+
+
 def test_the_error_map_is_u4_on_a_grid() -> None:
     experiment = load("designs/quickstart.yaml")[0]
     found = error_map(experiment)
