@@ -151,20 +151,22 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
     if len(rows) < ROWS_AT_ONCE // 2:
         return _triangle(np.concatenate([triangle, rows]))
     # Three times as fast on many rows, which pay for the time that it takes to import.
-    dtpqrt = scipy_linalg().lapack.dtpqrt
     above = np.asfortranarray(_square(triangle, rows.shape[1]))
-    found, _, _, _ = dtpqrt(0, min(PANEL, rows.shape[1]), above, np.asfortranarray(rows), overwrite_a=1, overwrite_b=1)
-    return np.triu(found)
+    return np.triu(_by_panels(above, np.asfortranarray(rows), PANEL))
 
 
 def _with_rows(triangle: Array, rows: Array) -> Array:
     """Triangular factor of a square `triangle` with `rows` below it, in place of both where they are large."""
     if len(triangle) < SMALL:
         return _square(_triangle(np.concatenate([triangle, rows])), len(triangle))
-    from scipy.linalg.lapack import dtpqrt
+    return _by_panels(triangle, rows, 2 * PANEL)
 
+
+def _by_panels(triangle: Array, rows: Array, panel: int) -> Array:
+    """Triangular factor of a square `triangle` with `rows` below it, both in Fortran's order and in place of both."""
     found: Array
-    found, _, _, _ = dtpqrt(0, min(2 * PANEL, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1)
+    dtpqrt = scipy_linalg().lapack.dtpqrt
+    found, _, _, _ = dtpqrt(0, min(panel, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1)
     return found
 
 
