@@ -9,8 +9,8 @@ from pathlib import Path
 from simulator.experiment.load import load, place_in
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
+from simulator.experiment.variants import unknown_variants
 from simulator.experiment.yamltree import Mark
-from simulator.settings import hint
 
 from .study import Plan, check
 
@@ -54,12 +54,9 @@ def check_files(files: Sequence[Path], variants: Sequence[str] = ()) -> Iterator
             complete = False
             yield CheckedFile(str(path), (), error.messages)
     # A file that cannot be used may be the one that has the variant.
-    unknown = [name for name in variants if name not in found] if complete else []
-    if unknown:
-        every = ", ".join(map(str, files))
-        known = sorted(name for name in found if name is not None)
-        texts = [f'no variant "{name}"; {hint(name, known)}' for name in unknown]
-        yield CheckedFile(every, (), tuple(Message(every, 0, 0, "", text) for text in texts))
+    messages = unknown_variants(files, variants, found) if complete else ()
+    if messages:
+        yield CheckedFile(messages[0].file, (), messages)
 
 
 def _checked(experiment: Experiment) -> CheckedDesign:

@@ -53,7 +53,7 @@ def experiments(options: Namespace) -> list[Experiment]:
     """
     from simulator.experiment.load import load
     from simulator.experiment.messages import ExperimentError, Message
-    from simulator.settings import hint
+    from simulator.experiment.variants import unknown_variants
 
     found: list[Experiment] = []
     messages: list[Message] = []
@@ -66,13 +66,9 @@ def experiments(options: Namespace) -> list[Experiment]:
         raise ExperimentError(messages)
     if not options.variant:
         return found
-    names = {experiment.name for experiment in found if experiment.name is not None}
-    for name in options.variant:
-        if name not in names:
-            files = ", ".join(str(path) for path in options.files)
-            messages.append(Message(files, 0, 0, "", f'no variant "{name}"; {hint(name, sorted(names))}'))
-    if messages:
-        raise ExperimentError(messages)
+    unknown = unknown_variants(options.files, options.variant, {experiment.name for experiment in found})
+    if unknown:
+        raise ExperimentError(unknown)
     return [experiment for experiment in found if experiment.name in options.variant]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import closing
 from pathlib import Path
 
 WRONG_USAGE, BAD_FILE = 2, 3
@@ -37,7 +38,7 @@ def add_store(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Write the table."""
     from ..sweeps.frame import frame
-    from ..sweeps.store import StoreError, open_store, sweeps
+    from ..sweeps.store import StoreError, open_store
 
     suffix = options.output.suffix.lower()
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
@@ -47,14 +48,8 @@ def run(options: Namespace) -> int:
         print(f"ballplate export: -o {options.output} is the store itself; name another file", file=sys.stderr)
         return WRONG_USAGE
     try:
-        store = open_store(options.store)
-        known = sweeps(store)
-        if not known or (options.sweep is not None and options.sweep not in known):
-            numbers = ", ".join(map(str, known)) or "none"
-            print(f"{options.store}: there is no such sweep; it has {numbers}", file=sys.stderr)
-            return BAD_FILE
-        table = frame(store, options.sweep)
-        store.close()
+        with closing(open_store(options.store)) as store:
+            table = frame(store, options.sweep)
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import closing
 from pathlib import Path
 
 from .export import add_store
@@ -38,7 +39,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 def run(options: Namespace) -> int:
     """Write the report."""
     from ..report.results import read_results
-    from ..sweeps.store import StoreError, open_store, sweeps
+    from ..sweeps.store import StoreError, open_store
 
     output: Path | None = options.output
     if output is not None and output.resolve() == options.store.resolve():
@@ -53,14 +54,8 @@ def run(options: Namespace) -> int:
         return WRONG_USAGE
     form = options.format or SUFFIXES.get(suffix, "html")
     try:
-        store = open_store(options.store)
-        try:
-            known = sweeps(store)
-            if not known or (options.sweep is not None and options.sweep not in known):
-                numbers = ", ".join(map(str, known)) or "none"
-                print(f"{options.store}: there is no such sweep; it has {numbers}", file=sys.stderr)
-                return BAD_FILE
-            results = read_results(store, max(known) if options.sweep is None else options.sweep)
+        with closing(open_store(options.store)) as store:
+            results = read_results(store, options.sweep)
             if form == "html":
                 from ..report.page import page
 
@@ -70,8 +65,6 @@ def run(options: Namespace) -> int:
                 from ..report.tables import report_tables
 
                 text = FORMATS[form](results.title, report_tables(results))
-        finally:
-            store.close()
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE

@@ -117,7 +117,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         return INTERRUPTED
     finally:
         bar.close()
-    _tell(store, number, summary)
+    _tell(store, f" of sweep {number}" if len({*stored, number}) > 1 else "", number, summary)
     return 1 if summary.failed or summary.left else 0
 
 
@@ -131,15 +131,13 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
     return nullcontext(local_runner(sweep, bundle, options.workers or processors()))
 
 
-def _tell(store: Store, number: int, summary: Summary) -> None:
-    from ..sweeps.store import results, sweeps
+def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
+    from ..sweeps.store import results
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
     counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
-    if len(sweeps(store)) > 1:
-        counted += f" of sweep {number}"
-    print(f"{store.path}: {counted}, {summary.done} done, {summary.failed} failed{before}{left}")
+    print(f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}")
     found = results(store, number)
     versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:

@@ -88,16 +88,8 @@ def trials(
     return Trials(chosen, found, optimism=_optimism(experiment, shared) if differs else None)
 
 
-@dataclass(frozen=True)
-class Block:
-    """Sums over a block of replicates; without them there is a reason."""
-
-    tally: Tally | None
-    reason: str = ""
-
-
-def block_of_trials(experiment: Experiment, count: int, seed: int, block: int, size: int) -> Block:
-    """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most.
+def block_of_trials(experiment: Experiment, count: int, seed: int, block: int, size: int) -> Tally | None:
+    """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most; None where there are none.
 
     `size` is a multiple of `TASK` replicates. The same replicates have the same bits, whatever the blocks.
 
@@ -105,11 +97,11 @@ def block_of_trials(experiment: Experiment, count: int, seed: int, block: int, s
     """
     shared = _shared(experiment)
     if isinstance(shared, str):
-        return Block(None, shared)
+        return None
     aims = targets(shared)
     first, last = block * size // TASK, min((block + 1) * size, count)
     parts = [sum_of_task(shared, aims, seed, task, last) for task in range(first, -(-last // TASK))]
-    return Block(reduce(add, parts))
+    return reduce(add, parts)
 
 
 def combined(experiment: Experiment, total: Tally) -> Outcome:

@@ -8,14 +8,12 @@ from pathlib import Path, PurePosixPath
 
 from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
-from simulator.experiment.yamltree import Scalar, read_tree, walk
+from simulator.experiment.yamltree import read_tree
 
-from ..sweeps.bundle import MODULE, Bundle, unpack
+from ..sweeps.bundle import MODULE, Bundle, has_code, unpack
 from ..sweeps.load import experiment_of, load_sweep
 from ..sweeps.store import Store, files
 from .results import Results
-
-KIND_WITH_CODE = "python"
 
 
 class NoExperimentError(Exception):
@@ -57,4 +55,4 @@ def _has_code(bundle: Bundle, folder: Path) -> bool:
     if any(name.endswith(MODULE) for name, _ in bundle.files):
         return True
     roots = [read_tree(folder / PurePosixPath(name)) for name in (bundle.source, bundle.base)]
-    return any(isinstance(n, Scalar) and n.value == KIND_WITH_CODE for root in roots for _, n in walk(root))
+    return any(map(has_code, roots))

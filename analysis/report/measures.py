@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..sweeps.columns import symbol_column
 from ..tables import shown_unit
 from ..uncertainty import DESCRIPTIONS
 from .results import Results
@@ -42,7 +43,7 @@ def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measur
     for symbol in DESCRIPTIONS:
         if " " in symbol and not of_parts:
             continue
-        name = symbol.replace(" ", "_")
+        name = symbol_column(symbol)
         for statistic in STATISTICS:
             found += [
                 Measure(symbol, statistic, unit, column) for column, unit in _columns(results, f"{name}_{statistic}_")
@@ -97,15 +98,6 @@ def trial_symbols(results: Results) -> list[str]:
             found.append(name.replace("_more", "'").replace("_", " "))
     order = list(DESCRIPTIONS)
     return sorted(found, key=lambda symbol: (order.index(symbol.rstrip("'")), symbol))
-
-
-def symbol_column(symbol: str) -> str:
-    """A quantity as it stands in names of columns.
-
-    >>> symbol_column("U2 lengths"), symbol_column("U5'")
-    ('U2_lengths', 'U5_more')
-    """
-    return symbol.replace(" ", "_").replace("'", "_more")
 
 
 def descriptions(measures: Sequence[Measure]) -> list[str]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from simulator.quantities import QUANTITY, exact_number
 
 from ..sweeps.frame import frame
-from ..sweeps.store import Store, all_details, sweeps
+from ..sweeps.store import Store, all_details, chosen_sweep, definition_of
 
 if TYPE_CHECKING:
     import pandas
@@ -103,9 +103,13 @@ class Results:
         return np.asarray(self.frame[name], float)
 
 
-def read_results(store: Store, number: int) -> Results:
-    """Results of a sweep of a store."""
-    definition = sweeps(store)[number]
+def read_results(store: Store, sweep: int | None) -> Results:
+    """Results of a sweep of a store, the newest unless told.
+
+    :raises StoreError: there is no such sweep, or the store cannot be read.
+    """
+    number = chosen_sweep(store, sweep)
+    definition = definition_of(store, number)
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = frame(store, number)

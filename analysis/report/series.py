@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .measures import Measure, symbol_column, trial_symbols, uncertainty_measures
+from ..sweeps.columns import symbol_column
+from .measures import Measure, trial_symbols, uncertainty_measures
 from .results import Axis, Results
 
 Floats = NDArray[np.float64]

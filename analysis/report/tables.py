@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from ..montecarlo.figures import Figure
 from ..montecarlo.tables import with_error
+from ..sweeps.columns import symbol_column
 from ..tables import number
 from .measures import (
     Measure,
     descriptions,
     rank_measures,
-    symbol_column,
     trial_measures,
     uncertainty_measures,
 )

@@ -42,12 +42,19 @@ def bundle_of(sweep: Sweep) -> Bundle:
 
     A file that is named by its place from the root of the file system is not taken along: it must be there, wherever
     the sweep is computed.
+
+    :raises ExperimentError: as `files_of`, or a file that cannot be read.
     """
     source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
     paths = files_of(sweep)
     root = Path(os.path.commonpath([path.parent for path in paths]))
     names = {path: path.relative_to(root).as_posix() for path in paths}
-    return Bundle(names[source], names[base], tuple((name, path.read_bytes()) for path, name in names.items()))
+    try:
+        files = tuple((name, path.read_bytes()) for path, name in names.items())
+    except OSError as error:
+        text = f"cannot be read ({error.strerror}); check its name and permissions"
+        raise ExperimentError([Message(str(error.filename), 0, 0, "", text)]) from None
+    return Bundle(names[source], names[base], files)
 
 
 def files_of(sweep: Sweep) -> list[Path]:
@@ -76,20 +83,18 @@ def _named(folder: Path, text: str) -> Iterator[Path]:
     """Files below or beside a folder that a text may mean: a path, or a Python module."""
     if not 0 < len(text) <= 300 or "\0" in text or "\n" in text or text.startswith(("/", "~")):
         return
-    candidates = [text]
     if ":" in text:
         module = text.partition(":")[0].replace(".", "/")
         if (folder / f"{module}{MODULE}").is_file() or (folder / module).is_dir():
             # What it imports may stand beside it.
             yield from (path for path in sorted(folder.glob(f"*{MODULE}"))[:MOST_MODULES] if path.is_file())
             yield from sorted((folder / module.partition("/")[0]).rglob(f"*{MODULE}"))[:MOST_MODULES]
-    for one in candidates:
-        path = Path(os.path.abspath(folder / one))
-        try:
-            if path.is_file():
-                yield path
-        except (OSError, ValueError):
-            continue
+    path = Path(os.path.abspath(folder / text))
+    try:
+        if path.is_file():
+            yield path
+    except (OSError, ValueError):
+        return
 
 
 def unpack(bundle: Bundle, folder: Path) -> Path:
@@ -107,6 +112,11 @@ def unpack(bundle: Bundle, folder: Path) -> Path:
     return folder / PurePosixPath(bundle.source)
 
 
+def has_code(tree: Node) -> bool:
+    """Whether an experiment may have an error model written in Python."""
+    return any(isinstance(node, Scalar) and node.value == "python" for _, node in walk(tree))
+
+
 def code_digest(bundle: Bundle) -> str:
     """A hash of everything but the YAML files: what a model written in Python may read or import."""
     kept = tuple(item for item in bundle.files if item[0] not in (bundle.source, bundle.base))
@@ -115,14 +125,17 @@ def code_digest(bundle: Bundle) -> str:
 
 def definition(sweep: Sweep, bundle: Bundle) -> dict[str, Any]:
     """What a store keeps of a sweep as plain data: by it a changed file is told from the same one."""
-    content = {name: hashlib.blake2b(content, digest_size=20).hexdigest() for name, content in bundle.files}
     return {
         "title": sweep.title,
         "source": bundle.source,
         "base": bundle.base,
         "sweep": _plain(to_python(read_tree(sweep.source))),
         "experiment": _plain(to_python(read_tree(sweep.base))),
-        "files": {name: digest for name, digest in content.items() if name not in (bundle.source, bundle.base)},
+        "files": {
+            name: hashlib.blake2b(content, digest_size=20).hexdigest()
+            for name, content in bundle.files
+            if name not in (bundle.source, bundle.base)
+        },
         "axes": [
             {
                 "name": axis.name,

@@ -43,7 +43,6 @@ class _Run:
     """What is known of the cells while a sweep runs: keys by cell, statuses by key and block."""
 
     store: Store
-    number: int
     cells: int
     known: dict[int, str]
     found: dict[tuple[str, int], str]
@@ -70,7 +69,7 @@ def run_sweep(
 
     :raises StoreError: the store cannot be written.
     """
-    run = _Run(store, number, len(sweep.cells), keys(store, number), statuses(store))
+    run = _Run(store, len(sweep.cells), keys(store, number), statuses(store))
     if {key for key, _ in run.found} - set(run.known.values()):
         # What another sweep of this store has computed needs no second time.
         unknown = [Task(k, KEY_ONLY) for k in range(run.cells) if k not in run.known]
@@ -119,9 +118,7 @@ def _waves(run: _Run, cells: list[int], blocks: int) -> Iterator[list[Task]]:
 
 
 def _total(run: _Run, cell: int, blocks: range) -> Tally | None:
-    """Sums over all replicate blocks of a cell; None where a block could not be computed."""
-    if any(run.status(cell, block) != "done" for block in blocks):
-        return None
+    """Sums over all replicate blocks of a cell, which are done; None where it has no replicates for a reason."""
     parts = [block_tally(run.store, run.known[cell], block) for block in blocks]
     tallies = [part for part in parts if part is not None]
     return reduce(add, tallies) if len(tallies) == len(parts) else None

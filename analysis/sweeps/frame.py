@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Store, results, sweeps
+from .store import Store, chosen_sweep, definition_of, results
 
 if TYPE_CHECKING:
     import pandas
@@ -18,12 +18,14 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
     Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name, or texts),
     `status`, `reason`, the figures by name, `data_set_seed`, `fingerprint`, `duration_s`, and the versions. Figures
     that a cell lacks are NaN.
+
+    :raises StoreError: there is no such sweep, or the store cannot be read.
     """
     import pandas
 
-    defined = sweeps(store)
-    number = max(defined) if sweep is None else sweep
-    axes, cells = defined[number]["axes"], defined[number]["cells"]
+    number = chosen_sweep(store, sweep)
+    defined = definition_of(store, number)
+    axes, cells = defined["axes"], defined["cells"]
     found = results(store, number)
     columns: dict[str, Any] = {"cell": found.cells}
     chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -24,20 +23,14 @@ from simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence,
 from simulator.settings import hint, listing
 
 from .axes import read_axis
-from .bundle import bundle_of, code_digest
+from .bundle import bundle_of, code_digest, has_code
+from .columns import is_reserved
 from .conditions import holds
 from .model import Axis, Sweep
 from .settings import SweepSettings
 from .values import entry_names
 
 MOST_CELLS = 1_000_000
-
-# Columns of a sweep's table that no axis may be named like.
-RESERVED = (
-    *("cell", "status", "reason", "data_set_seed", "fingerprint", "duration_s", "parameters", "observations"),
-    *("rank_deficiency", "as_expected", "weakly_determined", "smallest_singular_value_per_um", "gap", "trials"),
-    *("not_converged", "degrees_of_freedom"),
-)
 
 
 def load_sweep(path: str | os.PathLike[str], base: Path | None = None) -> Sweep:
@@ -92,13 +85,9 @@ def load_sweep(path: str | os.PathLike[str], base: Path | None = None) -> Sweep:
         settings.record,
     )
     _check_base(sweep)
-    if any(_has_code(tree) for tree in trees.values()):
-        sweep = replace(sweep, code=code_digest(bundle_of(sweep)))
-    return sweep
-
-
-def _has_code(tree: Node) -> bool:
-    return any(isinstance(node, Scalar) and node.value == "python" for _, node in walk(tree))
+    bundle = bundle_of(sweep)
+    code = code_digest(bundle) if any(map(has_code, trees.values())) else ""
+    return replace(sweep, digest=bundle.digest, code=code)
 
 
 def experiment_of(sweep: Sweep, number: int) -> Experiment:
@@ -208,7 +197,7 @@ def _check_names(axes: list[Axis], problems: Problems) -> None:
     """Refuse axes that would share a column with another one, or with what is recorded."""
     columns: dict[str, str] = {}
     for axis in axes:
-        if axis.column in RESERVED or re.fullmatch(r"U[1-6]([ _].*)?|.*_version|sum_of_squares.*", axis.column):
+        if is_reserved(axis.column):
             problems.add(("axes", axis.name), "is a column of every table; choose another name", of_key=True)
         elif axis.column in columns:
             text = f'would have the column "{axis.column}" of the axis "{columns[axis.column]}"; choose another name'

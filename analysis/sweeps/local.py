@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -41,15 +41,9 @@ def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
         if workers > 1 and tasks:
             yield from _in_workers(sweep, source, digest, tasks, workers)
             return
-        paths = files_of(sweep)
-        before = _signature(paths)
-        if bundle_of(sweep).digest != digest:
-            raise ChangedError
+        watched = _watched(sweep, digest)
         for task in tasks:
-            row = compute(sweep, task)
-            if _signature(paths) != before:
-                raise ChangedError
-            yield told(row, sweep.source)
+            yield _row(watched, task)
 
     return run
 
@@ -94,11 +88,35 @@ def compute_unchanged(source: Path, digest: str, task: Task) -> Row:
 
     :raises ChangedError: its files are not those of the bundle with this digest.
     """
-    sweep, paths, before = _loaded(source, digest)
-    row = compute(sweep, task)
-    if _signature(paths) != before:
+    return _row(_loaded(source, digest), task)
+
+
+@dataclass(frozen=True)
+class _Watched:
+    """A sweep with what tells that one of its files is written to: their paths, and the signature they had."""
+
+    sweep: Sweep
+    paths: list[Path]
+    signature: object
+
+
+def _watched(sweep: Sweep, digest: str) -> _Watched:
+    try:
+        paths = files_of(sweep)
+        # Before the files are read, so that nothing can change in between.
+        found = _Watched(sweep, paths, _signature(paths))
+        if bundle_of(sweep).digest == digest:
+            return found
+    except ExperimentError:
+        pass
+    raise ChangedError
+
+
+def _row(watched: _Watched, task: Task) -> Row:
+    row = compute(watched.sweep, task)
+    if _signature(watched.paths) != watched.signature:
         raise ChangedError
-    return told(row, source)
+    return told(row, watched.sweep.source)
 
 
 def told(row: Row, source: Path) -> Row:
@@ -109,16 +127,12 @@ def told(row: Row, source: Path) -> Row:
 
 
 @cache
-def _loaded(source: Path, digest: str) -> tuple[Sweep, list[Path], object]:
+def _loaded(source: Path, digest: str) -> _Watched:
     try:
         sweep = load_sweep(source)
-        paths = files_of(sweep)
-        before = _signature(paths)
-        if bundle_of(sweep).digest == digest:
-            return sweep, paths, before
-    except (ExperimentError, OSError):
-        pass
-    raise ChangedError
+    except ExperimentError:
+        raise ChangedError from None
+    return _watched(sweep, digest)
 
 
 def _signature(paths: Sequence[Path]) -> object:

@@ -50,8 +50,9 @@ class Axis:
 class Sweep:
     """A sweep. `trees` are the base file's variants by name, or the whole file under None.
 
-    `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest. `code` is a
-    hash of the files that an error model written in Python may use, empty without one.
+    `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest. `digest`
+    is a hash of all files that the sweep depends on, `code` of those that an error model written in Python may use,
+    empty without one.
     """
 
     source: Path
@@ -64,6 +65,7 @@ class Sweep:
     trials: int | None
     seed: int
     record: tuple[str, ...]
+    digest: str = ""
     code: str = ""
 
     def choices(self, number: int) -> tuple[Choice, ...]:

@@ -154,6 +154,27 @@ def sweeps(store: Store) -> dict[int, dict[str, Any]]:
     return {number: json.loads(text) for number, text in rows}
 
 
+def definition_of(store: Store, sweep: int) -> dict[str, Any]:
+    """Definition of one sweep of the store."""
+    return dict(
+        json.loads(store.connection.execute("SELECT definition FROM sweep WHERE id = ?", [sweep]).fetchone()[0])
+    )
+
+
+def chosen_sweep(store: Store, number: int | None) -> int:
+    """The number of a sweep of the store: the one asked for, or the newest.
+
+    :raises StoreError: there is no such sweep.
+    """
+    try:
+        known = [one for (one,) in store.connection.execute("SELECT id FROM sweep ORDER BY id")]
+    except sqlite3.Error as error:
+        raise _told(store.path, error) from None
+    if not known or (number is not None and number not in known):
+        raise StoreError(f"{store.path}: there is no such sweep; it has {', '.join(map(str, known)) or 'none'}")
+    return known[-1] if number is None else number
+
+
 def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
     """Files of a sweep by their path from the common folder."""
     rows = store.connection.execute("SELECT path, content FROM bundle WHERE sweep = ? ORDER BY path", [sweep])
@@ -309,12 +330,6 @@ def results(store: Store, sweep: int) -> Results:
         figures,
         {name: [of_versions[number].get(name, "") for number in versions] for name in kinds},
     )
-
-
-def details(store: Store, key: str) -> dict[str, Any]:
-    """Texts of a result: null directions, where the largest uncertainties stand, flags."""
-    row = store.connection.execute("SELECT details FROM result WHERE key = ? AND block = 0", [key]).fetchone()
-    return {} if row is None else dict(json.loads(row[0]))
 
 
 def all_details(store: Store, sweep: int) -> Iterator[tuple[int, dict[str, Any]]]:

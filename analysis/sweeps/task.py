@@ -6,7 +6,7 @@ import hashlib
 import platform
 import time
 import traceback
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from ..montecarlo.figures import Figure, Outcome
 from ..montecarlo.study import Trials, block_of_trials, combined, trials
 from ..montecarlo.tally import Tally
 from ..study import Plan, plan
-from .bundle import bundle_of
+from .columns import symbol_column, unit_suffix
 from .fingerprint import fingerprint
 from .load import experiment_of
 from .model import Sweep
@@ -78,8 +78,7 @@ def compute(sweep: Sweep, task: Task) -> Row:
     """Do a task; whatever goes wrong with the cell is told by its row."""
     start = time.perf_counter()
     row = _computed(sweep, task)
-    seconds = time.perf_counter() - start
-    return Row(**{**row.__dict__, "seconds": seconds, "versions": versions()})
+    return replace(row, seconds=time.perf_counter() - start, versions=versions())
 
 
 def _computed(sweep: Sweep, task: Task) -> Row:
@@ -94,8 +93,8 @@ def _computed(sweep: Sweep, task: Task) -> Row:
         return Row(number, block, key, "done")
     try:
         if block:
-            part = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
-            return Row(number, block, key, "done", seed=seed, tally=part.tally)
+            tally = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
+            return Row(number, block, key, "done", seed=seed, tally=tally)
         return _whole(sweep, experiment, task, key, seed)
     except ExperimentError as error:
         return Row(number, block, key, "failed", str(error), seed)
@@ -137,11 +136,8 @@ def key_of(sweep: Sweep, experiment: Experiment) -> str:
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:
-    """Key of a cell that makes no valid experiment."""
-    text = "\n".join(
-        f"{axis.name}={choice.label}" for axis, choice in zip(sweep.axes, sweep.choices(number), strict=True)
-    )
-    text += f"\n{bundle_of(sweep).digest}"
+    """Key of a cell that makes no valid experiment: of its choices, and of the files."""
+    text = f"{sweep.label(number)}\n{sweep.digest}"
     return "invalid " + hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
 
 
@@ -166,7 +162,7 @@ def plan_figures(planned: Plan, record: tuple[str, ...]) -> tuple[dict[str, floa
     for symbol, one in planned.quantities.items():
         if symbol.partition(" ")[0] not in record:
             continue
-        name, unit = symbol.replace(" ", "_"), unit_suffix(one.unit)
+        name, unit = symbol_column(symbol), unit_suffix(one.unit)
         figures[f"{name}_maximum_{unit}"] = one.maximum
         figures[f"{name}_average_{unit}"] = one.average
         figures[f"{name}_undetermined"] = float(one.undetermined)
@@ -191,10 +187,7 @@ def trial_figures(found: Outcome, record: tuple[str, ...]) -> dict[str, float]:
     for symbol, one in found.comparisons.items():
         if symbol.rstrip("'").partition(" ")[0] not in record:
             continue
-        name, unit = (
-            symbol.replace(" ", "_").replace("'", "_more"),
-            unit_suffix(one.unit),
-        )
+        name, unit = symbol_column(symbol), unit_suffix(one.unit)
         figures[f"{name}_actual_maximum_{unit}"] = one.actual_maximum
         figures[f"{name}_actual_average_{unit}"] = one.actual_average
         add(f"{name}_spread_ratio", one.spread)
@@ -205,15 +198,6 @@ def trial_figures(found: Outcome, record: tuple[str, ...]) -> dict[str, float]:
     add("sum_of_squares", found.misfit.mean)
     figures["degrees_of_freedom"] = float(found.misfit.degrees_of_freedom)
     return figures
-
-
-def unit_suffix(unit: str) -> str:
-    """A unit at the end of a column's name.
-
-    >>> unit_suffix("m, rad"), unit_suffix("1")
-    ('m_or_rad', 'ratio')
-    """
-    return unit.replace(", ", "_or_").replace("1", "ratio")
 
 
 @cache

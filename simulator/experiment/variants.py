@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
+from collections.abc import Sequence as AnySequence
 from dataclasses import replace
+from pathlib import Path
 
 from ..settings import describe, hint, listing
-from .messages import format_path
+from .messages import Message, format_path
 from .problems import Problems
 from .sections import ExperimentSettings
 from .yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
@@ -166,3 +169,12 @@ def in_variants(names: list[str], all_names: list[str]) -> str:
     if len(names) == len(all_names):
         return ""
     return f" (in variant{'s' if len(names) > 1 else ''} {listing(names, 4)})"
+
+
+def unknown_variants(
+    files: AnySequence[Path], wanted: AnySequence[str], found: Collection[str | None]
+) -> tuple[Message, ...]:
+    """Messages about variants that none of the files has; `found` are names of those that they have."""
+    every, known = ", ".join(map(str, files)), sorted(name for name in found if name is not None)
+    texts = [f'no variant "{name}"; {hint(name, known)}' for name in wanted if name not in known]
+    return tuple(Message(every, 0, 0, "", text) for text in texts)
