@@ -7,7 +7,7 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +44,31 @@ def seed(text: str) -> int:
     if not text.isascii() or not text.isdigit():
         raise ArgumentTypeError(f'a seed is a whole number, 0 or above, not "{text}"')
     return int(text)
+
+
+def picture(text: str) -> Path:
+    """Read the name of a picture to be drawn from the command line."""
+    from ..report.svg import PICTURES
+
+    if not text.lower().endswith(PICTURES):
+        raise ArgumentTypeError(f'a picture\'s name ends in {", ".join(PICTURES)}, unlike "{text}"')
+    return Path(text)
+
+
+def draw(draw_to: Callable[[Path], None], path: Path) -> bool:
+    """Write a picture; False after saying why not on standard error."""
+    try:
+        draw_to(path)
+    except ImportError as error:
+        if error.name is None or error.name.partition(".")[0] != "matplotlib":
+            raise
+        told = "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
+        print(f"{path}: {told}", file=sys.stderr)
+        return False
+    except OSError as error:
+        print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+        return False
+    return True
 
 
 def experiments(options: Namespace) -> list[Experiment]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from .common import add_file, add_json
 from .compare import add_pairs
+from .estimators import ESTIMATORS
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -35,7 +36,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument(
         "--estimator",
-        choices=("full", "distances", "cresto", "kruth"),
+        choices=("full", *ESTIMATORS),
         default="full",
         help="full (default), or one that uses distances alone and estimates the machine's parameters only",
     )
@@ -60,7 +61,7 @@ def run(options: Namespace) -> int:
         if names:
             print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
     if options.estimator != "full":
-        return _run_rival(options, experiment, observed)
+        return _run_other(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
     if options.json:
         print_json([fit_data(result)])
@@ -84,20 +85,18 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _run_rival(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:
-    """Fit with an estimator of distances; 1 if it did not converge or leaves parameters open."""
-    from ..estimators import fit_rival, rival_fit_data, rival_fit_lines
-    from .common import print_json
+def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:
+    """Fit with another estimator than the full one; 1 if it complains."""
+    from .common import print_json, print_lines
 
-    result = fit_rival(experiment, observed, options.estimator, options.pairs, options.across_probes, options.monomials)
+    found = ESTIMATORS[options.estimator](options, experiment, observed)
     if options.json:
-        print_json([rival_fit_data(result)])
+        print_json([found.data])
     else:
-        print("\n".join(rival_fit_lines(result)))
-    if result.solution.status != "converged":
-        print(f"the estimate has {result.solution.status}; see the record of iterations", file=sys.stderr)
-        return 1
-    if result.solution.deficiency:
-        print(f"rank deficiency {result.solution.deficiency}: what is undetermined is left out", file=sys.stderr)
+        print_lines(found.lines)
+    for warning in found.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    if found.complaint:
+        print(found.complaint, file=sys.stderr)
         return 1
     return 0

@@ -8,11 +8,15 @@ Each page has a folder of its own with a copy of the designs, in which its examp
 `{file} NAME`    writes a file and shows it.
 `{edit} NAME`    changes a file, as a difference: lines with `-` go, lines with `+` come, others stay.
 `{python-run}`   runs a program and shows what it prints.
+`{picture} NAME` shows an SVG or PNG file that an example has written, with `:alt:` for those who do not see it and its
+                 text below.
 """
 
 from __future__ import annotations
 
+import base64
 import errno
+import html
 import importlib
 import os
 import pty
@@ -37,6 +41,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 TOP = Path(__file__).resolve().parents[2]
+PICTURES = {".svg": "image/svg+xml", ".png": "image/png"}
 LANGUAGES = {".yaml": "yaml", ".yml": "yaml", ".py": "python"}
 TERMINAL = {"COLUMNS": "100", "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "PYTHONPATH": str(TOP), "TERM": "dumb"}
 # What the commands load when they are run; loaded before, it takes no time for each of them.
@@ -46,6 +51,7 @@ LOADED_BEFORE = (
     "analysis.junit",
     "analysis.montecarlo.study",
     "analysis.montecarlo.tables",
+    "matplotlib.figure",
     "simulator.generate",
     "simulator.readings",
     "scipy.interpolate",
@@ -148,6 +154,27 @@ class PythonRun(_Example):
         return blocks + ([nodes.literal_block("", "\n".join(lines), language="text")] if lines else [])
 
 
+class Picture(_Example):
+    required_arguments = 1
+    option_spec = {"alt": directives.unchanged_required}
+
+    def run(self) -> list[nodes.Node]:
+        path = self.folder / self.arguments[0]
+        if "alt" not in self.options or path.suffix not in PICTURES or not path.is_file():
+            raise self.refuse(f"{self.arguments[0]} is no SVG or PNG file that an example has written, or has no :alt:")
+        # As an address the picture keeps its ids to itself, and needs no file that outlives the page's folder.
+        data = base64.b64encode(path.read_bytes()).decode("ascii")
+        alt = html.escape(self.options["alt"], quote=True)
+        figure = nodes.figure()
+        figure += nodes.raw("", f'<img src="data:{PICTURES[path.suffix]};base64,{data}" alt="{alt}">', format="html")
+        if self.content:
+            caption = nodes.caption()
+            parsed, messages = self.parse_inline("\n".join(self.content))
+            caption += parsed
+            figure += [caption, *messages]
+        return [figure]
+
+
 def _command(command: str) -> Callable[[], int]:
     """What runs a line of the shell, the program itself without one where that does as well."""
     if not command.startswith("ballplate ") or set(command) & set("|&;<>()*?$`\\~#"):
@@ -225,5 +252,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("console", Console)
     app.add_directive("file", File)
     app.add_directive("edit", Edit)
+    app.add_directive("picture", Picture)
     app.add_directive("python-run", PythonRun)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

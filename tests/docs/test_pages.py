@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import base64
 import os
 import re
 import subprocess
@@ -62,7 +63,7 @@ def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
     pages = {path: Page(path) for path in built.rglob("*.html")}
     assert len(pages) >= 15
     for path, page in pages.items():
-        for address in page.loaded:
+        for address in (a for a in page.loaded if not a.startswith("data:")):
             assert "//" not in address and (path.parent / address.partition("?")[0].partition("#")[0]).exists(), address
         for address in page.links:
             target, _, name = address.partition("#")
@@ -95,15 +96,32 @@ def test_examples_have_run(built: Path) -> None:
     assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
 
 
-def test_an_example_that_fails_ends_the_build(tmp_path: Path) -> None:
-    page = "# Wrong\n\n```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```\n"
-    (tmp_path / "index.md").write_text(page, encoding="utf-8")
+@pytest.mark.parametrize(
+    ("example", "message"),
+    [
+        ("```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```", "exit status 0 instead of 1"),
+        ("```{picture} none.svg\n:alt: nothing\n```", "none.svg is no SVG or PNG file that an example has written"),
+    ],
+)
+def test_an_example_that_fails_ends_the_build(tmp_path: Path, example: str, message: str) -> None:
+    (tmp_path / "index.md").write_text(f"# Wrong\n\n{example}\n", encoding="utf-8")
     found = subprocess.run(
         [sys.executable, "-m", "sphinx", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"],
         capture_output=True,
         text=True,
     )
-    assert found.returncode != 0 and "exit status 0 instead of 1" in found.stderr
+    assert found.returncode != 0 and message in found.stderr
+
+
+def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) -> None:
+    drawing = "<svg xmlns='http://www.w3.org/2000/svg'/>"
+    page = f"# Right\n\n```{{file}} one.svg\n{drawing}\n```\n\n```{{picture}} one.svg\n:alt: a < b\nA *caption*.\n```\n"
+    (tmp_path / "index.md").write_text(page, encoding="utf-8")
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"]
+    subprocess.run(command, check=True, capture_output=True)
+    built = (tmp_path / "built/index.html").read_text(encoding="utf-8")
+    data = base64.b64encode(f"{drawing}\n".encode()).decode()
+    assert f'src="data:image/svg+xml;base64,{data}" alt="a &lt; b"' in built and "A <em>caption</em>." in built
 
 
 def shown(name: str) -> Any:
