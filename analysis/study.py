@@ -21,6 +21,7 @@ from simulator.machines.protocol import Array, Unit
 from simulator.readings import ObservedReadings
 from simulator.threads import single_threaded
 
+from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
 from .uncertainty import Quantity, uncertainties
 
@@ -80,6 +81,7 @@ class Fit:
     quantities: dict[str, Quantity]
     estimates: tuple[ParameterEstimate, ...]
     largest: tuple[Residual, ...]
+    plates: tuple[PlateCoordinates, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -162,6 +164,7 @@ def fit(
         uncertainties(design, layout, solution.state, spread, scale, experiment.target_accuracy),
         _estimates(design, layout, solution, spread, scale, monomials),
         _largest(design, solution, observed.x),
+        plate_coordinates(experiment, design, solution.state, spread, scale),
     )
 
 

@@ -6,12 +6,17 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from .plates import PlateCoordinates
 from .rank import Verdict
 from .study import Fit, Plan
 from .uncertainty import Quantity
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
 SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
+
+
+# Balls of a plate that a table has room for.
+MOST_BALLS = 100
 
 
 def shown_unit(unit: str) -> str:
@@ -154,7 +159,22 @@ def fit_lines(fit: Fit) -> list[str]:
             ]
         )
     lines += aligned(rows, [False, True, True, False])
-    return [*lines, "(origins of positions and co-ordinates of balls are among the estimates of --json)"]
+    lines.append("(origins of positions and co-ordinates of balls are among the estimates of --json)")
+    for plate in fit.plates:
+        lines += ["", *plate_table(plate, named=len(fit.plates) > 1)]
+    return lines
+
+
+def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_BALLS) -> list[str]:
+    """A plate's co-ordinates in its own axes as lines of text, for the first balls of a large one."""
+    title = "co-ordinates of the balls in the plate's own axes"
+    lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
+    rows = [["ball", "x, mm", "y, mm", "standard uncertainty of x, um", "of y, um"]]
+    for name, values, uncertainties in zip(plate.names, plate.coordinates, plate.standard_uncertainties, strict=True):
+        x, y = (to_uncertainty(1e3 * v, 1e3 * u) for v, u in zip(values, uncertainties, strict=True))
+        rows.append([name, x, y, *(number(1e6 * u, 3) for u in uncertainties)])
+    lines += aligned(rows[: most + 1], [False, True, True, True, True])
+    return lines + ([f"({len(rows) - 1 - most} balls more in --json)"] if len(rows) - 1 > most else [])
 
 
 def residual_table(fit: Fit, count: int = 3) -> list[str]:
@@ -213,6 +233,24 @@ def fit_data(fit: Fit) -> dict[str, Any]:
                 "unit": e.unit,
             }
             for e in fit.estimates
+        },
+        **({"plates": {plate.artefact: plate_data(plate) for plate in fit.plates}} if fit.plates else {}),
+    }
+
+
+def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
+    """A plate's co-ordinates in its own axes as plain data in metres; what is undetermined is None."""
+    axes = plate.axes
+    return {
+        "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
+        "balls": {
+            name: {
+                axis: {"value": _finite(value), "standard_uncertainty": _finite(uncertainty), "unit": "m"}
+                for axis, value, uncertainty in zip("xy", values, uncertainties, strict=True)
+            }
+            for name, values, uncertainties in zip(
+                plate.names, plate.coordinates.tolist(), plate.standard_uncertainties.tolist(), strict=True
+            )
         },
     }
 

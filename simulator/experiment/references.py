@@ -156,7 +156,25 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
             problems.add((*steps, "coordinates"), text)
         elif not twins:
             artefacts[name], layouts[name] = listed, layout
+        if listed.axes is not None:
+            _check_axes(listed, layout, (*steps, "axes"), dimension, problems)
     return References(problems, folder, dimension, probes, written_keys(root, "artefacts"), artefacts, layouts)
+
+
+def _check_axes(
+    settings: ArtefactSettings, layout: BallLayout, steps: Steps, dimension: int | None, problems: Problems
+) -> None:
+    """Report axes of an artefact that has none, or through balls that it does not have."""
+    assert settings.axes is not None
+    if settings.role != "plate":
+        problems.add(steps, "a length standard's balls are not estimated; remove its axes")
+    elif dimension == 3:
+        text = "axes are those of a plate in two dimensions; remove them, or the z axis of machine.volume"
+        problems.add(steps, text)
+    for key in ("origin", "x", "y"):
+        name = getattr(settings.axes, key)
+        if name is not None and name not in layout.names:
+            problems.add((*steps, key), f'unknown ball "{shorten(name)}"; {hint(name, layout.names)}')
 
 
 def resolve_probes(sections: Sections, references: References) -> dict[str, Floats]:

@@ -90,6 +90,22 @@ Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 
 
+class AxesSettings(Settings):
+    """The axes that a plate's co-ordinates are told in after a fit: its origin, and a ball on the x or on the y axis."""
+
+    origin: Name = Field(description="the ball at the origin")
+    x: Name | None = Field(None, description="the ball on the x axis, on the half where it nominally is; this or y")
+    y: Name | None = Field(None, description="the ball on the y axis, on the half where it nominally is; this or x")
+
+    @model_validator(mode="after")
+    def _two_balls(self) -> Self:
+        if (self.x is None) == (self.y is None):
+            raise ValueError('needs either "x" or "y", the ball that lies on that axis; give exactly one of them')
+        if self.origin in (self.x, self.y):
+            raise ValueError(f'ball "{self.origin}" cannot be the origin and fix an axis too; name another one')
+        return self
+
+
 class ArtefactSettings(Settings):
     """What artefacts of every kind have."""
 
@@ -97,6 +113,11 @@ class ArtefactSettings(Settings):
     role: Literal["plate", "length_standard"] = Field(
         "plate",
         description="plate: its ball co-ordinates are estimated; length_standard: it only carries distances",
+    )
+    axes: AxesSettings | None = Field(
+        None,
+        description="axes in which a two-dimensional fit tells the co-ordinates of the balls; default: from the first "
+        "ball through the farthest one that nominally lies on its x axis",
     )
 
     def layout(self) -> BallLayout:

@@ -1,0 +1,131 @@
+"""Squareness and scale difference of two axes from a plate read before and after a quarter turn (NBSIR 79-1752).
+
+With (x1, y1) the readings of a ball in the first position, (x2, y2) those after a turn by 90 degrees + beta, clockwise
+as seen against z, and (ex, ey) the offset between the two, to first order in all of alpha, beta and gamma,
+
+    x1 = -(beta + alpha) x2 - (1 + gamma) y2 + ex,    y1 = (1 - gamma) x2 + (alpha - beta) y2 + ey,
+
+equations (15) with the sign of gamma put right in the first. They hold for any share of gamma that the scales of x and
+y are given (appendix B), and are linear: five parameters, or three without the offset (appendix A).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.motions import fit_motion
+from ..machines.metric import MetricModel, Scale
+from ..machines.protocol import Array
+from ..threads import single_threaded
+
+# Balls whose spread across their main line is below this fraction of their length count as on one line.
+ON_A_LINE = 1e-4
+
+
+class UndeterminedError(ValueError):
+    """The balls lie on one line, so that neither squareness nor scale difference shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reversal:
+    """What the first-order equations give for n balls; angles in radians, lengths in metres.
+
+    `offset` (2,) is zero where it is no parameter. `residuals` (n, 2) are the readings of the first position less what
+    those of the second predict; `sigma` is their root mean square over `degrees_of_freedom`, NaN without any. The
+    error of two readings is in each, so that a single reading scatters by sigma / sqrt(2). `coordinates` (n, 2) are
+    the balls along the machine's axes in the first position, up to a shift: the mean of both positions, corrected.
+    `neglected` (n, 2) is what the first-order equations leave out, at the parameters found.
+    """
+
+    alpha: float
+    beta: float
+    gamma: float
+    offset: Array
+    sigma: float
+    degrees_of_freedom: int
+    residuals: Array
+    coordinates: Array
+    neglected: Array
+
+    @property
+    def bias(self) -> float:
+        """Most that the neglected terms change any parameter or co-ordinate by, in its own standard uncertainties.
+
+        That is the root of their sum of squares over sigma: a linear least-squares estimate of standard uncertainty u
+        changes by no more than u |n| / sigma where its observations change by n.
+        """
+        neglected = float(np.sqrt((self.neglected**2).sum()))
+        return neglected / self.sigma if self.sigma > 0.0 else float("inf") if neglected > 0.0 else 0.0
+
+
+def turn_between(first: Array, second: Array) -> float:
+    """Angle in radians that takes readings (n, 2) in the first position to those in the second, counter-clockwise.
+
+    >>> round(turn_between(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.0, 1.0], [0.0, 0.0]])), 12)
+    -1.570796326795
+    """
+    rotation, _ = fit_motion(first, second)
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
+@single_threaded
+def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> Reversal:
+    """Fit readings (n, 2) of the same balls in two positions, the second about 90 degrees clockwise from the first.
+
+    `scale` tells which axis takes the scale difference when co-ordinates are corrected. With "none" neither does; it is
+    fitted all the same, as the report does. Without `offsets` both positions have to be read from the same ball.
+
+    :raises UndeterminedError: the balls lie on one line.
+    """
+    x2, y2 = second.T
+    zero, one = np.zeros(len(x2)), np.ones(len(x2))
+    by_x = np.stack([-x2, -x2, -y2, one, zero], axis=1)
+    by_y = np.stack([y2, -y2, -x2, zero, one], axis=1)
+    rows = np.concatenate([by_x, by_y])[:, : 5 if offsets else 3]
+    wanted = np.concatenate([first[:, 0] + y2, first[:, 1] - x2])
+    # A unit of each column then moves some reading by the plate's size.
+    size = np.abs(second).max(initial=0.0)
+    if size == 0.0 or _spread(second) < ON_A_LINE:
+        raise UndeterminedError("the balls lie on one line, and show neither squareness nor scale difference")
+    weights = np.array([size, size, size, 1.0, 1.0])[: rows.shape[1]]
+    found = np.linalg.lstsq(rows / weights, wanted, rcond=None)[0] / weights
+    left = wanted - rows @ found
+    residuals = left.reshape(2, -1).T
+    freedom = len(wanted) - len(found)
+    sigma = float(np.sqrt(left @ left / freedom)) if freedom > 0 else float("nan")
+    alpha, beta, gamma = (float(value) for value in found[:3])
+    offset = found[3:] if offsets else np.zeros(2)
+    arms = second - second.mean(axis=0) if offsets else second
+    return Reversal(
+        alpha,
+        beta,
+        gamma,
+        offset,
+        sigma,
+        freedom,
+        residuals,
+        _corrected(first - residuals / 2.0 - offset / 2.0, scale, alpha, gamma),
+        arms @ _left_out(alpha, beta, gamma).T,
+    )
+
+
+def _spread(points: Array) -> float:
+    """Extent of points (n, 2) across their main line, as a fraction of that along it."""
+    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return float(extent[1] / extent[0]) if len(extent) == 2 and extent[0] > 0.0 else 0.0
+
+
+def _corrected(x: Array, scale: Scale, alpha: float, gamma: float) -> Array:
+    """True co-ordinates A^-1 x, up to a shift."""
+    a = np.array([alpha] if scale == "none" else [alpha, gamma])
+    return x + MetricModel(scale).error(x, a, np.zeros_like(x))
+
+
+def _left_out(alpha: float, beta: float, gamma: float) -> Array:
+    """What A B^-1 A^-1 (2, 2) has beside its first-order terms."""
+    inverse = _corrected(np.eye(2), "split", alpha, gamma).T
+    c, s = np.cos(beta), np.sin(beta)
+    exact = np.linalg.inv(inverse) @ np.array([[-s, -c], [c, -s]]) @ inverse
+    return np.asarray(exact - np.array([[-(beta + alpha), -(1.0 + gamma)], [1.0 - gamma, alpha - beta]]))

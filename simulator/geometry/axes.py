@@ -1,0 +1,92 @@
+"""The axes of a plate itself, which two of its balls define: an origin, and a ball that lies on one of the axes.
+
+They make co-ordinates comparable, whatever frame an estimate was made in (NBSIR 79-1752, section 2). The axes are those
+of two dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .artefacts import AxesSettings, BallLayout
+
+# A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to be on it.
+ON_AXIS = 1e-6
+
+
+@dataclass(frozen=True)
+class PlateAxes:
+    """The ball at the origin and the one on axis 0 (x) or 1 (y), on its negative half where `sign` is -1."""
+
+    origin: int
+    ball: int
+    axis: int
+    sign: float = 1.0
+
+
+def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> PlateAxes | None:
+    """The axes of a plate as its settings state them, or sensible ones; None for a single ball.
+
+    Without settings the first ball is the origin. The x axis goes through the farthest ball that nominally lies on it;
+    if there is none, the y axis through the farthest on that; otherwise the x axis through the ball that is farthest
+    along it. The half of the axis is the one where the ball nominally is.
+
+    :raises KeyError: the settings name a ball that the layout has not.
+
+    >>> layout = BallLayout(("a", "b", "c"), np.array([[0.0, 0, 0], [0, 0.2, 0], [0.3, 0.1, 0]]))
+    >>> plate_axes(layout)
+    PlateAxes(origin=0, ball=1, axis=1, sign=1.0)
+    >>> plate_axes(layout, AxesSettings(origin="b", x="c"))
+    PlateAxes(origin=1, ball=2, axis=0, sign=1.0)
+    """
+    if len(layout.names) < 2:
+        return None
+    index = {name: i for i, name in enumerate(layout.names)}
+    if settings is not None:
+        axis = 0 if settings.x is not None else 1
+        origin, ball = index[settings.origin], index[str(settings.x if axis == 0 else settings.y)]
+    else:
+        origin = 0
+        ball, axis = _farthest(layout.coordinates[:, :2] - layout.coordinates[0, :2])
+    along = layout.coordinates[ball, axis] - layout.coordinates[origin, axis]
+    return PlateAxes(origin, ball, axis, -1.0 if along < 0.0 else 1.0)
+
+
+def _farthest(places: NDArray[np.float64]) -> tuple[int, int]:
+    """The ball that fixes an axis best, and which one, from places (n, 2) relative to the origin."""
+    distance = np.sqrt((places**2).sum(axis=1))
+    for axis in (0, 1):
+        on_axis = np.abs(places[:, 1 - axis]) <= ON_AXIS * distance
+        reach = np.where(on_axis, np.abs(places[:, axis]), 0.0)
+        if reach.max() > 0.0:
+            return int(reach.argmax()), axis
+    return int(np.abs(places[:, 0]).argmax()), 0
+
+
+def axes_words(axes: PlateAxes, names: tuple[str, ...]) -> str:
+    """The axes in words.
+
+    >>> axes_words(PlateAxes(0, 1, 1), ("a", "b"))
+    'origin: ball a, y axis through ball b'
+    """
+    return f"origin: ball {names[axes.origin]}, {'xy'[axes.axis]} axis through ball {names[axes.ball]}"
+
+
+def in_plate_axes(balls: NDArray[np.float64], axes: PlateAxes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and the rotation (2, 2) that they are turned by.
+
+    >>> in_plate_axes(np.array([[1.0, 1.0], [1.0, 3.0]]), PlateAxes(0, 1, 0))[0].tolist()
+    [[0.0, 0.0], [2.0, 0.0]]
+    """
+    moved = balls - balls[axes.origin]
+    along = axes.sign * moved[axes.ball]
+    c, s = along / np.hypot(*along)
+    to_x = np.array([[c, s], [-s, c]])
+    rotation = to_x if axes.axis == 0 else np.array([[s, -c], [c, s]])
+    turned = moved @ rotation.T
+    # Zero by definition.
+    turned[axes.ball, 1 - axes.axis] = 0.0
+    return turned, rotation
