@@ -44,9 +44,24 @@ def _of_distances(options: Namespace, experiment: Experiment, observed: Observed
     return Outcome(rival_fit_lines(found), rival_fit_data(found), complaint)
 
 
+def _reversal(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
+    from ..reversal import fit_reversal
+    from ..reversal_tables import reversal_data, reversal_lines
+
+    found = fit_reversal(experiment, observed, options.scale, not options.no_offsets, options.sigma)
+    complaint = ""
+    if not found.full.converged:
+        complaint = f"the estimate by multiple redundancy has {found.full.solution.status}"
+    elif not found.full.verdict.as_expected:
+        expected = found.full.verdict.expected or 0
+        complaint = f"rank deficiency {found.full.verdict.deficiency} where the file expects {expected}"
+    return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings)
+
+
 ESTIMATORS: dict[str, Estimator] = {
     "distances": _of_distances,
     "cresto": _of_distances,
     "kruth": _of_distances,
+    "reversal": _reversal,
 }
 """By name; `full` is not among them."""

@@ -38,9 +38,20 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--estimator",
         choices=("full", *ESTIMATORS),
         default="full",
-        help="full (default), or one that uses distances alone and estimates the machine's parameters only",
+        help="full (default); distances, cresto or kruth, which use distances alone and estimate the machine's "
+        "parameters only; reversal, of a plate in two dimensions and two positions a quarter turn apart",
     )
     add_pairs(parser)
+    parser.add_argument(
+        "--scale",
+        choices=("x", "y", "split", "none"),
+        help="with reversal: which axis takes the scale difference; default: what the file says",
+    )
+    parser.add_argument(
+        "--no-offsets",
+        action="store_true",
+        help="with reversal: leave out the offsets between the positions, three parameters instead of five",
+    )
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -55,6 +66,10 @@ def run(options: Namespace) -> int:
     from ..tables import fit_data, fit_lines
     from .common import print_json, print_lines, single
 
+    if options.estimator != "reversal" and (options.scale or options.no_offsets):
+        given = "--scale" if options.scale else "--no-offsets"
+        print(f"ballplate fit: {given} goes with --estimator reversal only; leave it out, or add that", file=sys.stderr)
+        return 2
     experiment = single(options)
     observed = read_readings(options.readings, lay_out(experiment))
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):

@@ -50,14 +50,20 @@ class Reversal:
     neglected: Array
 
     @property
+    def single(self) -> float:
+        """Standard deviation of a co-ordinate of a single reading."""
+        return self.sigma / float(np.sqrt(2.0))
+
+    @property
     def bias(self) -> float:
         """Most that the neglected terms change any parameter or co-ordinate by, in its own standard uncertainties.
 
-        That is the root of their sum of squares over sigma: a linear least-squares estimate of standard uncertainty u
-        changes by no more than u |n| / sigma where its observations change by n.
+        That is the root of their sum of squares over the standard deviation s of a reading: a linear function of the
+        readings with the coefficients l has the standard uncertainty s |l|, and changes by no more than |l| |n| where
+        the readings change by n.
         """
         neglected = float(np.sqrt((self.neglected**2).sum()))
-        return neglected / self.sigma if self.sigma > 0.0 else float("inf") if neglected > 0.0 else 0.0
+        return neglected / self.single if self.sigma > 0.0 else float("inf") if neglected > 0.0 else 0.0
 
 
 def turn_between(first: Array, second: Array) -> float:

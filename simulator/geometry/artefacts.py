@@ -91,7 +91,7 @@ BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 
 
 class AxesSettings(Settings):
-    """The axes that a plate's co-ordinates are told in after a fit: its origin, and a ball on the x or on the y axis."""
+    """The axes that a plate's co-ordinates are told in: the ball at the origin, and one on the x or the y axis."""
 
     origin: Name = Field(description="the ball at the origin")
     x: Name | None = Field(None, description="the ball on the x axis, on the half where it nominally is; this or y")
