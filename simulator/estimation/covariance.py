@@ -20,6 +20,9 @@ from .parameters import SharedLayout
 # and the weakest determined direction of a usable design is many orders of magnitude above.
 EXACT = 1e-10
 
+# What a design leaves open as drawn, readings determine by about as much as poses are off, in radians.
+NEARLY = 1e-4
+
 # The size of change that a singular value is quoted for.
 MICROMETRE = 1e-6
 
@@ -65,11 +68,16 @@ class Spectrum:
 
 
 @single_threaded
-def spectrum(factor: Factor, exact: float = EXACT) -> Spectrum:
-    """Singular value decomposition of the shared parameters' factor."""
+def spectrum(factor: Factor, exact: float = EXACT, drawn_open: int = 0) -> Spectrum:
+    """Singular value decomposition of the shared parameters' factor.
+
+    The smallest `drawn_open` values count as zero if they are at least small, below `NEARLY` of the largest.
+    """
     scale = factor.layout.scale * MICROMETRE
     _, values, rows = np.linalg.svd(factor.root * scale)
-    deficiency = int((values <= exact * values.max(initial=0.0)).sum())
+    largest = values.max(initial=0.0)
+    nearly = min(drawn_open, int((values <= NEARLY * largest).sum()))
+    deficiency = max(int((values <= exact * largest).sum()), nearly)
     return Spectrum(values, scale[:, None] * rows.T, scale, deficiency)
 
 

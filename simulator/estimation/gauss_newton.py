@@ -23,11 +23,14 @@ class GaussNewtonSettings:
     """When to stop.
 
     An iteration is the last when the step, each parameter scaled to its effect in the volume, is below
-    `smallest_step` metres, or when it no longer shrinks because rounding is all that is left.
+    `smallest_step` metres, or when it no longer shrinks because rounding is all that is left. So many directions as
+    `drawn_open` are those that the design leaves open as drawn; they stay so where readings tell of them only by what
+    poses are off their nominal values.
     """
 
     iterations: int = 20
     smallest_step: float = 1e-13
+    drawn_open: int = 0
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSe
             found = no_spectrum(layout)
             status = "diverged"
             break
-        found = spectrum(factor)
+        found = spectrum(factor, drawn_open=settings.drawn_open)
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found)

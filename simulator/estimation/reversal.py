@@ -85,6 +85,10 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
 
     :raises UndeterminedError: the balls lie on one line.
     """
+    # Without offsets a line has to go through the origin to leave anything open.
+    arms = second - second.mean(axis=0) if offsets else second
+    if _spread(arms) < ON_A_LINE:
+        raise UndeterminedError("the balls lie on one line, and show neither squareness nor scale difference")
     x2, y2 = second.T
     zero, one = np.zeros(len(x2)), np.ones(len(x2))
     by_x = np.stack([-x2, -x2, -y2, one, zero], axis=1)
@@ -92,9 +96,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     rows = np.concatenate([by_x, by_y])[:, : 5 if offsets else 3]
     wanted = np.concatenate([first[:, 0] + y2, first[:, 1] - x2])
     # A unit of each column then moves some reading by the plate's size.
-    size = np.abs(second).max(initial=0.0)
-    if size == 0.0 or _spread(second) < ON_A_LINE:
-        raise UndeterminedError("the balls lie on one line, and show neither squareness nor scale difference")
+    size = np.abs(second).max()
     weights = np.array([size, size, size, 1.0, 1.0])[: rows.shape[1]]
     found = np.linalg.lstsq(rows / weights, wanted, rcond=None)[0] / weights
     left = wanted - rows @ found
@@ -103,7 +105,6 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     sigma = float(np.sqrt(left @ left / freedom)) if freedom > 0 else float("nan")
     alpha, beta, gamma = (float(value) for value in found[:3])
     offset = found[3:] if offsets else np.zeros(2)
-    arms = second - second.mean(axis=0) if offsets else second
     return Reversal(
         alpha,
         beta,
@@ -117,9 +118,9 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     )
 
 
-def _spread(points: Array) -> float:
-    """Extent of points (n, 2) across their main line, as a fraction of that along it."""
-    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+def _spread(arms: Array) -> float:
+    """Extent of points (n, 2) across their main line through the origin, as a fraction of that along it."""
+    extent = np.linalg.svd(arms, compute_uv=False)
     return float(extent[1] / extent[0]) if len(extent) == 2 and extent[0] > 0.0 else 0.0
 
 
