@@ -113,10 +113,10 @@ def fit_reversal(
     k, m = (0, 1) if turn_between(*seen) < 0.0 else (1, 0)
     try:
         found = reverse(seen[k], seen[m], scale, offsets)
+        chance = float("nan") if offsets else _chance(found, reverse(seen[k], seen[m], scale))
     except UndeterminedError as error:
         text = f"{error}; read balls that are not"
         raise ExperimentError([_message(experiment, ("artefacts", design.artefact_names[0]), text)]) from None
-    chance = float("nan") if offsets else _chance(found, reverse(seen[k], seen[m], scale))
     axes = axes_of_plates(experiment)[design.artefact_names[0]]
     full = fit(experiment, observed, sigma)
     values = [found.alpha, found.beta, found.gamma, *found.offset][: 5 if offsets else 3]

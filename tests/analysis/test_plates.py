@@ -1,4 +1,4 @@
-"""Co-ordinates in a plate's own axes: against a dense computation, by simulation, and whatever frame they were found in."""
+"""Co-ordinates in a plate's own axes: against a dense computation, by simulation, and from several frames."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ METRICS = {
 
 
 def readings(beta: float, scale: str = "x", offset: tuple[float, float] = (0.0, 0.0), tilt: float = 0.3) -> list[Array]:
-    """Exact readings of the plate in both positions, the second turned by 90 degrees + beta clockwise from the first."""
+    """Exact readings of the plate in both positions, the second turned clockwise by 90 degrees + beta."""
     found = []
     for angle, shift in ((tilt, offset), (tilt - np.pi / 2 - beta, (0.0, 0.0))):
         c, s = np.cos(angle), np.sin(angle)
