@@ -143,6 +143,11 @@ MACHINE = [
         '{random: 200, seed: 1}']),
 ]  # fmt: skip
 ARTEFACTS = [
+    ("size: [500 mm, 500 mm]", "size: [500 mm, 500 mm], axes: {origin: r1c1, x: r1c3}", [
+        "8:68: artefacts.plate.axes: axes are those of a plate in two dimensions; remove them, or the z axis of "
+        "machine.volume"]),
+    ("role: length_standard", 'role: length_standard, axes: {origin: "1", x: "2"}', [
+        "9:73: artefacts.bar.axes: a length standard's balls are not estimated; remove its axes"]),
     ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
     ("kind: grid, ", "", [
         '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere']),
@@ -286,6 +291,17 @@ PLANE_CASES = [
      "calibration: [{kind: distances, pairs: all, standard_uncertainty: 1 um, dimensions: 3}]\npositions:", [
         "5:85: calibration[0].dimensions: a two-dimensional experiment has distances in 2 "
         "dimensions; remove it"]),
+    ("size: 500 mm", "size: 500 mm, axes: {origin: r1c9, x: r1c7}", [
+        '4:74: artefacts.plate.axes.origin: unknown ball "r1c9"; did you mean "r1c3"?',
+        '4:83: artefacts.plate.axes.x: unknown ball "r1c7"; did you mean "r1c3"?']),
+    ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1}", [
+        '4:65: artefacts.plate.axes: needs either "x" or "y", the ball that lies on that axis; '
+        "give exactly one of them"]),
+    ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1, x: r1c2, y: r2c1}", [
+        '4:65: artefacts.plate.axes: needs either "x" or "y", the ball that lies on that axis; '
+        "give exactly one of them"]),
+    ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1, y: r1c1}", [
+        '4:65: artefacts.plate.axes: ball "r1c1" cannot be the origin and fix an axis too; name another one']),
 ]  # fmt: skip
 
 

@@ -1,0 +1,195 @@
+"""`fit --estimator reversal`, and the metric from positions at any angles, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+
+FOLDER = Path("designs/hocken_borchardt")
+ANGLES = str(FOLDER / "angles.yaml")
+DUMMY = [str(FOLDER / "dummy.yaml"), str(FOLDER / "dummy-readings.csv"), "--variant", "with scale"]
+REVERSAL = ["--estimator", "reversal"]
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> tuple[str, str]:
+    capsys.readouterr()
+    assert main(list(arguments)) == status
+    return capsys.readouterr()
+
+
+def data(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    return json.loads(told(capsys, *arguments, "--json")[0])  # type: ignore[no-any-return]
+
+
+def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    out, err = told(capsys, "fit", *DUMMY, *REVERSAL)
+    lines = [line.split() for line in out.splitlines()]
+    assert err == ""
+    assert ["alpha", "4.8079", "4.8062", "0.0252", "urad"] in lines
+    assert ["2", "318.1723719", "0", "318.1723704", "0", "0.0103", "0"] in lines
+    assert '"turned" is turned by 89.992480 degrees, clockwise, from "first"' in out
+    assert "(origin: ball 1, x axis through ball 2)" in out
+    out, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--no-offsets", "--scale", "none")
+    assert "three parameters, no offsets, scale difference: none (fitted, but not applied)" in out
+    assert "offset x" not in out and "fit without --no-offsets" in err
+
+
+def test_data_are_those_of_the_full_fit_beside_the_reversal(capsys: pytest.CaptureFixture[str]) -> None:
+    found = data(capsys, "fit", *DUMMY, *REVERSAL)
+    full = data(capsys, "fit", *DUMMY)
+    relation = found["multiple_redundancy"].pop("relation")
+    assert found["multiple_redundancy"] == full
+    for name in ("alpha", "gamma"):
+        assert relation[name] == full["estimates"][name]
+    assert relation["beta"]["value"] == pytest.approx(full["estimates"]["first: rotation z"]["value"], abs=1e-12)
+    uncertainty = full["estimates"]["first: rotation z"]["standard_uncertainty"]
+    assert relation["beta"]["standard_uncertainty"] == pytest.approx(uncertainty)
+    # The other position is held where it is, and the scales near enough one.
+    assert relation["offset x"]["value"] == pytest.approx(full["estimates"]["first: origin x"]["value"], abs=1e-9)
+    uncertainty = full["estimates"]["first: origin x"]["standard_uncertainty"]
+    assert relation["offset x"]["standard_uncertainty"] == pytest.approx(uncertainty, rel=1e-4)
+    assert found["axes"] == full["plates"]["plate"]["axes"] == {"origin": "1", "x": "2"}
+    for ball, place in full["plates"]["plate"]["balls"].items():
+        for axis in "xy":
+            assert found["balls"][ball][axis]["value"] == pytest.approx(place[axis]["value"], abs=3e-9)
+    assert found["positions"] == {"first": "first", "second": "turned"}
+    assert len(found["residuals"]) == 9 and found["sigma"] == pytest.approx(0.534e-6 * 0.0254, rel=1e-3)
+
+
+def test_either_sense_and_either_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Counter-clockwise, the position listed second comes first; parameters are told for the same relation."""
+    text = Path(ANGLES).read_text().partition("expected_rank_deficiency")[0].partition("positions:")[0]
+    poses = {"a": "{origin: [250 mm, 250 mm], rotation: 0 deg}", "b": "{origin: [650 mm, 250 mm], rotation: 90 deg}"}
+    readings, found = tmp_path / "r.csv", {}
+    for order in ("ab", "ba"):
+        path = tmp_path / f"{order}.yaml"
+        listed = "".join(f"  - {{name: {name}, pose: {poses[name]}}}\n" for name in order)
+        path.write_text(f"{text}positions:\n{listed}")
+        if order == "ab":
+            told(capsys, "simulate", str(path), "-o", str(readings))
+        found[order] = data(capsys, "fit", str(path), str(readings), *REVERSAL)
+    one, other = found["ab"], found["ba"]
+    assert one["positions"] == other["positions"] == {"first": "b", "second": "a"}
+    for name, estimate in one["multiple_redundancy"]["relation"].items():
+        beside = other["multiple_redundancy"]["relation"][name]
+        assert estimate["value"] == pytest.approx(beside["value"], abs=1e-12)
+        assert estimate["standard_uncertainty"] == pytest.approx(beside["standard_uncertainty"], rel=1e-4)
+        assert one["estimates"][name]["value"] == other["estimates"][name]["value"]
+        # Beyond what noise explains the reversal and the full estimate are the same, too.
+        assert one["estimates"][name]["value"] == pytest.approx(estimate["value"], abs=2e-9)
+    true = {"alpha": 12e-6, "beta": 0.0, "gamma": 8e-6}
+    for name, value in true.items():
+        estimate = one["multiple_redundancy"]["relation"][name]
+        assert abs(estimate["value"] - value) < 3 * estimate["standard_uncertainty"]
+
+
+def test_too_far_from_a_quarter_turn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, readings = tmp_path / "far.yaml", str(tmp_path / "r.csv")
+    text = Path(ANGLES).read_text().replace("rotation: 90 deg", "rotation: 90.2 deg")
+    path.write_text(text)
+    chosen = ["--variant", "quarter turn"]
+    told(capsys, "simulate", str(path), "-o", readings, *chosen)
+    _, err = told(capsys, "fit", str(path), readings, *chosen, *REVERSAL)
+    assert "the turn is 720 arcsec from 90 degrees, too far for equations of the first order" in err
+    estimates = data(capsys, "fit", str(path), readings, *chosen)["estimates"]
+    for name, true in (("alpha", 12e-6), ("gamma", 8e-6)):
+        assert abs(estimates[name]["value"] - true) < 3 * estimates[name]["standard_uncertainty"]
+
+
+def test_positions_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
+    """The readings shipped give their true machine and plate back, within their uncertainties."""
+    found = data(capsys, "fit", ANGLES, str(FOLDER / "angles-readings.csv"), "--variant", "any angles")
+    assert found["status"] == "converged" and found["rank_deficiency"] == 0 and not found["too_large"]
+    for name, true in (("alpha", 12e-6), ("gamma", 8e-6)):
+        estimate = found["estimates"][name]
+        assert estimate["standard_uncertainty"] < 3e-7
+        assert abs(estimate["value"] - true) < 3 * estimate["standard_uncertainty"]
+    plate = found["plates"]["plate"]
+    assert plate["axes"] == {"origin": "r1c1", "x": "r1c4"}
+    off = [
+        (plate["balls"][f"r{row + 1}c{column + 1}"][axis]["value"] - 0.12 * place)
+        / plate["balls"][f"r{row + 1}c{column + 1}"][axis]["standard_uncertainty"]
+        for row in range(4)
+        for column in range(4)
+        for axis, place in (("x", column), ("y", row))
+        if plate["balls"][f"r{row + 1}c{column + 1}"][axis]["standard_uncertainty"] > 0
+    ]
+    assert len(off) == 29 and np.abs(off).max() < 3.5
+
+
+def test_rank_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
+    """Squareness and scale difference show by the sine of the angle, and half a turn shows neither."""
+    judged = json.loads(told(capsys, "run", ANGLES, "--json")[0])
+    found = {one["experiment"]: one for one in judged}
+    deficiency = {name.partition("[")[2][:-1]: one["rank_deficiency"] for name, one in found.items()}
+    assert deficiency == {
+        "any angles": 0,
+        "three positions": 0,
+        "quarter turn": 0,
+        "small turn": 0,
+        "half a turn": 2,
+        "shifted only": 2,
+        "half a turn, equal scales": 1,
+    }
+    for name in ("half a turn", "shifted only"):
+        words = " ".join(found[f"angles[{name}]"]["undetermined"])
+        assert "alpha (departure of the axes from squareness)" in words
+        assert "gamma (difference of the scales of x and y)" in words
+        assert found[f"angles[{name}]"]["quantities"]["U3"]["undetermined"] == 2
+    quarter, small = (
+        found[f"angles[{name}]"]["quantities"]["U3 angles"]["maximum"] for name in ("quarter turn", "small turn")
+    )
+    assert small * np.sin(np.radians(5)) == pytest.approx(quarter, rel=1e-6)
+
+
+def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Everything that is not as it should be is named at once, at its place, with nothing on standard output."""
+    path, readings = tmp_path / "e.yaml", tmp_path / "r.csv"
+    told(capsys, "simulate", ANGLES, "-o", str(readings), "--variant", "quarter turn")
+    lines = readings.read_text().splitlines()
+    readings.write_text("\n".join(line for line in lines if ",r2c2," not in line or "straight" in line) + "\n")
+    out, err = told(capsys, "fit", ANGLES, str(readings), "--variant", "quarter turn", *REVERSAL, status=3)
+    assert out == ""
+    assert (
+        f'{readings}: the reversal needs every ball in both positions; in "turned by 90" the readings lack "r2c2"; '
+        in err
+    )
+    out, err = told(capsys, "simulate", ANGLES, "-o", str(tmp_path / "h.csv"), "--variant", "half a turn")
+    out, err = told(capsys, "fit", ANGLES, str(tmp_path / "h.csv"), "--variant", "half a turn", *REVERSAL, status=3)
+    assert out == ""
+    assert 'a turn of 180 degrees lies between "straight" and "turned by 180"; turn the plate by about 90' in err
+    path.write_text(
+        "title: t\n"
+        "machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\n"
+        "error_model: {kind: kinematic}\n"
+        "probes: {down: [0 mm, 0 mm, 0 mm]}\n"
+        "artefacts:\n"
+        "  plate: {kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}\n"
+        "  ball: {kind: sphere}\n"
+        "positions:\n"
+        "  - {name: low, artefact: plate, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\n"
+        "  - {name: high, artefact: plate, plane: z, level: 500 mm, corner: {x: 0 mm, y: 0 mm}}\n"
+        "  - {name: there, artefact: ball, pose: {origin: [0 mm, 0 mm, 0 mm]}}\n"
+    )
+    told(capsys, "simulate", str(path), "-o", str(tmp_path / "s.csv"))
+    out, err = told(capsys, "fit", str(path), str(tmp_path / "s.csv"), *REVERSAL, status=3)
+    assert out == "" and [line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()] == [
+        '3:21: error_model.kind: the reversal is about a machine of kind "metric"',
+        "5:1: artefacts: the reversal takes one artefact",
+        "8:1: positions: the reversal takes two positions, a quarter turn apart",
+    ]
+
+
+def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for option in (["--scale", "x"], ["--no-offsets"]):
+        _, err = told(capsys, "fit", *DUMMY, *option, status=2)
+        assert f"{option[0]} goes with --estimator reversal only" in err
+    with pytest.raises(SystemExit) as caught:
+        main(["fit", *DUMMY, *REVERSAL, "--scale", "z"])
+    assert caught.value.code == 2
