@@ -45,7 +45,8 @@ INSTEAD = "or fit without --estimator, which takes any positions"
 class ReversalFit:
     """Both estimates of the same readings.
 
-    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the first. `names` and
+    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the first; `places` (n, 2)
+    are the readings in the first. `names` and
     `coordinates` (n, 2) are the balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple
     redundancy with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless `scale` is
     "none") and offsets as the reversal defines them, with standard uncertainties. `without_offsets` is the chance of a
@@ -58,6 +59,7 @@ class ReversalFit:
     offsets: bool
     first: str
     second: str
+    places: Array
     found: Reversal
     estimates: tuple[ParameterEstimate, ...]
     axes: PlateAxes
@@ -127,6 +129,7 @@ def fit_reversal(
         offsets,
         design.position_names[k],
         design.position_names[m],
+        seen[k] + design.origins[k],
         found,
         tuple(ParameterEstimate(n, v, np.nan, u) for (n, u), v in zip(PARAMETERS, values, strict=False)),
         axes,

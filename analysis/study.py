@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from simulator.design import Design, nominal_state, probe_offsets
+from simulator.design import Design, Readings, nominal_state, probe_offsets
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import GaussNewtonSettings, Solution, gauss_newton
@@ -173,14 +173,19 @@ def fit(
     )
 
 
-def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
-    """The largest residuals of readings, largest first."""
+def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Readings, Array, Array]:
+    """Readings of plates, with what each differs by from the estimate, (m, d) metres and in standard uncertainties."""
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
-    weight = reading_weights(design, readings)
-    residual = reading_blocks(design, solution.state, readings, x[chosen]).residual
+    standardised = reading_blocks(design, solution.state, readings, x[chosen]).residual
+    return readings, standardised / reading_weights(design, readings), standardised
+
+
+def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
+    """The largest residuals of readings, largest first."""
+    readings, value, standardised = reading_residuals(design, solution, x)
     found = []
-    for place in np.argsort(-np.abs(residual), axis=None, kind="stable")[:LARGEST].tolist():
+    for place in np.argsort(-np.abs(standardised), axis=None, kind="stable")[:LARGEST].tolist():
         i, axis = divmod(place, design.dimension)
         found.append(
             Residual(
@@ -188,8 +193,8 @@ def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ..
                 design.ball_label(readings.ball[i]),
                 design.probe_names[readings.probe[i]],
                 "xyz"[axis],
-                float(residual[i, axis] / weight[i, axis]),
-                float(residual[i, axis]),
+                float(value[i, axis]),
+                float(standardised[i, axis]),
             )
         )
     return tuple(found)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,12 +22,14 @@ class Outcome:
     """What an estimator has found, as lines of text and as plain data in metres and radians.
 
     `complaint` says why the exit status is 1 and is empty where all is well; `warnings` do not change the status.
+    `draw` writes the picture of its residuals, None where it has none.
     """
 
     lines: list[str]
     data: dict[str, Any]
     complaint: str = ""
     warnings: tuple[str, ...] = ()
+    draw: Callable[[Path], None] | None = None
 
 
 Estimator = Callable[[Namespace, "Experiment", "ObservedReadings"], Outcome]
@@ -55,7 +58,13 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
     elif not found.full.verdict.as_expected:
         expected = found.full.verdict.expected or 0
         complaint = f"rank deficiency {found.full.verdict.deficiency} where the file expects {expected}"
-    return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings)
+
+    def draw(path: Path) -> None:
+        from ..report.vectors import draw_vectors, of_reversal
+
+        draw_vectors(of_reversal(found), found.title, path)
+
+    return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings, draw)
 
 
 ESTIMATORS: dict[str, Estimator] = {

@@ -7,13 +7,15 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, add_json
+from .common import add_file, add_json, picture
 from .compare import add_pairs
 from .estimators import ESTIMATORS
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
     from simulator.readings import ObservedReadings
+
+    from ..study import Fit
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -52,6 +54,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="store_true",
         help="with reversal: leave out the offsets between the positions, three parameters instead of five",
     )
+    parser.add_argument(
+        "--plot",
+        metavar="FILE",
+        type=picture,
+        help="draw the residuals of a two-dimensional experiment as magnified vectors (.svg, .png or .pdf)",
+    )
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -71,6 +79,10 @@ def run(options: Namespace) -> int:
         print(f"ballplate fit: {given} goes with --estimator reversal only; leave it out, or add that", file=sys.stderr)
         return 2
     experiment = single(options)
+    if options.plot and (experiment.dimension != 2 or options.estimator not in ("full", "reversal")):
+        text = "--plot draws residuals of readings in two dimensions, by the full estimator or reversal; leave it out"
+        print(f"ballplate fit: {text}", file=sys.stderr)
+        return 2
     observed = read_readings(options.readings, lay_out(experiment))
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
         if names:
@@ -86,6 +98,8 @@ def run(options: Namespace) -> int:
         text = "see the record of iterations, and look for wrong units, balls or probes among the readings"
         print(f"the estimate has {result.solution.status} and nothing is made of it: {text}", file=sys.stderr)
         return 1
+    if options.plot and not _drawn(result, observed, options.plot):
+        return 3
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
         print(
@@ -100,15 +114,25 @@ def run(options: Namespace) -> int:
     return 0
 
 
+def _drawn(result: Fit, observed: ObservedReadings, path: Path) -> bool:
+    """Draw the residuals; False if that cannot be done."""
+    from ..report.vectors import draw_vectors, of_fit
+    from .common import draw
+
+    return draw(lambda path: draw_vectors(of_fit(result, observed), result.title, path), path)
+
+
 def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:
     """Fit with another estimator than the full one; 1 if it complains."""
-    from .common import print_json, print_lines
+    from .common import draw, print_json, print_lines
 
     found = ESTIMATORS[options.estimator](options, experiment, observed)
     if options.json:
         print_json([found.data])
     else:
         print_lines(found.lines)
+    if options.plot and found.draw and not draw(found.draw, options.plot):
+        return 3
     for warning in found.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     if found.complaint:

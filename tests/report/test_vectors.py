@@ -1,0 +1,60 @@
+"""Residual vectors as a picture."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.report.vectors import LONGEST, Vectors, draw_vectors, magnification, of_fit, of_reversal
+from analysis.reversal import fit_reversal
+from analysis.study import fit
+from simulator.experiment.load import load
+from simulator.layout import lay_out
+from simulator.readings import read_readings
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+FOLDER = Path("designs/hocken_borchardt")
+REAL = [str(FOLDER / "real.yaml"), str(FOLDER / "real-readings.csv"), "--variant", "with scale"]
+
+
+def test_vectors_are_the_residuals() -> None:
+    experiment = load(FOLDER / "real.yaml")[0]
+    observed = read_readings(FOLDER / "real-readings.csv", lay_out(experiment))
+    found = fit(experiment, observed)
+    turned, first = of_fit(found, observed)
+    assert (turned.label, first.label) == ("turned", "first") and turned.residuals.shape == (13, 2)
+    every = np.concatenate([turned.residuals, first.residuals])
+    assert np.abs(every).max() == pytest.approx(abs(found.largest[0].value))
+    assert (every**2).sum() / 0.0254e-6**2 == pytest.approx(found.solution.factor.sum_of_squares)
+    np.testing.assert_array_equal(first.places, observed.x[observed.design.readings.position == 1])
+    # The reversal has the residuals of both positions in the first: as much each, and so twice as much there.
+    (both,) = of_reversal(fit_reversal(experiment, observed))
+    np.testing.assert_array_equal(both.places, first.places)
+    np.testing.assert_allclose(both.residuals, 2 * first.residuals, rtol=0, atol=5e-9)
+
+
+@pytest.mark.parametrize("size", [1e-9, 3.1e-7, 0.5e-6, 2e-5])
+def test_the_longest_vector_takes_its_part_of_the_drawing(size: float) -> None:
+    group = Vectors("", np.zeros((2, 2)), np.array([[0.0, size], [size / 3, 0.0]]))
+    assert 0.4 * LONGEST * 0.3 < size * magnification((group,), 0.3) <= LONGEST * 0.3 * (1 + 1e-9)
+
+
+def test_no_residuals_at_all(tmp_path: Path) -> None:
+    draw_vectors((Vectors("perfect", np.eye(2), np.zeros((2, 2))),), "nothing", tmp_path / "none.svg")
+    assert ElementTree.parse(tmp_path / "none.svg").getroot().tag.endswith("svg")
+
+
+def test_fit_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, estimator in (("full.svg", "full"), ("reversal.svg", "reversal")):
+        assert main(["fit", *REAL, "--estimator", estimator, "--plot", str(tmp_path / name)]) == 0
+        assert "magnified" in (tmp_path / name).read_text()
+    assert main(["fit", *REAL, "--plot", str(tmp_path / "none" / "a.svg")]) == 3
+    assert "cannot be written" in capsys.readouterr().err
+    for wrong in (["designs/quickstart.yaml"], [str(FOLDER / "real.yaml"), "--estimator", "kruth"]):
+        assert main(["fit", wrong[0], REAL[1], *REAL[2:4][: 2 * (len(wrong) > 1)], *wrong[1:], "--plot", "a.svg"]) == 2
+        assert "--plot draws residuals" in capsys.readouterr().err
