@@ -19,6 +19,9 @@ from simulator.settings import Settings
 # What says nothing about the result: names, and where things stand.
 LEFT_OUT = ("title", "description", "source", "mark", "path", "_folder")
 
+# Settings that decide only how a fit of real readings is told: the axes of a plate.
+TOLD_LATER = ("axes",)
+
 
 class _Digest(Protocol):
     def update(self, data: bytes, /) -> None: ...
@@ -81,8 +84,9 @@ def _text(digest: _Digest, text: str) -> None:
 def _settings(digest: _Digest, value: BaseModel) -> None:
     _text(digest, f"settings {type(value).__name__}")
     for name in type(value).model_fields:
-        _text(digest, name)
-        _add(digest, getattr(value, name))
+        if name not in TOLD_LATER:
+            _text(digest, name)
+            _add(digest, getattr(value, name))
     for name, item in sorted((value.__pydantic_private__ or {}).items()):
         if name not in LEFT_OUT:
             _text(digest, name)

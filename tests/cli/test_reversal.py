@@ -186,6 +186,28 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     ]
 
 
+def test_several_probes_and_priors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, readings = tmp_path / "e.yaml", tmp_path / "r.csv"
+    text = (
+        Path(ANGLES).read_text().replace("rotation: 37 deg", "rotation: 90 deg").replace("[400 mm, 150", "[700 mm, 150")
+    )
+    positions = "".join(
+        line.replace("}}", "}, probes: [a, b]}") + "\n" for line in text.splitlines() if "  - {name: " in line
+    )
+    text = text.partition("positions:")[0] + "probes: {a: [0 mm, 0 mm], b: [20 mm, 0 mm]}\npositions:\n"
+    path.write_text(text + "".join(f"{line}\n" for line in positions.splitlines()[:2]))
+    told(capsys, "simulate", str(path), "-o", str(readings))
+    _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, status=3)
+    assert f"{readings}: the reversal takes readings with one probe, not with a, b; keep those with one" in err
+    readings.write_text("".join(f"{line}\n" for line in readings.read_text().splitlines() if ",b," not in line))
+    one = data(capsys, "fit", str(path), str(readings), *REVERSAL)
+    assert one["estimates"]["alpha"]["value"] == pytest.approx(12e-6, abs=2e-6)
+    path.write_text(path.read_text() + "priors: [{parameter: gamma, standard_uncertainty: 1 ppm}]\n")
+    assert data(capsys, "fit", str(path), str(readings), *REVERSAL)["scale"] == "x"
+    _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, "--scale", "none", status=3)
+    assert "priors: priors are about the file's error model; write scale: none there instead of --scale" in err
+
+
 def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:
     for option in (["--scale", "x"], ["--no-offsets"]):
         _, err = told(capsys, "fit", *DUMMY, *option, status=2)

@@ -111,6 +111,15 @@ def test_five_parameters_by_multiple_redundancy() -> None:
     assert (found.full.degrees_of_freedom, found.found.degrees_of_freedom) == (13, 13)
 
 
+def test_true_parameters_are_within_the_uncertainties() -> None:
+    """Table 1 tells what the readings were made with; rounding to a microinch is their only error."""
+    full = {e.name: e for e in reversed_("dummy", "x").redundant}
+    microinch = 1e-6 * INCH
+    true = {"alpha": 4.79e-6, "beta": -131.26e-6, "gamma": 13.70e-6, "offset x": -14.20 * microinch}
+    for name, value in (true | {"offset y": 9.60 * microinch}).items():
+        assert abs(full[name].value - value) < full[name].standard_uncertainty
+
+
 def test_three_parameters() -> None:
     """Table A1."""
     found = reversed_("dummy", "x", offsets=False)

@@ -196,6 +196,15 @@ def test_a_fingerprint_tells_what_matters(tmp_path: Path, old: str, new: str, di
     assert (one != other) == differs
 
 
+def test_axes_of_a_plate_are_told_later(tmp_path: Path) -> None:
+    """Stored cells and the seeds made of their fingerprints stay what they are."""
+    text = Path("designs/hocken_borchardt/angles.yaml").read_text(encoding="utf-8")
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "b.yaml").write_text(text.replace("x: r1c4", "y: r3c1"), encoding="utf-8")
+    one, other = ([fingerprint(found) for found in load(tmp_path / name)] for name in ("a.yaml", "b.yaml"))
+    assert one == other and len(set(one)) == len(one)
+
+
 def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path, "--dry-run") == 1
