@@ -52,7 +52,7 @@ def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
 
     >>> one = Vectors("", np.zeros((1, 2)), np.array([[3e-7, 4e-7]]))
     >>> magnification((one,), 0.5)
-    100000.0
+    200000.0
     """
     longest = max((float(np.sqrt((g.residuals**2).sum(axis=1)).max(initial=0.0)) for g in groups), default=0.0)
     if longest == 0.0 or extent == 0.0:
