@@ -121,7 +121,7 @@ def fit_reversal(
         raise ExperimentError([_message(experiment, ("artefacts", design.artefact_names[0]), text)]) from None
     axes = axes_of_plates(experiment)[design.artefact_names[0]]
     full = fit(experiment, observed, sigma)
-    values = [found.alpha, found.beta, found.gamma, *found.offset][: 5 if offsets else 3]
+    values = [found.alpha, found.beta, found.gamma, *found.offset.tolist()][: 5 if offsets else 3]
     return ReversalFit(
         experiment.label,
         experiment.title,
