@@ -1,8 +1,9 @@
 """Univariate functions on [0, 1]: Chebyshev polynomials, monomials and B-splines behind one protocol.
 
-Every family contains 1 and t; the rest are interior functions, which vanish at both ends. An error function that is
-zero at 0 takes what vanishes there, one that is zero at both ends the interior functions alone: end conditions are
-met by construction. NPL Report CISE 15/98, section 2.1.1, has the families, section 2.6 why monomials will not do at
+Every family contains 1 and t, or a function in place of t; the rest are interior functions, which vanish at both ends. An
+error function that is zero at 0 takes what vanishes there, one that is zero at both ends the interior functions alone: end
+conditions are met by construction, and so are slopes of zero and periodic ends. A slope other than zero is no condition on
+a basis, whose functions are multiplied by any number; `simulator/splines` has fits with such. NPL Report CISE 15/98, section 2.1.1, has the families, section 2.6 why monomials will not do at
 high degrees.
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
@@ -164,20 +165,35 @@ class Monomial(_Polynomials):
         return matrix
 
 
+Ends = Literal["free", "zero slope at start", "zero slope at end", "zero slopes", "periodic"]
+"""What holds for a spline at 0 and 1 besides its value."""
+
+# Derivatives grow with the inverse of the distance, and are compared between the ends.
+SMALLEST_PIECE = 1e-4
+
+
 @dataclass(frozen=True)
 class Spline:
-    """Splines of an order (degree plus one, at least 2) with interior knots: t and the B-splines N_2 to N_last-1.
+    """Splines of an order (degree plus one, at least 2) with interior knots.
 
-    A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative less. Beyond [0, 1]
-    the polynomial of the last piece goes on.
+    A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative less; order - 2 times
+    leaves value and slope, as between tangent features. Beyond [0, 1] the polynomial of the last piece goes on.
+
+    `ends` holds for every function. With free ends, the functions are t and the B-splines N_2 to N_last-1. A slope of
+    zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives way to the last B-splines. Periodic are the
+    derivatives 1 to order - 2, the same at both ends: such a function is t times some factor, a scale error or
+    squareness, and one that goes on from 1 as from 0.
 
     >>> Spline(4, (0.5,)).size, Spline(4, (0.5,), zero_at_one=True).size
     (4, 3)
+    >>> Spline(4, (0.5,), ends="zero slopes").size, Spline(4, (0.3, 0.5), ends="periodic").size
+    (2, 3)
     """
 
     order: int
     knots: tuple[float, ...] = ()
     zero_at_one: bool = False
+    ends: Ends = "free"
 
     def __post_init__(self) -> None:
         if self.order < 2:
@@ -188,6 +204,16 @@ class Spline:
             raise ValueError(
                 f"a knot stands too often at one place; give it {self.order - 1} times at most, one less than the order"
             )
+        if self.ends != "free" and self.order < 3:
+            raise ValueError("broken lines have no slope at their ends to be prescribed; give an order of 3 or more")
+        if self.ends != "free" and self.count < 3 + int(self.ends == "zero slopes"):
+            raise ValueError(
+                f"no spline of order {self.order} without knots has {self.ends}; give an order of 4 or knots"
+            )
+        if self.ends == "periodic" and np.diff([0.0, *sorted(set(self.knots)), 1.0]).min() < SMALLEST_PIECE:
+            raise ValueError(
+                f"knots of a periodic spline are too close together; leave {SMALLEST_PIECE:g} between them"
+            )
 
     @property
     def count(self) -> int:
@@ -197,7 +223,12 @@ class Spline:
     @property
     def size(self) -> int:
         """Number of functions."""
-        return self.count - 1 - int(self.zero_at_one)
+        return self._inner.shape[1] + int(not self.zero_at_one)
+
+    @property
+    def contains_t(self) -> bool:
+        """Whether t, a straight line, is among the functions that vanish at 0."""
+        return self.ends in ("free", "periodic")
 
     @property
     def _all_knots(self) -> Array:
@@ -208,43 +239,68 @@ class Spline:
         # SciPy takes longer to import than most experiments to check.
         from scipy.interpolate import BSpline
 
-        splines = BSpline(self._all_knots, np.eye(self.count), self.order - 1)(t)[:, 1:-1]
-        return np.asarray(splines if self.zero_at_one else np.column_stack([t, splines]))
+        splines = BSpline(self._all_knots, np.eye(self.count), self.order - 1)(t)
+        # Products with the unit matrix would cost free ends nothing but time.
+        inner = splines[:, 1:-1] if self.ends == "free" else splines @ self._inner
+        if self.zero_at_one:
+            return np.asarray(inner)
+        return np.column_stack([t if self.contains_t else splines @ self._first, inner])
 
     def interior(self) -> Spline:
         """The functions that vanish at both ends."""
         return replace(self, zero_at_one=True)
 
     @cached_property
-    def _abscissae(self) -> Array:
-        """Coefficients (count,) of t: means of order - 1 successive knots."""
-        knots = self._all_knots
-        return np.array([knots[j + 1 : j + self.order].mean() for j in range(self.count)])
+    def _first(self) -> Array:
+        """Coefficients (count,) of the function that is 1 at 1: of t means of order - 1 successive knots."""
+        if self.contains_t:
+            knots = self._all_knots
+            return np.array([knots[j + 1 : j + self.order].mean() for j in range(self.count)])
+        # The last B-spline has a slope at 1, and that before it the opposite one.
+        return np.eye(self.count)[-1 if self.ends == "zero slope at start" else [-2, -1]].reshape(-1, self.count).sum(0)
+
+    @cached_property
+    def _inner(self) -> Array:
+        """Coefficients (count, number) of the functions that vanish at both ends."""
+        whole = np.eye(self.count)[:, 1:-1]
+        if self.ends == "free":
+            return whole
+        if self.ends != "periodic":
+            first, last = self.ends != "zero slope at end", self.ends != "zero slope at start"
+            return whole[:, int(first) : whole.shape[1] - int(last)]
+        from scipy.interpolate import BSpline
+
+        splines = BSpline(self._all_knots, whole, self.order - 1)
+        jumps = np.stack([splines(1.0, nu=k) - splines(0.0, nu=k) for k in range(1, self.order - 1)])
+        jumps /= np.abs(jumps).max(axis=1, keepdims=True)
+        # Orthonormal combinations that have no jumps.
+        null = np.linalg.qr(jumps.T, mode="complete")[0][:, len(jumps) :]
+        return np.asarray(whole @ null)
 
     def quoted(self, variable: str = "t") -> Quoted:
         """Coefficients of the B-splines that are not zero by the end conditions."""
         whole = self.quoted_whole(variable)
-        if self.zero_at_one:
-            return Quoted(whole.names[1:-1], whole.matrix[1:-1, 2:])
-        return Quoted(whole.names[1:], whole.matrix[1:, 1:])
+        matrix = self._inner if self.zero_at_one else np.column_stack([self._first, self._inner])
+        used = np.flatnonzero(matrix.any(axis=1))
+        return Quoted(tuple(whole.names[k] for k in used), matrix[used])
 
     def quoted_whole(self, variable: str = "t") -> Quoted:
         """Coefficients of all B-splines for 1, t and the interior functions."""
-        matrix = np.zeros((self.count, self.count))
-        matrix[:, 0], matrix[:, 1] = 1.0, self._abscissae
-        matrix[1:-1, 2:] = np.eye(self.count - 2)
+        t = replace(self, ends="free")._first
+        matrix = np.column_stack([np.ones(self.count), t, self._inner])
         return Quoted(tuple(f"N{k + 1}({variable})" for k in range(self.count)), matrix)
 
 
 def spline_containing(parts: tuple[Basis, ...], raised: int = 0) -> Basis:
     """The smallest family that contains the whole families of all `parts`, the last `raised` of them times t.
 
-    Polynomials stay Chebyshev polynomials; as soon as there is a spline, so is the result.
+    Polynomials stay Chebyshev polynomials; as soon as there is a spline, so is the result. Its ends are free whatever
+    those of the parts are, as a product with t has other slopes.
 
     >>> spline_containing((Polynomial(5), Monomial(4))).coefficients
     5
     >>> spline_containing((Spline(3, (0.5,)), Polynomial(4)))
-    Spline(order=4, knots=(0.5, 0.5), zero_at_one=False)
+    Spline(order=4, knots=(0.5, 0.5), zero_at_one=False, ends='free')
     """
     degrees = []
     for k, part in enumerate(parts):

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+from scipy.linalg import null_space
 
-from simulator.machines.bases import Basis, Monomial, Polynomial, Spline, spline_containing, whole_values
+from simulator.machines.bases import Basis, Ends, Monomial, Polynomial, Spline, spline_containing, whole_values
 
 FAMILIES: dict[str, Basis] = {
     "Chebyshev": Polynomial(6),
@@ -16,7 +20,9 @@ FAMILIES: dict[str, Basis] = {
     "double knot": Spline(4, (0.4, 0.4)),
     "broken line": Spline(2, (0.25, 0.5)),
     "no interior knot": Spline(3),
+    "periodic": Spline(4, (0.3, 0.5, 0.5), ends="periodic"),
 }
+CONSTRAINED: tuple[Ends, ...] = ("zero slope at start", "zero slope at end", "zero slopes", "periodic")
 families = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 ENDS = np.array([0.0, 1.0])
 T = np.linspace(0.0, 1.0, 41)
@@ -83,6 +89,56 @@ def test_impossible_splines_are_refused(order: int, knots: tuple[float, ...]) ->
         Spline(order, knots)
 
 
+@pytest.mark.parametrize("ends", CONSTRAINED)
+def test_splines_too_small_for_their_ends_are_refused(ends: Ends) -> None:
+    with pytest.raises(ValueError, match="broken lines"):
+        Spline(2, (0.5,), ends=ends)
+    if ends == "zero slopes":
+        with pytest.raises(ValueError, match="without knots"):
+            Spline(3, ends=ends)
+    if ends == "periodic":
+        with pytest.raises(ValueError, match="too close"):
+            Spline(3, (1e-5,), ends=ends)
+
+
+@st.composite
+def constrained(draw: st.DrawFn) -> Spline:
+    order, ends = draw(st.integers(3, 6)), draw(st.sampled_from(CONSTRAINED))
+    places = draw(st.lists(st.integers(1, 19), max_size=4, unique=True))
+    knots = [place / 20 for place in places for _ in range(draw(st.integers(1, order - 1)))]
+    if ends == "zero slopes" and order + len(knots) < 4:
+        knots = [0.5]
+    return Spline(order, tuple(sorted(knots)), draw(st.booleans()), ends)
+
+
+@given(constrained())
+def test_constrained_ends_hold_for_every_function_and_for_no_fewer(basis: Spline) -> None:
+    """The span is the null space of the conditions on all B-splines, found densely."""
+    order = basis.order
+    all_ = BSpline([0.0] * order + list(basis.knots) + [1.0] * order, np.eye(basis.count), order - 1)
+
+    def jump(k: int) -> np.ndarray:
+        return np.asarray(all_(1.0, nu=k) - all_(0.0, nu=k))
+
+    rows = [all_(0.0)] + [all_(1.0)] * basis.zero_at_one
+    if basis.ends == "periodic":
+        rows += [jump(k) for k in range(1, order - 1)]
+    else:
+        rows += [all_(0.0, nu=1)] * (basis.ends != "zero slope at end")
+        rows += [all_(1.0, nu=1)] * (basis.ends != "zero slope at start")
+    conditions = np.stack([row / np.abs(row).max() for row in rows])
+    quoted = basis.quoted()
+    ours = np.zeros((basis.count, basis.size))
+    ours[[int(name[1:].partition("(")[0]) - 1 for name in quoted.names]] = quoted.matrix
+    np.testing.assert_allclose(conditions @ ours, 0.0, atol=1e-12)
+    wanted = null_space(conditions)
+    assert basis.size == wanted.shape[1]
+    # Both bases are of full rank, and each lies in the span of the other.
+    assert basis.size == 0 or np.linalg.cond(ours) < 1e3
+    np.testing.assert_allclose(ours - wanted @ (wanted.T @ ours), 0.0, atol=1e-12)
+    np.testing.assert_allclose(basis.values(T), all_(T) @ ours, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("parts", "raised"),
     [
@@ -91,12 +147,14 @@ def test_impossible_splines_are_refused(order: int, knots: tuple[float, ...]) ->
         ((Spline(4, (0.5,)), Polynomial(3)), 0),
         ((Spline(4, (0.5,)), Spline(3, (0.25, 0.5))), 1),
         ((Spline(3), Polynomial(5)), 0),
+        ((Spline(4, (0.5, 0.5), ends="zero slopes"), Spline(3, (0.25,), ends="periodic")), 1),
+        ((Spline(4, (0.5, 0.5), ends="zero slope at start"),), 0),
     ],
 )
 def test_a_containing_family_contains(parts: tuple[Basis, ...], raised: int) -> None:
     whole = whole_values(spline_containing(parts, raised), T)
     for k, part in enumerate(parts):
-        values = whole_values(part, T)
+        values = np.column_stack([whole_values(part, T), part.values(T)])
         if k >= len(parts) - raised:
             values = values * T[:, None]
         left = values - whole @ np.linalg.lstsq(whole, values, rcond=None)[0]

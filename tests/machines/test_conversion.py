@@ -23,7 +23,12 @@ def places(count: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("name", sorted(ARRANGEMENTS))
 @pytest.mark.parametrize(
     ("position", "rotation"),
-    [(Polynomial(5), Polynomial(4)), (Spline(4, (0.5,)), Monomial(3)), (Spline(3, (0.3,)), Spline(3, (0.3, 0.6)))],
+    [
+        (Polynomial(5), Polynomial(4)),
+        (Spline(4, (0.5,)), Monomial(3)),
+        (Spline(3, (0.3,)), Spline(3, (0.3, 0.6))),
+        (Spline(4, (0.5, 0.5), ends="zero slopes"), Spline(4, (0.3,), ends="periodic")),
+    ],
 )
 def test_an_empirical_model_contains_every_kinematic_one(name: str, position: Basis, rotation: Basis) -> None:
     kinematic = kinematic_model_of(ARRANGEMENTS[name], position, rotation, LOWER, UPPER)

@@ -27,10 +27,10 @@ MODELS: dict[str, ErrorModel] = {
     },
     "few coefficients": kinematic_model(ARRANGEMENTS["MB2"], 2, 1, LOWER, UPPER),
     **{
-        f"kinematic of {type(basis).__name__} {'full' if full else 'linearised'}": kinematic_model_of(
+        f"kinematic of {type(basis).__name__}{getattr(basis, 'ends', '')} {'full' if full else 'linearised'}": kinematic_model_of(
             ARRANGEMENTS["MB2"], basis, Monomial(3), LOWER, UPPER, full
         )
-        for basis in (Monomial(4), Spline(4, (0.3, 0.5)))
+        for basis in (Monomial(4), Spline(4, (0.3, 0.5)), Spline(4, (0.5, 0.5), ends="zero slopes"))
         for full in (False, True)
     },
     **{
@@ -38,6 +38,7 @@ MODELS: dict[str, ErrorModel] = {
         for name, terms in {
             "sums of polynomials": sums(Polynomial(4)),
             "sums of splines": sums(Spline(4, (0.5,))),
+            "sums of periodic splines": sums(Spline(4, (0.3, 0.5), ends="periodic")),
             "quadratic": quadratic(),
             "tensor": tensor(Spline(3, (0.5,))),
             "radial": Radial((3, 3, 2), 0.5),

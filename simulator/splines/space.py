@@ -1,0 +1,121 @@
+"""Splines of one order over breakpoints, in B-splines: their values, their derivatives from either side, their pieces.
+
+The abscissa is scaled to [0, 1] inside, so that neither its unit nor its origin costs digits.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .problems import Problem, SplineError
+
+Array = NDArray[np.float64]
+Side = Literal["above", "below"]
+"""From which side a derivative is taken where it jumps."""
+
+
+@dataclass(frozen=True)
+class SplineSpace:
+    """Splines of an `order` (degree plus one) from `lower` to `upper` with interior `knots` in ascending order.
+
+    A knot that stands m times leaves order - 1 - m derivatives continuous, the value counted as one of none: twice for
+    cubic splines leaves value and slope. Abscissae are in metres or radians.
+
+    >>> SplineSpace(4, 0.0, 2.0, (0.5, 1.0, 1.0)).count
+    7
+    """
+
+    order: int
+    lower: float
+    upper: float
+    knots: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        found = []
+        if self.order < 2:
+            found.append(Problem("a spline's order is 2 (broken lines) at least"))
+        if not self.lower < self.upper:
+            found.append(Problem("the curve ends at {0}, not above its start at {1}", (self.upper, self.lower)))
+        outside = [knot for knot in self.knots if not self.lower < knot < self.upper]
+        for knot in dict.fromkeys(outside):
+            found.append(
+                Problem(
+                    "the knot at {0} is not between the ends, {1} and {2}; leave it out",
+                    (knot, self.lower, self.upper),
+                )
+            )
+        for knot, times in Counter(self.knots).items():
+            if times >= self.order:
+                found.append(
+                    Problem(f"the knot at {{0}} stands {times} times; give it {self.order - 1} times at most", (knot,))
+                )
+        if list(self.knots) != sorted(self.knots):
+            found.append(Problem("the knots are out of order; give them in ascending order"))
+        if found:
+            raise SplineError(found)
+
+    @property
+    def count(self) -> int:
+        """Number of B-splines."""
+        return self.order + len(self.knots)
+
+    @property
+    def length(self) -> float:
+        """From end to end."""
+        return self.upper - self.lower
+
+    @cached_property
+    def breaks(self) -> Array:
+        """Ends of the pieces (pieces + 1,), each once."""
+        return np.array([self.lower, *sorted(set(self.knots)), self.upper])
+
+    @cached_property
+    def _spline(self) -> object:
+        # SciPy takes longer to import than most experiments to check.
+        from scipy.interpolate import BSpline
+
+        inner = (np.asarray(self.knots) - self.lower) / self.length
+        knots = np.concatenate([np.zeros(self.order), inner, np.ones(self.order)])
+        return BSpline(knots, np.eye(self.count), self.order - 1)
+
+    @cached_property
+    def pieces(self) -> Array:
+        """Taylor coefficients (pieces, order, count) of each B-spline about the start of each piece, in x scaled."""
+        start = (self.breaks[:-1] - self.lower) / self.length
+        found = np.empty((len(start), self.order, self.count))
+        factorial = 1.0
+        for k in range(self.order):
+            factorial *= max(k, 1)
+            found[:, k] = self._spline(start, nu=k) / factorial  # type: ignore[operator]
+        return found
+
+    def rows(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
+        """The B-splines' values or derivatives at x (m,), as (m, count), per metre or radian to the power `derivative`.
+
+        :raises SplineError: an x beyond the ends, where there is no curve.
+        """
+        x = np.asarray(x, dtype=float)
+        outside = np.unique(x[~((x >= self.lower) & (x <= self.upper))])
+        if len(outside):
+            raise SplineError(
+                Problem(
+                    "{0} is outside the curve, from {1} to {2}; it is not extrapolated", (u, self.lower, self.upper)
+                )
+                for u in outside.tolist()
+            )
+        if derivative >= self.order:
+            return np.zeros((len(x), self.count))
+        piece = np.searchsorted(self.breaks, x, "right" if side == "above" else "left") - 1
+        piece = np.clip(piece, 0, len(self.breaks) - 2)
+        u = ((x - self.breaks[piece]) / self.length)[:, None]
+        found = np.zeros((len(x), self.count))
+        for k in range(self.order - 1, derivative - 1, -1):
+            factor = float(np.prod(np.arange(k - derivative + 1, k + 1)))
+            found = found * u + factor * self.pieces[piece, k]
+        return np.asarray(found / self.length**derivative)
