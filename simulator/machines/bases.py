@@ -1,10 +1,10 @@
 """Univariate functions on [0, 1]: Chebyshev polynomials, monomials and B-splines behind one protocol.
 
-Every family contains 1 and t, or a function in place of t; the rest are interior functions, which vanish at both ends. An
-error function that is zero at 0 takes what vanishes there, one that is zero at both ends the interior functions alone: end
-conditions are met by construction, and so are slopes of zero and periodic ends. A slope other than zero is no condition on
-a basis, whose functions are multiplied by any number; `simulator/splines` has fits with such. NPL Report CISE 15/98, section 2.1.1, has the families, section 2.6 why monomials will not do at
-high degrees.
+Every family contains 1 and t, or a function in place of t; the rest are interior functions, which vanish at both ends.
+An error function that is zero at 0 takes what vanishes there, one that is zero at both ends the interior functions
+alone: end conditions are met by construction, and so are slopes of zero and periodic ends. A slope other than zero is
+no condition on a basis, whose functions are multiplied by any number; `simulator/splines` has fits with such. NPL
+Report CISE 15/98, section 2.1.1, has the families, section 2.6 why monomials will not do at high degrees.
 """
 
 from __future__ import annotations
@@ -180,9 +180,9 @@ class Spline:
     leaves value and slope, as between tangent features. Beyond [0, 1] the polynomial of the last piece goes on.
 
     `ends` holds for every function. With free ends, the functions are t and the B-splines N_2 to N_last-1. A slope of
-    zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives way to the last B-splines. Periodic are the
-    derivatives 1 to order - 2, the same at both ends: such a function is t times some factor, a scale error or
-    squareness, and one that goes on from 1 as from 0.
+    zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives way to the last B-splines. Periodic ends
+    have the same derivatives 1 to order - 2: such a function is t times some factor, a scale error or squareness, and
+    one that goes on from 1 as from 0.
 
     >>> Spline(4, (0.5,)).size, Spline(4, (0.5,), zero_at_one=True).size
     (4, 3)

@@ -93,8 +93,8 @@ class SplineSettings(Settings):
     features: tuple[float, ...] = Field(
         default=(),
         max_length=30,
-        description="Boundaries of neighbouring features in ascending order, in fractions of the axis: there only value "
-        "and slope are continuous.",
+        description="Boundaries of neighbouring features in ascending order, in fractions of the axis: there only "
+        "value and slope are continuous.",
     )
     slopes: SlopesSettings | None = Field(
         default=None,

@@ -1,8 +1,8 @@
 """Least squares under constraints by orthogonal factorisation.
 
-The constraints C c = f are met by c = c0 + Z z, where C' P = Q R gives the particular solution c0 and the columns Z of Q
-that C does not see; then || W (A Z z - (y - A c0)) || is made small by a second factorisation. NISTIR 6517, equation (25),
-is the same solution by pseudo-inverses; Lawson and Hanson, Solving Least Squares Problems, chapter 20, has this one.
+The constraints C c = f are met by c = c0 + Z z, where C' P = Q R gives the particular solution c0 and the columns Z of
+Q that C does not see; then || W (A Z z - (y - A c0)) || is made small by a second factorisation. NISTIR 6517, equation
+(25), is the same solution by pseudo-inverses; Lawson and Hanson, Solving Least Squares Problems, chapter 20, has this.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .space import Array, Side, SplineSpace
 
 # Rows of length 1, and columns of functions of size 1: what is smaller is rounding.
 NOTHING = 1e-10
-# A point that determines a direction of the spline to less than this part of its largest value does not count.
+# Singular values of the points' rows below this part of the largest are rounding.
 UNDETERMINED = 1e-9
 
 
@@ -26,9 +26,9 @@ UNDETERMINED = 1e-9
 class SplineFit:
     """A fitted spline.
 
-    `coefficients` (count,) are those of the B-splines of `space`; sigma² `root` `root`' (count, free) is their covariance.
-    x, y (m,) are the points in ascending order of x as `order_of_points` has them, `uncertainties` (m,) those of y,
-    all 1 where none are stated: then `sigma` is a standard uncertainty, otherwise a factor.
+    `coefficients` (count,) are those of the B-splines of `space`; with `root` (count, free) their covariance is
+    sigma² root root'. x, y (m,) are the points, `uncertainties` (m,) those of y, all 1 where none are stated: then
+    `sigma` is a standard uncertainty, otherwise a factor. `redundant` are constraints that the others imply.
     """
 
     space: SplineSpace
@@ -100,8 +100,8 @@ def fit(
 
     Points count by the inverse squares of their `uncertainties` (m,), alike where there are none.
 
-    :raises SplineError: constraints that contradict one another, points that do not determine the curve, or places beyond
-        its ends; all that is found at once.
+    :raises SplineError: constraints that contradict one another, points that do not determine the curve, or places
+        beyond its ends; all of a kind at once.
     """
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     weights = np.ones(len(x)) if uncertainties is None else 1.0 / np.asarray(uncertainties, dtype=float)
@@ -143,7 +143,8 @@ def _contradiction(constraints: tuple[Constraint, ...], matrix: Array, kept: Arr
         return Problem(text, constraints[k].places)
     parts = np.linalg.lstsq(matrix[kept].T, matrix[k], rcond=None)[0]
     others = [constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING]
-    texts, places = [], []
+    texts: list[str] = []
+    places: list[float] = []
     for one in (constraints[k], *others):
         indices = [f"{{{len(places) + i}}}" for i in range(len(one.places))]
         texts.append(one.words.format(*indices))
@@ -172,10 +173,9 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
         inside = int(((x >= lower) & (x <= upper)).sum())
         within = open_ * (np.abs(space.pieces[first : last + 1]).max(axis=(0, 1)) > 0)[:, None]
         missing = np.linalg.matrix_rank(within, tol=1e-6)
-        text = (
-            f"between {{0}} and {{1}} the curve lacks {missing} point{'s' if missing > 1 else ''}: there are {inside}; "
-            "leave out knots there, add constraints or points"
-        )
+        lacks = f"{missing} point{'s' if missing > 1 else ''}"
+        where = f"between {{0}} and {{1}}, where it has {inside}"
+        text = f"the curve lacks {lacks} {where}; leave out knots or prescribe more"
         problems.append(Problem(text, (lower, upper)))
     raise SplineError(problems)
 

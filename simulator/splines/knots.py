@@ -12,7 +12,8 @@ from .space import Array
 def at_every(x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()) -> tuple[float, ...]:
     """Knots at every r-th of the points x between neighbouring boundaries, as NISTIR 6517, equation (5), has them.
 
-    A knot at the end of a feature would be none, and is left out. Points of the same x count as one.
+    A knot that no point of its feature lies beyond would have nothing to determine it, and is left out. Points of the
+    same x count as one.
 
     >>> at_every(np.arange(1.0, 9.0), 3, 1.0, 8.0)
     (3.0, 6.0)
@@ -22,7 +23,7 @@ def at_every(x: Array, r: int, lower: float, upper: float, boundaries: Sequence[
     ends = [lower, *boundaries, upper]
     for start, end in zip(ends, ends[1:], strict=False):
         inside = distinct[(distinct >= start) & (distinct <= end)]
-        found += [knot for knot in inside[r - 1 :: r].tolist() if start < knot < end]
+        found += [knot for knot in inside[r - 1 : -1 : r].tolist() if start < knot < end]
     return tuple(found)
 
 

@@ -27,10 +27,14 @@ MODELS: dict[str, ErrorModel] = {
     },
     "few coefficients": kinematic_model(ARRANGEMENTS["MB2"], 2, 1, LOWER, UPPER),
     **{
-        f"kinematic of {type(basis).__name__}{getattr(basis, 'ends', '')} {'full' if full else 'linearised'}": kinematic_model_of(
+        f"kinematic of {name} {'full' if full else 'linearised'}": kinematic_model_of(
             ARRANGEMENTS["MB2"], basis, Monomial(3), LOWER, UPPER, full
         )
-        for basis in (Monomial(4), Spline(4, (0.3, 0.5)), Spline(4, (0.5, 0.5), ends="zero slopes"))
+        for name, basis in {
+            "monomials": Monomial(4),
+            "splines": Spline(4, (0.3, 0.5)),
+            "splines of zero slopes": Spline(4, (0.5, 0.5), ends="zero slopes"),
+        }.items()
         for full in (False, True)
     },
     **{

@@ -1,0 +1,321 @@
+"""`ballplate spline`: a spline with prescribed values and slopes through measured errors."""
+
+from __future__ import annotations
+
+import re
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .common import count, print_json, print_lines
+
+if TYPE_CHECKING:
+    from simulator.splines.read import Column, Points
+
+    from ..curve import Curve, CurveSettings, Place
+
+WRONG_USAGE, BAD_FILE = 2, 3
+
+
+class OptionError(ValueError):
+    """An option's value cannot be used."""
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser: ArgumentParser = commands.add_parser(
+        "spline",
+        help="fit a spline with prescribed values and slopes to measured errors",
+        description="Fit a spline to errors along an axis or along the profile of a turned part, by least squares, "
+        "with values and slopes prescribed at its ends or elsewhere, and write it as polynomials for a controller. The "
+        "file has columns such as position_mm and error_um, or nominal_x_mm and nominal_z_mm for a profile, whose arc "
+        'length is then the abscissa; also point, feature and u_um. A PLACE is an abscissa such as "12.5 mm", start, '
+        'end, or nominal co-ordinates on the profile such as "37.084 mm, -37.084 mm".',
+    )
+    parser.add_argument("file", metavar="FILE", type=Path, help="measured points (CSV)")
+    data = parser.add_argument_group("points")
+    data.add_argument("--x", metavar="COLUMN", help="abscissa; default: arc_length if there is a profile, or the first")
+    data.add_argument("--y", metavar="COLUMN", help="error; default: the only other column")
+    data.add_argument("--points", metavar="NAMES", help="only these, such as 12-32 or 1,2,5-9; default: all")
+    data.add_argument(
+        "--uncertainty", metavar="LENGTH", help="standard uncertainty of each error, where no column u has it"
+    )
+    data.add_argument(
+        "--sigma",
+        choices=("given", "estimated"),
+        help="believe the stated uncertainties, or estimate a factor; default: given if there are any",
+    )
+    shape = parser.add_argument_group("curve")
+    knots = shape.add_mutually_exclusive_group()
+    knots.add_argument(
+        "--every", metavar="R", type=count, help="a knot at every R-th point of each feature; default: 5"
+    )
+    knots.add_argument("--knots", metavar="PLACES", help='knots such as "10 mm, 20 mm", or none')
+    shape.add_argument("--order", metavar="N", type=count, default=4, help="degree plus one; default: 4, cubic")
+    shape.add_argument("--start", metavar="PLACE", default="start", help="where the curve starts; default: first point")
+    shape.add_argument("--end", metavar="PLACE", default="end", help="where the curve ends; default: last point")
+    shape.add_argument(
+        "--boundary",
+        metavar="PLACE",
+        action="append",
+        default=[],
+        help="between features that share value and slope; may be repeated",
+    )
+    shape.add_argument(
+        "--straight",
+        metavar="K",
+        type=count,
+        action="append",
+        default=[],
+        help="the K-th feature is a straight line; may be repeated",
+    )
+    shape.add_argument(
+        "--periodic", metavar="PERIOD", nargs="?", const="360 deg", help="closed curve; PERIOD: 360 deg by default"
+    )
+    held = parser.add_argument_group("prescribed")
+    for end in ("start", "end"):
+        held.add_argument(f"--{end}-value", metavar="VALUE", help=f'error at the {end}, such as "3 um"')
+        held.add_argument(f"--{end}-slope", metavar="SLOPE", help=f'slope at the {end}, such as 0 or "2 um/mm"')
+    held.add_argument(
+        "--at",
+        nargs=3,
+        metavar=("PLACE", "value|slope", "VALUE"),
+        action="append",
+        default=[],
+        help='for example --at "30 mm" slope 0; may be repeated',
+    )
+    output = parser.add_argument_group("output")
+    output.add_argument("--evaluate", metavar="PLACES", help='values there too, such as "10 mm, 12.5 mm"')
+    output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
+    output.add_argument(
+        "--coefficients", metavar="FILE", type=Path, help="write the polynomials as CSV; - for the screen"
+    )
+    output.add_argument("--plot", metavar="FILE", type=Path, help="draw points and curve (.svg, .png or .pdf)")
+    output.add_argument(
+        "--whiskers", metavar="FILE", type=Path, help="draw errors as bars normal to the profile (.svg, .png or .pdf)"
+    )
+    output.add_argument("--magnification", metavar="N", type=float, help="of the bars; default: one that suits")
+    output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
+    parser.set_defaults(run=run)
+
+
+POWERS = "polynomials in the distance from the start of each piece (default), or in the abscissa itself"
+
+
+def run(options: Namespace) -> int:
+    """Fit, print and draw."""
+    from simulator.experiment.messages import ExperimentError, Message, in_one_line
+    from simulator.splines.problems import SplineError
+    from simulator.splines.read import choose_points, read_points
+
+    from ..curve import fit_curve
+    from ..curve_tables import coefficients_csv, curve_data, curve_lines, shown
+
+    everything = read_points(options.file, options.x, options.y)
+    points = everything
+    if options.points is not None:
+        points = everything.chosen(choose_points(everything, options.points, str(options.file)))
+    try:
+        settings = _settings(options, points)
+        uncertainty = None if options.uncertainty is None else _positive(options.uncertainty, points.y_column)
+        at = _list("--evaluate", options.evaluate, points.x_column) if options.evaluate else []
+        _check(options, points)
+    except OptionError as error:
+        print(in_one_line(f"ballplate spline: {error}"), file=sys.stderr)
+        return WRONG_USAGE
+    try:
+        curve = fit_curve(points, settings, uncertainty, options.sigma)
+        import numpy as np
+
+        where = np.array(at, dtype=float)
+        curve.fit.values(where)
+        lines = [] if options.json else curve_lines(curve, options.file.name, options.powers, where)
+    except SplineError as error:
+        texts = [problem.told(lambda place: shown(place, points.x_column)) for problem in error.problems]
+        raise ExperimentError(Message(str(options.file), 0, 0, "", text) for text in texts) from None
+    status = _draw(options, curve, everything)
+    if status:
+        return status
+    if options.coefficients is not None and str(options.coefficients) != "-":
+        try:
+            options.coefficients.write_text(coefficients_csv(curve, options.powers), encoding="utf-8")
+        except OSError as error:
+            return _unwritten(options.coefficients, error)
+    if options.json:
+        print_json([curve_data(curve, str(options.file), options.powers, where)])
+    elif str(options.coefficients) == "-":
+        sys.stdout.write(coefficients_csv(curve, options.powers))
+    else:
+        print_lines(lines)
+    return 0
+
+
+def _draw(options: Namespace, curve: Curve, everything: Points) -> int:
+    if options.plot is None and options.whiskers is None:
+        return 0
+    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.splines.problems import SplineError
+
+    from ..curve_tables import shown
+
+    path = None
+    try:
+        from ..report.curves import plot, whiskers
+
+        if options.plot is not None:
+            path = options.plot
+            plot(curve, path)
+        if options.whiskers is not None:
+            path = options.whiskers
+            whiskers(curve, everything, path, options.magnification)
+    except SplineError as error:
+        texts = [problem.told(lambda place: shown(place, everything.x_column)) for problem in error.problems]
+        raise ExperimentError(Message(str(options.file), 0, 0, "", text) for text in texts) from None
+    except ImportError as error:
+        if error.name is None or error.name.partition(".")[0] != "matplotlib":
+            raise
+        told = "drawings need matplotlib; install it with: python -m pip install 'ballplate[report]'"
+        print(f"ballplate spline: {told}", file=sys.stderr)
+        return BAD_FILE
+    except OSError as error:
+        return _unwritten(path, error)
+    return 0
+
+
+def _unwritten(path: Path | None, error: OSError) -> int:
+    print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+    return BAD_FILE
+
+
+def _check(options: Namespace, points: Points) -> None:
+    """Refuse options that do not go together.
+
+    :raises OptionError: there are such.
+    """
+    from ..report.svg import PICTURES
+
+    for name in ("plot", "whiskers"):
+        path = getattr(options, name)
+        if path is not None and path.suffix.lower() not in PICTURES:
+            raise OptionError(f"--{name} {path} should end in one of {', '.join(PICTURES)}")
+    outputs = [path for path in (options.plot, options.whiskers, options.coefficients) if path is not None]
+    resolved = [path.resolve() for path in outputs if str(path) != "-"]
+    if options.file.resolve() in resolved or len(set(resolved)) < len(resolved):
+        raise OptionError("two of the files are the same; name another")
+    if options.whiskers is not None and points.places is None:
+        raise OptionError("--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file")
+    if options.whiskers is not None and points.y_column.kind != "length":
+        raise OptionError(f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle")
+    if options.magnification is not None and not 0 < options.magnification < float("inf"):
+        raise OptionError("--magnification should be above 0, such as 200")
+    if options.json and str(options.coefficients) == "-":
+        raise OptionError("--json and --coefficients - both go to the screen; name a file for one")
+
+
+def _settings(options: Namespace, points: Points) -> CurveSettings:
+    """What the options ask for.
+
+    :raises OptionError: a value that is no length, angle or slope.
+    """
+    from ..curve import EVERY, CurveSettings, Hold
+
+    x, y = points.x_column, points.y_column
+    holds = []
+    for end in ("start", "end"):
+        for derivative, what in enumerate(("value", "slope")):
+            text = getattr(options, f"{end}_{what}")
+            if text is not None:
+                holds.append(Hold(end, derivative, _value(f"--{end}-{what}", text, derivative, x, y)))
+    for place, what, text in options.at:
+        if what not in ("value", "slope"):
+            raise OptionError(f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0')
+        derivative = ("value", "slope").index(what)
+        holds.append(Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y)))
+    knots = None
+    if options.knots is not None:
+        knots = () if options.knots.strip() == "none" else tuple(sorted(_list("--knots", options.knots, x)))
+        if len(knots) > MOST_KNOTS:
+            raise OptionError(f"--knots: {len(knots)} are too many; at most {MOST_KNOTS} are possible")
+    if not 2 <= options.order <= 12:
+        raise OptionError("--order should be 2 to 12; 4 is a cubic spline")
+    period = None
+    if options.periodic is not None:
+        if options.periodic == "360 deg" and x.kind == "length":
+            raise OptionError('--periodic: the abscissa is a length; state the period, as in --periodic "10 mm"')
+        period = _positive(options.periodic, x, "--periodic")
+    return CurveSettings(
+        order=options.order,
+        every=options.every or EVERY,
+        knots=knots,
+        start=_place("--start", options.start, x),
+        end=_place("--end", options.end, x),
+        boundaries=tuple(_place("--boundary", text, x) for text in options.boundary),
+        straight=tuple(options.straight),
+        holds=tuple(holds),
+        period=period,
+    )
+
+
+MOST_KNOTS = 1000
+
+
+def _parser(kind: str) -> Callable[[object], float]:
+    from simulator.quantities import parse_angle, parse_length
+
+    return parse_length if kind == "length" else parse_angle
+
+
+def _quantity(option: str, text: str, kind: str) -> float:
+    from simulator.quantities import QuantityError
+
+    if text.strip() in ("0", "-0", "0.0"):
+        return 0.0
+    try:
+        return _parser(kind)(text)
+    except QuantityError as error:
+        raise OptionError(f"{option}: {error}") from None
+
+
+def _positive(text: str, column: Column, option: str = "--uncertainty") -> float:
+    found = _quantity(option, text, column.kind)
+    if found <= 0:
+        raise OptionError(f'{option}: "{text}" must be above zero')
+    return found
+
+
+def _list(option: str, text: str, column: Column) -> list[float]:
+    return [_quantity(option, part, column.kind) for part in text.split(",")]
+
+
+def _place(option: str, text: str, column: Column) -> Place:
+    plain = text.strip()
+    if plain in ("start", "end"):
+        return "start" if plain == "start" else "end"
+    parts = plain.split(",")
+    if len(parts) > 2 or len(parts) == 2 and column.kind != "length":
+        raise OptionError(f'{option}: "{text}" should be one abscissa, or two nominal co-ordinates on a profile')
+    if len(parts) == 2:
+        return _quantity(option, parts[0], "length"), _quantity(option, parts[1], "length")
+    return _quantity(option, plain, column.kind)
+
+
+def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> float:
+    """A value of the error, or a slope as a unit of the error over one of the abscissa."""
+    from simulator.quantities import UNITS, QuantityError, metres_or_radians, parse_ratio
+
+    if derivative == 0:
+        return _quantity(option, text, y.kind)
+    plain = text.strip().replace("µ", "u").replace("μ", "u")
+    if plain in ("0", "-0", "0.0"):
+        return 0.0
+    found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
+    units: Any = UNITS
+    try:
+        if found and found[2] in units[y.kind] and found[3] in units[x.kind]:
+            return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
+        if x.kind == y.kind == "length" and not found:
+            return parse_ratio(plain)
+    except QuantityError as error:
+        raise OptionError(f"{option}: {error}") from None
+    raise OptionError(f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0')

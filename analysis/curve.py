@@ -1,0 +1,225 @@
+"""An error curve through measured points: a spline with what is prescribed for it, and how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from simulator.geometry.profile import NotOnProfileError, Profile, along
+from simulator.splines.constraints import Constraint, periodic, prescribed, straight
+from simulator.splines.fit import SplineFit, fit
+from simulator.splines.knots import at_every, with_boundaries
+from simulator.splines.problems import Problem, SplineError
+from simulator.splines.read import ARC_LENGTH, Points
+from simulator.splines.space import Array, SplineSpace
+
+Place = float | tuple[float, float] | Literal["start", "end"]
+"""An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""
+
+EVERY = 5
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A prescribed value (derivative 0) or slope (1) at a place, in metres or radians."""
+
+    at: Place
+    derivative: int
+    value: float
+
+
+@dataclass(frozen=True)
+class CurveSettings:
+    """What curve is wanted. Lengths and angles are in metres and radians.
+
+    Knots are at every `every`-th point of each feature, or where `knots` says. At `boundaries` only value and slope are
+    continuous; `straight` are the features, counted from 1, that are straight lines. `period` closes the curve.
+    """
+
+    order: int = 4
+    every: int = EVERY
+    knots: tuple[float, ...] | None = None
+    start: Place = "start"
+    end: Place = "end"
+    boundaries: tuple[Place, ...] = ()
+    straight: tuple[int, ...] = ()
+    holds: tuple[Hold, ...] = ()
+    period: float | None = None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A fitted curve. `fit` has the points in ascending order of x, which `points` (names and columns) follows.
+
+    `sigma` is the standard uncertainty of a point, or the factor of the stated ones: `sigma_is_estimated` from the
+    residuals, and then not a number without degrees of freedom, or 1.
+    """
+
+    points: Points
+    settings: CurveSettings
+    fit: SplineFit
+    boundaries: tuple[float, ...]
+    holds: tuple[Constraint, ...]
+    sigma: float
+    sigma_is_estimated: bool
+    has_uncertainties: bool
+    profile_boundaries: Array = field(repr=False)
+
+    @property
+    def coverage_factor(self) -> float:
+        """Of the expanded uncertainty for 95 %: Student's where sigma is estimated, otherwise normal."""
+        from scipy.special import ndtri, stdtrit
+
+        if self.sigma_is_estimated:
+            return float(stdtrit(self.fit.degrees_of_freedom, 0.975)) if self.fit.degrees_of_freedom else float("nan")
+        return float(ndtri(0.975))
+
+    def standard_uncertainty(self, x: Array, derivative: int = 0) -> Array:
+        """Of the curve or a derivative at x (m,), from the points' scatter alone.
+
+        :raises SplineError: an x beyond the ends.
+        """
+        return np.asarray(self.sigma * self.fit.spread(x, derivative))
+
+
+def fit_curve(
+    points: Points, settings: CurveSettings, uncertainty: float | None = None, sigma: str | None = None
+) -> Curve:
+    """Fit the curve. `uncertainty` is that of each point where the points state none; `sigma` is given or estimated.
+
+    :raises SplineError: it cannot be fitted; all reasons found.
+    """
+    x, ends, boundaries, holds, on_profile = _located(points, settings)
+    lower, upper = ends
+    order = np.argsort(x, kind="stable")
+    x, points = x[order], points.chosen(order.tolist())
+    boundaries = tuple(sorted(set(boundaries)))
+    knots = settings.knots
+    problems = [
+        Problem(f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of the curve")
+        for k in settings.straight
+        if not 1 <= k <= len(boundaries) + 1
+    ]
+    problems += [
+        Problem("the boundary at {0} is not between the ends of the curve, {1} and {2}", (place, lower, upper))
+        for place in boundaries
+        if not lower < place < upper
+    ]
+    problems += [
+        Problem("{0} is a boundary and a knot; leave it out of the knots", (knot,))
+        for knot in knots or ()
+        if knot in boundaries
+    ]
+    if settings.order < 3 and boundaries:
+        problems.append(Problem("broken lines share no slope at boundaries; give an order of 3 or more"))
+    if problems:
+        raise SplineError(problems)
+    features = list(pairwise((lower, *boundaries, upper)))
+    lines = [features[k - 1] for k in sorted(set(settings.straight))]
+    if knots is None:
+        found = at_every(x, settings.every, lower, upper, boundaries)
+        knots = tuple(knot for knot in found if not any(start <= knot <= end for start, end in lines))
+    space = SplineSpace(settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order))
+    constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
+    for start, end in lines:
+        constraints += straight(space, start, end)
+    stated = points.uncertainties
+    if stated is None and uncertainty is not None:
+        stated = np.full(len(x), uncertainty)
+    fitted = fit(space, x, points.y, stated, constraints)
+    is_estimated = (sigma or ("estimated" if stated is None else "given")) == "estimated"
+    factor = fitted.sigma if is_estimated else 1.0
+    return Curve(points, settings, fitted, boundaries, holds, factor, is_estimated, stated is not None, on_profile)
+
+
+def whole_profile(points: Points, boundaries: Array) -> tuple[Profile, Array]:
+    """The profile of all points of a file with boundaries (n, 2) on it, and the points' indices in it.
+
+    :raises SplineError: the points do not make a profile.
+    """
+    assert points.places is not None
+    between = [place for place in boundaries if not (points.places == place).all(axis=1).any()]
+    profile, own, _ = along(points.places, points.features, np.array(between).reshape(-1, 2))
+    _refuse_coincident(profile)
+    return profile, own
+
+
+def _located(
+    points: Points, settings: CurveSettings
+) -> tuple[Array, tuple[float, float], tuple[float, ...], tuple[Constraint, ...], Array]:
+    """Abscissae of points, ends, boundaries and prescribed values, and the places among them on the profile (n, 2)."""
+    wanted = [*settings.boundaries, *(hold.at for hold in settings.holds)]
+    nominal = list(dict.fromkeys(place for place in wanted if isinstance(place, tuple)))
+    ends = [settings.start, settings.end]
+    where: dict[Place, float] = {}
+    if points.x is not None:
+        if nominal or any(isinstance(end, tuple) for end in ends):
+            text = f"nominal co-ordinates tell a place on the profile, but the abscissa is {points.x_column.words}"
+            raise SplineError([Problem(f"{text}; give one value, or choose --x {ARC_LENGTH}")])
+        x = points.x
+    else:
+        x, where = _on_profile(points, settings, nominal)
+    lower = float(x.min()) if settings.start == "start" else _abscissa(settings.start, where)
+    upper = float(x.max()) if settings.end == "end" else _abscissa(settings.end, where)
+    if settings.period is not None:
+        if settings.end != "end":
+            raise SplineError([Problem("a periodic curve ends one period after its start; leave the end out")])
+        if settings.start == "start" and points.x_column.kind == "angle":
+            lower = 0.0
+        upper = lower + settings.period
+        x = lower + np.mod(x - lower, settings.period)
+    where |= {"start": lower, "end": upper}
+    # The slope at the upper end is that of the last piece, so that either side will do.
+    holds = tuple(prescribed(_abscissa(hold.at, where), hold.derivative, hold.value) for hold in settings.holds)
+    boundaries = tuple(_abscissa(place, where) for place in settings.boundaries)
+    on_profile = np.array([place for place in settings.boundaries if isinstance(place, tuple)]).reshape(-1, 2)
+    return x, (lower, upper), boundaries, holds, on_profile
+
+
+def _abscissa(place: Place, where: dict[Place, float]) -> float:
+    return where[place] if isinstance(place, tuple | str) else place
+
+
+def _on_profile(
+    points: Points, settings: CurveSettings, nominal: Sequence[tuple[float, float]]
+) -> tuple[Array, dict[Place, float]]:
+    """Arc lengths of the points and of places by their nominal co-ordinates."""
+    assert points.places is not None
+    start, end = (
+        None if isinstance(place, float | str) or (points.places == place).all(axis=1).any() else np.array(place)
+        for place in (settings.start, settings.end)
+    )
+    between = [place for place in nominal if not (points.places == place).all(axis=1).any()]
+    try:
+        profile, own, at = along(points.places, points.features, np.array(between).reshape(-1, 2), start, end)
+    except NotOnProfileError as error:
+        wrong = between[error.args[0]]
+        text = "the place ({0}, {1}) is not on the profile between two points; correct it, or give the arc length"
+        raise SplineError([Problem(text, wrong)]) from None
+    _refuse_coincident(profile)
+    lengths = profile.lengths
+    where: dict[Place, float] = {}
+    for place in (*nominal, settings.start, settings.end):
+        if isinstance(place, tuple):
+            where[place] = float(lengths[(profile.places == place).all(axis=1)][0])
+    return lengths[own], where
+
+
+def _refuse_coincident(profile: Profile) -> None:
+    """Refuse neighbouring places that are the same, between which nothing has a direction.
+
+    :raises SplineError: there are such.
+    """
+    same = list(_coincident(profile.places))
+    if same:
+        raise SplineError(same)
+
+
+def _coincident(places: Array) -> Iterator[Problem]:
+    for one, two in pairwise(places.tolist()):
+        if one == two:
+            yield Problem("two neighbouring points stand at ({0}, {1}); leave one of them out", tuple(one))
