@@ -129,9 +129,13 @@ def _piece_lines(curve: Curve, powers: Powers) -> list[str]:
             "0" if abs(value) * length < size else f"{value:.7g}" for value, length in zip(row, lengths, strict=True)
         ]
         rows.append([f"{start / x.factor:.6g}", f"{end / x.factor:.6g}", *told])
+    note = []
+    if powers == "global":
+        note = [f"terms are up to {found.cancellation():.2g} times the curve, and rounding as much larger"]
     return [
         f"polynomials of u, the {_variable(curve, powers)}, in {x.unit}; their coefficients of",
         *aligned(rows, [True] * len(head)),
+        *note,
     ]
 
 
