@@ -6,6 +6,7 @@ import re
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -311,11 +312,9 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
         return 0.0
     found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
     units: Any = UNITS
-    try:
+    with suppress(QuantityError):
         if found and found[2] in units[y.kind] and found[3] in units[x.kind]:
             return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
-        if x.kind == y.kind == "length" and not found:
+        if x.kind == y.kind == "length":
             return parse_ratio(plain)
-    except QuantityError as error:
-        raise OptionError(f"{option}: {error}") from None
     raise OptionError(f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0')

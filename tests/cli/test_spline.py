@@ -1,0 +1,221 @@
+"""`ballplate spline` as a user meets it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+
+PART = "designs/gilsinn/table-1.csv"
+DOME = (PART, "--y", "semi_finish_error", "--points", "12-32")
+TANGENT = "37.084 mm, -37.084 mm"
+
+
+def run(*arguments: str | Path) -> int:
+    return main(["spline", *map(str, arguments)])
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Path:
+    """Roundness at 24 angles."""
+    angles = np.arange(0, 360, 15)
+    errors = 3 * np.cos(np.radians(angles - 20)) + np.cos(np.radians(3 * angles))
+    path = tmp_path / "ring.csv"
+    rows = "".join(f"{angle},{error}\n" for angle, error in zip(angles, errors, strict=True))
+    path.write_text(f"angle_deg,error_um\n{rows}", encoding="utf-8")
+    return path
+
+
+def test_text(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(*DOME, "--start-slope", "0", "--evaluate", "0 mm, 20 mm") == 0
+    out, err = capsys.readouterr()
+    assert err == "" and max(map(len, out.splitlines())) <= 120
+    assert "table-1.csv: semi finish error against arc length, 21 points" in out
+    assert "prescribed: slope 0 at 0 mm" in out
+    assert "cubic spline, 4 knots" in out and "7 free coefficients, 14 degrees of freedom" in out
+    assert out.splitlines()[-2].split()[:2] == ["0", "12.17"]
+    assert out.splitlines()[-2].endswith("0 um/mm")
+
+
+def test_json_is_in_metres_and_its_pieces_give_its_points(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(*DOME, "--start-slope", "0", "--end-value", "-30 um", "--end", "0 mm, 0 mm", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["free_coefficients"], found["degrees_of_freedom"], found["order"]) == (6, 15, 4)
+    for held in found["prescribed"]:
+        assert abs(held["missed_by"]) < 1e-18
+    for point in found["points"]:
+        piece = [one for one in found["pieces"] if one["start"] <= point["x"]][-1]
+        u = point["x"] - piece["start"]
+        assert sum(c * u**k for k, c in enumerate(piece["coefficients"])) == pytest.approx(point["curve"], abs=1e-17)
+        assert point["residual"] == point["y"] - point["curve"] or abs(point["residual"]) < 1e-4
+    assert [found["points"][0]["point"], found["points"][-1]["point"]] == ["12", "32"]
+    squares = sum(point["residual"] ** 2 for point in found["points"])
+    assert found["sigma"] == pytest.approx(math.sqrt(squares / 15)) and found["sigma_is_estimated"]
+
+
+def test_features_share_value_and_slope(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = (*DOME, "--boundary", TANGENT, "--straight", "1", "--json", "--evaluate", "1.27 mm")
+    assert run(*arguments) == 0
+    free = json.loads(capsys.readouterr().out)
+    assert free["boundaries"] == pytest.approx([0.00127], rel=1e-12)
+    first, second = free["pieces"][:2]
+    length = first["end"] - first["start"]
+    assert first["coefficients"][0] + first["coefficients"][1] * length == pytest.approx(second["coefficients"][0])
+    assert first["coefficients"][1] == pytest.approx(second["coefficients"][1], rel=1e-9)
+    assert max(abs(c) * length**k for k, c in enumerate(first["coefficients"]) if k > 1) < 1e-18
+    assert run(*arguments, "--at", TANGENT, "slope", "0") == 0
+    held = json.loads(capsys.readouterr().out)
+    assert abs(held["values"][0]["slope"]) < 1e-15
+    assert held["free_coefficients"] == free["free_coefficients"] - 1
+    assert held["sum_of_squares"] > free["sum_of_squares"]
+
+
+def test_uncertainties_given_and_estimated(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    rows = "".join(f"{k},{k % 3},{0.5 + 0.1 * k}\n" for k in range(12))
+    (tmp_path / "data.csv").write_text(f"position_mm,error_um,u_um\n{rows}", encoding="utf-8")
+    found = []
+    for sigma in ("given", "estimated"):
+        assert run(tmp_path / "data.csv", "--sigma", sigma, "--json") == 0
+        found.append(json.loads(capsys.readouterr().out))
+    given, estimated = found
+    assert given["sigma"] == 1.0 and given["coverage_factor"] == pytest.approx(1.959964)
+    factor = math.sqrt(given["sum_of_squares"] / given["degrees_of_freedom"])
+    assert estimated["sigma"] == pytest.approx(factor) and estimated["coverage_factor"] > 2.3
+    ratio = estimated["points"][3]["standard_uncertainty"] / given["points"][3]["standard_uncertainty"]
+    assert ratio == pytest.approx(factor)
+    assert run(tmp_path / "data.csv") == 0
+    assert "sigma 1.000, given (" in capsys.readouterr().out
+
+
+def test_nothing_is_told_of_uncertainty_without_degrees_of_freedom(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "data.csv").write_text("position_mm,error_um\n0,0\n1,2\n2,1\n4,0\n", encoding="utf-8")
+    assert run(tmp_path / "data.csv", "--plot", tmp_path / "plot.svg") == 0
+    assert "no degrees of freedom are left to estimate sigma from" in capsys.readouterr().out
+    assert run(tmp_path / "data.csv", "--json", "--evaluate", "1 mm") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["sigma"] is None and found["values"][0]["standard_uncertainty"] is None
+    assert run(tmp_path / "data.csv", "--uncertainty", "0.5 um") == 0
+    assert "sigma 1.000, given\n" in capsys.readouterr().out
+
+
+def test_a_closed_curve(capsys: pytest.CaptureFixture[str], ring: Path) -> None:
+    assert run(ring, "--periodic", "--every", "2", "--json", "--evaluate", "0 deg, 360 deg") == 0
+    found = json.loads(capsys.readouterr().out)
+    start, end = found["values"]
+    assert end["x"] == pytest.approx(2 * math.pi)
+    assert start["curve"] == pytest.approx(end["curve"], abs=1e-18)
+    assert start["slope"] == pytest.approx(end["slope"], abs=1e-18)
+    assert found["sigma"] < 1e-7
+
+
+@pytest.mark.parametrize("powers", ["local", "global"])
+def test_coefficients_for_a_controller(capsys: pytest.CaptureFixture[str], tmp_path: Path, powers: str) -> None:
+    """The file evaluates to the curve, in the units of its columns' names."""
+    arguments = (*DOME, "--start-slope", "0", "--powers", powers)
+    assert run(*arguments, "--coefficients", "-") == 0
+    text = capsys.readouterr().out
+    assert run(*arguments, "--coefficients", tmp_path / "c.csv", "--json") == 0
+    assert (tmp_path / "c.csv").read_text(encoding="utf-8") == text
+    points = json.loads(capsys.readouterr().out)["points"]
+    rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+    assert list(rows[0]) == ["start_mm", "end_mm", "c0_um", "c1_um_per_mm", "c2_um_per_mm2", "c3_um_per_mm3"]
+    for point in points:
+        x = point["x"] * 1e3
+        row = [row for row in rows if float(row["start_mm"]) <= x + 1e-9][-1]
+        u = x - float(row["start_mm"]) if powers == "local" else x
+        value = sum(float(row[name]) * u**k for k, name in enumerate(list(row)[2:]))
+        assert value == pytest.approx(point["curve"] * 1e6, abs=1e-9)
+
+
+def test_drawings(tmp_path: Path) -> None:
+    for first in (True, False):
+        folder = tmp_path / str(first)
+        folder.mkdir()
+        plot, bars = folder / "fit.svg", folder / "whiskers.svg"
+        assert run(*DOME, "--start-slope", "0", "--plot", plot, "--whiskers", bars, "--magnification", "300") == 0
+        assert (
+            plot.read_bytes().startswith(b"<?xml")
+            and b"<title>semi finish error against arc length" in plot.read_bytes()
+        )
+        assert b"32 points, magnified 300 times; the largest is 94.17 um" in bars.read_bytes()
+    assert (tmp_path / "True/fit.svg").read_bytes() == (tmp_path / "False/fit.svg").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--knots", "10, 20 mm"), '--knots: "10" has no unit; write for example "10 mm"'),
+        (("--start-slope", "3 um"), '--start-slope: "3 um" is not a slope; write for example "2 um/mm", or 0'),
+        (("--start-slope", "3 um/s"), '"3 um/s" is not a slope; write for example "2 um/mm", or 0'),
+        (("--start-value", "1 urad"), "--start-value:"),
+        (("--at", "3 mm", "bend", "0"), '--at: "bend" should be value or slope'),
+        (("--order", "1"), "--order should be 2 to 12"),
+        (("--periodic",), "--periodic: the abscissa is a length; state the period"),
+        (("--periodic", "-1 mm"), "must be above zero"),
+        (("--boundary", "1 mm, 2 mm, 3 mm"), "should be one abscissa, or two nominal co-ordinates"),
+        (("--uncertainty", "0 um"), "must be above zero"),
+        (("--plot", "a.gif"), "--plot a.gif should end in one of .svg, .png, .pdf"),
+        (("--plot", "a.svg", "--whiskers", "a.svg"), "two of the files are the same"),
+        (("--magnification", "nan"), "--magnification should be above 0"),
+        (("--json", "--coefficients", "-"), "both go to the screen"),
+        (("--evaluate", "x mm"), '--evaluate: "x mm" is not a length'),
+    ],
+)
+def test_wrong_usage(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], text: str) -> None:
+    assert run(*DOME, *arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("ballplate spline: ") and text in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "texts"),
+    [
+        (
+            ("--evaluate", "60 mm, -1 mm"),
+            ["-1 mm is outside the curve", "60 mm is outside the curve, from 0 mm to 56.9"],
+        ),
+        (("--knots", "70 mm"), ["the knot at 70 mm is not between the ends, 0 mm and 56.9"]),
+        (("--knots", "5.1 mm, 5.2 mm, 5.3 mm, 5.4 mm, 5.5 mm, 5.6 mm, 6 mm"), ["the curve lacks", "leave out knots"]),
+        (("--start-slope", "0", "--at", "start", "slope", "1 um/mm"), ["contradicts the slope at 0 mm"]),
+        (("--boundary", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
+        (
+            ("--boundary", "90 mm", "--straight", "3"),
+            ["there is no feature 3; there are 2", "the boundary at 90 mm is not"],
+        ),
+        (("--boundary", "9 mm", "--knots", "9 mm"), ["9 mm is a boundary and a knot"]),
+        (("--order", "2", "--boundary", "9 mm"), ["broken lines share no slope"]),
+        (("--x", "nominal_z", "--start", TANGENT), ["nominal co-ordinates tell a place on the profile"]),
+        (("--points", "12-32,44"), ['no point "44"']),
+        (("--points", "12"), ["the curve ends at 0 mm, not above its start"]),
+    ],
+)
+def test_what_cannot_be_fitted(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], texts: list[str]
+) -> None:
+    assert run(*DOME, *arguments) == 3
+    out, err = capsys.readouterr()
+    assert out == "" and all(text in err for text in texts)
+    assert all(line.startswith(f"{PART}: ") for line in err.splitlines())
+
+
+def test_whiskers_need_a_profile(capsys: pytest.CaptureFixture[str], ring: Path, tmp_path: Path) -> None:
+    assert run(ring, "--whiskers", tmp_path / "a.svg") == 2
+    assert "--whiskers needs a profile" in capsys.readouterr().err
+    assert run(*DOME, "--plot", tmp_path / "missing" / "a.svg") == 3
+    assert "a.svg: cannot be written (No such file or directory)" in capsys.readouterr().err
+
+
+def test_help(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as leave:
+        run("--help")
+    assert leave.value.code == 0
+    out = capsys.readouterr().out
+    assert "--start-slope SLOPE" in out and "--whiskers FILE" in out

@@ -1,0 +1,93 @@
+"""Files of measured points: what is read, and what is said of those with mistakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simulator.experiment.messages import ExperimentError
+from simulator.splines.read import Column, choose_points, read_points
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return Path("data.csv")
+
+
+def told(path: Path, text: str, x: str | None = None, y: str | None = None) -> list[str]:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ExperimentError) as error:
+        read_points(path, x, y)
+    return [str(message) for message in error.value.messages]
+
+
+def test_an_abscissa_and_an_error(write: Path) -> None:
+    write.write_text("# laser\nposition_mm,EXX_um,note\n0,0,start\n 250,0.8,\n", encoding="utf-8")
+    points = read_points(write)
+    assert points.x is not None and points.x.tolist() == [0.0, 0.25] and points.y.tolist() == [0.0, 8e-7]
+    assert points.names == ("1", "2") and points.places is None and points.uncertainties is None
+    assert points.x_column == Column("position", "mm", 1e-3, "length") and points.y_column.words == "EXX"
+
+
+def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
+    write.write_text("point,x_mm,z_in,first_um,second_um,u_nm\na,1,1,2,3,50\nb,2,1,2,4,60\n", encoding="utf-8")
+    points = read_points(write, y="second_um")
+    assert points.x is None and points.x_column == Column("arc_length", "mm", 1e-3, "length")
+    assert points.places is not None and points.places.tolist() == [[0.001, 0.0254], [0.002, 0.0254]]
+    np.testing.assert_allclose(points.uncertainties, [5e-8, 6e-8])
+    assert points.names == ("a", "b") and points.y.tolist() == [3e-6, 4e-6]
+    along_z = read_points(write, x="z", y="first")
+    assert along_z.x is not None and along_z.x.tolist() == [0.0254, 0.0254]
+    assert told(write, write.read_text(encoding="utf-8")) == [
+        "data.csv:1:1: several columns may be the error: first, second; choose one with --y"
+    ]
+
+
+def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
+    text = "point,position_mm,error_um,u_um\n1,0,1,0.1\n1,1,x,0.1\n3,2,,0.1\n4,3\n5,4,1,0\n6,5,2,1e30\n"
+    assert told(write, text) == [
+        'data.csv:3:5: "x" is not a number; write for example "500.0003"',
+        'data.csv:3:1: a second point "1", as in line 2; rename one',
+        "data.csv:4:5: no error; write a number, or remove the line",
+        "data.csv:5:1: 2 columns instead of 4; separate them by commas",
+        'data.csv:6:7: "0" is no standard uncertainty; give one above zero',
+        'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "x", "y", "message"),
+    [
+        ("", None, None, "data.csv: the file is empty; its first line should be position_mm,error_um"),
+        ("position_mm;error_um\n", None, None, "the columns are not separated by commas"),
+        ("position,error_um\n1,2\n", None, None, "there is no abscissa beside the error"),
+        ("position_mm\n1\n", None, None, "there is no abscissa beside the error"),
+        ("position,error\n1,2\n", None, None, "no column is left for the error; its name needs a unit"),
+        ("a_mm,b_um,c_um\n1,2,3\n", None, "d", 'no column "d" for --y; known: a, b, c'),
+        ("a_mm,error,c_um\n1,2,3\n", None, "error", 'the column "error" has no unit of length or angle'),
+        ("a_mm,b_um\n1,2\n", "b", "b", "b is chosen for x and for y"),
+        ("a_mm,b_um\n1,2\n", "arc_length", "b", "the arc length needs a profile"),
+        ("a_mm,a_um\n1,2\n", None, None, 'a second column "a_um"; remove one of them'),
+        ("a_mm,b_um,u_urad\n1,2,3\n", None, None, "the uncertainty is an angle and b a length"),
+        ("a_mm,b_um\n", None, None, "no rows below the names of the columns"),
+    ],
+)
+def test_files_that_cannot_be_used(write: Path, text: str, x: str | None, y: str | None, message: str) -> None:
+    found = told(write, text, x, y)
+    assert len(found) == 1 and message in found[0]
+
+
+def test_points_by_name(write: Path) -> None:
+    write.write_text("point,a_mm,b_um\n" + "".join(f"{k},1,0\n" for k in (1, 2, 3, 7, "end")), encoding="utf-8")
+    points = read_points(write)
+    assert choose_points(points, "2-7", "data.csv") == [1, 2, 3]
+    assert choose_points(points, "end, 1,2-3", "data.csv") == [0, 1, 2, 4]
+    with pytest.raises(ExperimentError) as error:
+        choose_points(points, "4-6, enf, 1", "data.csv")
+    assert [message.text for message in error.value.messages] == [
+        'no points "4-6"; known: 1, 2, 3, 7, end',
+        'no point "enf"; did you mean "end"?',
+    ]
