@@ -77,6 +77,24 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4, knots: [0.5, 1]}}", [
         "5:39: error_model.basis: interior knots are out of order or range; give them between 0 and 1, in "
         "ascending order"]),
+    ("error_model: {kind: kinematic}",
+     "error_model: {kind: kinematic, basis: {order: 4, knots: [0.3], features: [0.4], slopes: {end: 0.5}, edge: 1}}", [
+        '5:89: error_model.basis.slopes: functions of a basis are multiplied by any number, which keeps no end slope '
+        "but 0; give 0",
+        "5:101: error_model.basis.edge: unknown key; known: periodic"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {knots: [0.3], features: [0.3]}}", [
+        "5:39: error_model.basis: 0.3 is among the knots and the features; leave it out of the knots"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 2, features: [0.3]}}", [
+        "5:39: error_model.basis: broken lines share no slope between features; give an order of 3 or more"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {features: [0.3, 0.3]}}", [
+        "5:39: error_model.basis: boundaries of features are out of order; give each once, in ascending order"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {periodic: true, slopes: {end: 0}}}", [
+        "5:39: error_model.basis: periodic ends have slopes of their own; remove slopes or periodic"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {slopes: {}}}", [
+        "5:48: error_model.basis.slopes: neither start nor end is given; give 0 for one of them or both, or remove the "
+        "key"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, basis: {slopes: {end: 0}}}", [
+        "5:14: error_model: full tensor products have the factors x, y and z, whose slope is not 0; remove slopes"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: spline}", [
         '5:39: error_model.basis: unknown value "spline"; allowed: chebyshev, monomial']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4}, rotation_coefficients: 3}", [
