@@ -21,6 +21,8 @@ Place = float | tuple[float, float] | Literal["start", "end"]
 """An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""
 
 EVERY = 5
+# Time grows with the square of these, times the points.
+MOST_COEFFICIENTS = 500
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,9 @@ def fit_curve(
         found = at_every(x, settings.every, lower, upper, boundaries)
         knots = tuple(knot for knot in found if not any(start <= knot <= end for start, end in lines))
     space = SplineSpace(settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order))
+    if space.count > MOST_COEFFICIENTS:
+        text = f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible, leave out knots"
+        raise SplineError([Problem(text)])
     constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
     for start, end in lines:
         constraints += straight(space, start, end)

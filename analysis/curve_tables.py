@@ -57,8 +57,8 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
     ]
     knots = [knot for knot in space.knots if knot not in curve.boundaries]
     listed = ", ".join(f"{knot / x.factor:.6g}" for knot in knots[:MOST_LISTED])
-    listed += f" and {len(knots) - MOST_LISTED} more" if len(knots) > MOST_LISTED else ""
-    where = f" at {listed} {x.unit}" if knots else ""
+    more = f" and {len(knots) - MOST_LISTED} more" if len(knots) > MOST_LISTED else ""
+    where = f" at {listed} {x.unit}{more}" if knots else ""
     what = ORDERS.get(space.order, f"spline of order {space.order}")
     lines.append(
         f"{what}, {len(knots)} knot{'s' if len(knots) != 1 else ''}{where}; "

@@ -40,7 +40,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     data.add_argument("--y", metavar="COLUMN", help="error; default: the only other column")
     data.add_argument("--points", metavar="NAMES", help="only these, such as 12-32 or 1,2,5-9; default: all")
     data.add_argument(
-        "--uncertainty", metavar="LENGTH", help="standard uncertainty of each error, where no column u has it"
+        "--uncertainty", metavar="VALUE", help="standard uncertainty of each error, where no column u has it"
     )
     data.add_argument(
         "--sigma",
@@ -236,8 +236,6 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
     knots = None
     if options.knots is not None:
         knots = () if options.knots.strip() == "none" else tuple(sorted(_list("--knots", options.knots, x)))
-        if len(knots) > MOST_KNOTS:
-            raise OptionError(f"--knots: {len(knots)} are too many; at most {MOST_KNOTS} are possible")
     if not 2 <= options.order <= 12:
         raise OptionError("--order should be 2 to 12; 4 is a cubic spline")
     period = None
@@ -256,9 +254,6 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
         holds=tuple(holds),
         period=period,
     )
-
-
-MOST_KNOTS = 1000
 
 
 def _parser(kind: str) -> Callable[[object], float]:

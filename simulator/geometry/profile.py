@@ -55,7 +55,8 @@ class Profile:
     def normals(self) -> Array:
         """Unit normals (m, 2), radius and axial co-ordinate, that point out of the material.
 
-        The normal of a feature of one point is square to the line between its neighbours.
+        The normal of a feature of one point is square to the line to the nearer of its neighbours, to which it may be
+        tangent.
         """
         tangents = np.zeros(len(self._points), complex)
         for first, last in self.features:
@@ -69,8 +70,10 @@ class Profile:
     def _tangents(self, first: int, last: int) -> Complex:
         points = self._points
         if first == last:
-            before, after = points[max(first - 1, 0)], points[min(last + 1, len(points) - 1)]
-            return np.array([after - before if after != before else 1.0])
+            if len(points) == 1:
+                return np.ones(1, complex)
+            steps = np.diff(points[max(first - 1, 0) : last + 2])
+            return steps[np.argmin(np.abs(steps))][None]
         chords = np.diff(points[first : last + 1])
         chords /= np.abs(chords)
         if last - first == 1:

@@ -103,14 +103,16 @@ def fit(
     :raises SplineError: constraints that contradict one another, points that do not determine the curve, or places
         beyond its ends; all of a kind at once.
     """
+    from scipy.linalg import solve_triangular
+
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     weights = np.ones(len(x)) if uncertainties is None else 1.0 / np.asarray(uncertainties, dtype=float)
     particular, null, redundant = _constrained(space, constraints)
     design = space.rows(x)
     _refuse_undetermined(space, x, design @ null, null)
     q, r = np.linalg.qr(weights[:, None] * (design @ null))
-    free = np.linalg.solve(r, q.T @ (weights * (y - design @ particular)))
-    root = null @ np.linalg.inv(r)
+    free = solve_triangular(r, q.T @ (weights * (y - design @ particular)))
+    root = null @ solve_triangular(r, np.eye(len(r)))
     coefficients = particular + null @ free
     return SplineFit(space, constraints, redundant, coefficients, root, x, y, 1.0 / weights)
 
@@ -160,7 +162,7 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
     """
     if null.shape[1] == 0:
         return
-    _, values, directions = np.linalg.svd(design, full_matrices=True)
+    _, values, directions = np.linalg.svd(np.linalg.qr(design, mode="r"), full_matrices=True)
     known = int((values > UNDETERMINED * max(float(values.max(initial=0.0)), UNDETERMINED)).sum())
     if known == null.shape[1]:
         return

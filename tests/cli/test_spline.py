@@ -206,6 +206,18 @@ def test_what_cannot_be_fitted(
     assert all(line.startswith(f"{PART}: ") for line in err.splitlines())
 
 
+def test_many_points_are_fitted_and_too_many_coefficients_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    x = np.arange(8000)
+    rows = "".join(f"{a},{b}\n" for a, b in zip(x / 10, np.sin(x / 500), strict=True))
+    (tmp_path / "data.csv").write_text(f"position_mm,error_um\n{rows}", encoding="utf-8")
+    assert run(tmp_path / "data.csv", "--every", "100", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["sigma"] < 1e-10
+    assert run(tmp_path / "data.csv") == 3
+    assert "1603 coefficients are too many; at most 500 are possible, leave out knots" in capsys.readouterr().err
+
+
 def test_whiskers_need_a_profile(capsys: pytest.CaptureFixture[str], ring: Path, tmp_path: Path) -> None:
     assert run(ring, "--whiskers", tmp_path / "a.svg") == 2
     assert "--whiskers needs a profile" in capsys.readouterr().err

@@ -50,10 +50,12 @@ def test_labels_part_features_at_a_corner() -> None:
     assert profile.lengths[-1] == pytest.approx(0.03 + np.hypot(0.01, 0.01))
 
 
-def test_a_single_point_takes_its_normal_from_its_neighbours() -> None:
-    places = np.array([[0.04, -0.03], [0.04, -0.02], [0.03, -0.01], [0.02, 0.0], [0.01, 0.0]])
+def test_a_single_point_takes_its_normal_from_its_nearer_neighbour() -> None:
+    places = np.array([[0.05, -0.03], [0.05, -0.02], [0.03, -0.01], [0.02, 0.0], [0.01, 0.0]])
     profile, own, _ = along(places, ["a", "a", "b", "c", "c"], np.zeros((0, 2)))
     np.testing.assert_allclose(profile.normals[own[2]], np.sqrt([0.5, 0.5]), atol=1e-12)
+    alone, _, _ = along(places[:1], [""], np.zeros((0, 2)))
+    assert alone.normals.tolist() == [[1.0, 0.0]] and alone.lengths.tolist() == [0.0]
 
 
 def test_a_boundary_off_the_profile_is_refused() -> None:

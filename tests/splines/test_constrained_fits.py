@@ -225,17 +225,17 @@ def test_powers_of_x_are_those_of_the_documents_recursion() -> None:
 
 
 def test_sigma_and_the_band_cover_as_they_say() -> None:
-    """2000 data sets of a curve within the space: spread of the fitted curve and mean of sigma squared."""
+    """1200 data sets of a curve within the space: spread of the fitted curve and mean of sigma squared."""
     x = np.linspace(0.0, 1.0, 15)
     space = SplineSpace(4, 0.0, 1.0, (0.5,))
     ends = (prescribed(0.0, 1, 0.0),)
     truth = fit(space, x, np.sin(3 * x), None, ends)
     generator = np.random.default_rng(np.random.SeedSequence(7))
     places = np.array([0.0, 0.3, 1.0])
-    found = [fit(space, x, truth.values(x) + 0.1 * generator.standard_normal(15), None, ends) for _ in range(2000)]
+    found = [fit(space, x, truth.values(x) + 0.1 * generator.standard_normal(15), None, ends) for _ in range(1200)]
     curves = np.array([one.values(places) for one in found])
-    np.testing.assert_allclose(curves.std(axis=0), 0.1 * truth.spread(places), rtol=0.05)
-    assert np.mean([one.sigma**2 for one in found]) == pytest.approx(0.01, rel=0.03)
+    np.testing.assert_allclose(curves.std(axis=0), 0.1 * truth.spread(places), rtol=0.08)
+    assert np.mean([one.sigma**2 for one in found]) == pytest.approx(0.01, rel=0.05)
 
 
 def test_points_count_by_their_uncertainties() -> None:
