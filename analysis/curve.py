@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal
@@ -147,9 +147,8 @@ def whole_profile(points: Points, boundaries: Array) -> tuple[Profile, Array]:
     :raises SplineError: the points do not make a profile.
     """
     assert points.places is not None
-    between = [place for place in boundaries if not (points.places == place).all(axis=1).any()]
-    profile, own, _ = along(points.places, points.features, np.array(between).reshape(-1, 2))
-    _refuse_coincident(profile)
+    _refuse_coincident(points.places)
+    profile, own, _ = along(points.places, points.features, boundaries)
     return profile, own
 
 
@@ -198,33 +197,29 @@ def _on_profile(
         None if isinstance(place, float | str) or (points.places == place).all(axis=1).any() else np.array(place)
         for place in (settings.start, settings.end)
     )
-    between = [place for place in nominal if not (points.places == place).all(axis=1).any()]
+    _refuse_coincident(points.places)
     try:
-        profile, own, at = along(points.places, points.features, np.array(between).reshape(-1, 2), start, end)
+        profile, own, at = along(points.places, points.features, np.array(nominal).reshape(-1, 2), start, end)
     except NotOnProfileError as error:
-        wrong = between[error.args[0]]
         text = "the place ({0}, {1}) is not on the profile between two points; correct it, or give the arc length"
-        raise SplineError([Problem(text, wrong)]) from None
-    _refuse_coincident(profile)
+        raise SplineError([Problem(text, nominal[error.args[0]])]) from None
     lengths = profile.lengths
-    where: dict[Place, float] = {}
-    for place in (*nominal, settings.start, settings.end):
+    where: dict[Place, float] = dict(zip(nominal, lengths[at].tolist(), strict=True))
+    for place in (settings.start, settings.end):
         if isinstance(place, tuple):
             where[place] = float(lengths[(profile.places == place).all(axis=1)][0])
     return lengths[own], where
 
 
-def _refuse_coincident(profile: Profile) -> None:
+def _refuse_coincident(places: Array) -> None:
     """Refuse neighbouring places that are the same, between which nothing has a direction.
 
     :raises SplineError: there are such.
     """
-    same = list(_coincident(profile.places))
+    same = [
+        Problem("two neighbouring points stand at ({0}, {1}); leave one of them out", tuple(one))
+        for one, two in pairwise(places.tolist())
+        if one == two
+    ]
     if same:
         raise SplineError(same)
-
-
-def _coincident(places: Array) -> Iterator[Problem]:
-    for one, two in pairwise(places.tolist()):
-        if one == two:
-            yield Problem("two neighbouring points stand at ({0}, {1}); leave one of them out", tuple(one))

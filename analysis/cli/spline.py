@@ -243,6 +243,8 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
         if options.periodic == "360 deg" and x.kind == "length":
             raise OptionError('--periodic: the abscissa is a length; state the period, as in --periodic "10 mm"')
         period = _positive(options.periodic, x, "--periodic")
+    if options.start.strip() == "end" or options.end.strip() == "start":
+        raise OptionError("the curve starts at its start and ends at its end; give --start and --end other places")
     return CurveSettings(
         order=options.order,
         every=options.every or EVERY,

@@ -98,7 +98,7 @@ def along(
     """The profile over nominal places (m, 2), and indices in it of the places (m,) and of the boundaries (n,).
 
     A feature ends where the labels of neighbouring places differ, and at every one of the `boundaries` (n, 2), which
-    lie between places. `start` and `end` (2,) are places before the first and after the last one.
+    lie between places or are places themselves. `start` and `end` (2,) are places before the first and after the last.
 
     :raises NotOnProfileError: a boundary that is far from the way between neighbouring places; its argument is the
         boundary's index.
@@ -108,6 +108,10 @@ def along(
     marks = [*labels]
     where: list[int] = []
     for k, boundary in enumerate(boundaries):
+        same = np.flatnonzero((np.array(found) == boundary).all(axis=1))
+        if len(same):
+            where.append(int(same[0]))
+            continue
         at = _between(np.array(found), boundary)
         if at is None:
             raise NotOnProfileError(k)
@@ -122,7 +126,7 @@ def along(
     if end is not None:
         found.append(end)
         marks.append(marks[-1])
-    edges = sorted(where)
+    edges = set(where) - {0, len(found) - 1}
     features, first = [], 0
     for k in range(1, len(found)):
         if k in edges:
@@ -137,11 +141,11 @@ def along(
 
 def _between(places: Array, boundary: Array) -> int | None:
     """Index before which a place stands, where it lengthens the way least; None where that is much."""
+    if len(places) < 2:
+        return None
     before = np.hypot(*(places[:-1] - boundary).T)
     after = np.hypot(*(places[1:] - boundary).T)
     direct = np.hypot(*np.diff(places, axis=0).T)
     detour = before + after - direct
     best = int(np.argmin(detour))
-    if detour[best] > DETOUR * max(direct[best], 1e-12) or min(before[best], after[best]) == 0.0:
-        return None
-    return best + 1
+    return None if detour[best] > DETOUR * direct[best] else best + 1

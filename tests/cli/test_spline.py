@@ -157,6 +157,7 @@ def test_drawings(tmp_path: Path) -> None:
         (("--start-slope", "3 um/s"), '"3 um/s" is not a slope; write for example "2 um/mm", or 0'),
         (("--start-value", "1 urad"), "--start-value:"),
         (("--at", "3 mm", "bend", "0"), '--at: "bend" should be value or slope'),
+        (("--start", "end"), "the curve starts at its start"),
         (("--order", "1"), "--order should be 2 to 12"),
         (("--periodic",), "--periodic: the abscissa is a length; state the period"),
         (("--periodic", "-1 mm"), "must be above zero"),
@@ -216,6 +217,13 @@ def test_many_points_are_fitted_and_too_many_coefficients_refused(
     assert json.loads(capsys.readouterr().out)["sigma"] < 1e-10
     assert run(tmp_path / "data.csv") == 3
     assert "1603 coefficients are too many; at most 500 are possible, leave out knots" in capsys.readouterr().err
+
+
+def test_points_at_the_same_place_are_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    rows = "".join(f"{10 - k // 2},{k // 2},{k}\n" for k in (0, 2, 3, 6, 8))
+    (tmp_path / "data.csv").write_text(f"nominal_x_mm,nominal_z_mm,error_um\n{rows}", encoding="utf-8")
+    assert run(tmp_path / "data.csv") == 3
+    assert "two neighbouring points stand at (9 mm, 1 mm); leave one of them out" in capsys.readouterr().err
 
 
 def test_whiskers_need_a_profile(capsys: pytest.CaptureFixture[str], ring: Path, tmp_path: Path) -> None:

@@ -41,6 +41,16 @@ def test_a_line_joins_a_circle_at_their_boundary(backwards: bool) -> None:
     np.testing.assert_allclose(normals[2], [np.cos(np.radians(4)), np.sin(np.radians(4))], atol=1e-12)
 
 
+def test_a_measured_point_may_be_the_boundary() -> None:
+    line = np.array([[RADIUS, -RADIUS - 0.02], [RADIUS, -RADIUS - 0.005]])
+    places = np.concatenate([line, dome(np.array([0.0, 20.0, 50.0, 80.0]))])
+    for labels in ([""] * 6, ["line"] * 3 + ["dome"] * 3, ["line"] * 2 + ["dome"] * 4):
+        profile, own, at = along(places, labels, dome(np.array([0.0, 80.0])))
+        assert own.tolist() == list(range(6)) and at.tolist() == [2, 5]
+        assert profile.features == ((0, 2), (2, 5))
+        np.testing.assert_allclose(np.diff(profile.lengths)[2:], RADIUS * np.radians([20, 30, 30]), rtol=1e-12)
+
+
 def test_labels_part_features_at_a_corner() -> None:
     """A cylinder and a face: each has its own normals, which a common curve would round off."""
     places = np.array([[0.04, -0.03], [0.04, -0.02], [0.04, -0.01], [0.03, 0.0], [0.02, 0.0]])
