@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,12 +15,13 @@ import numpy as np
 from ..experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from ..experiment.tables import MOST_ROWS, _cells, refuse_columns
 from ..experiment.yamltree import Mark, read_text
-from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
+from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number, metres_or_radians
 from ..settings import hint, listing, shorten
 from .space import Array
 
 EXAMPLE = "position_mm,error_um"
 PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))
+NORMALS = ("normal_x", "normal_z")
 POINT, FEATURE, UNCERTAINTY, ARC_LENGTH = "point", "feature", "u", "arc_length"
 MOST_POINTS = 20_000
 
@@ -44,7 +46,7 @@ class Points:
     """Points in the order of the file, in metres and radians.
 
     `x` (m,) is not there where the abscissa is the arc length along the profile; `places` (m, 2), radius and axial
-    co-ordinate, are not there where the file has no profile.
+    co-ordinate, are not there where the file has no profile, unit `normals` (m, 2) where it does not state them.
     """
 
     names: tuple[str, ...]
@@ -55,6 +57,7 @@ class Points:
     y: Array = field(repr=False)
     uncertainties: Array | None = field(repr=False)
     places: Array | None = field(repr=False)
+    normals: Array | None = field(default=None, repr=False)
 
     def chosen(self, indices: Sequence[int]) -> Points:
         """Those of some indices."""
@@ -68,6 +71,7 @@ class Points:
             self.y[index],
             None if self.uncertainties is None else self.uncertainties[index],
             None if self.places is None else self.places[index],
+            None if self.normals is None else self.normals[index],
         )
 
 
@@ -76,8 +80,8 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
 
     `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc length along the profile
     if the file has the columns nominal_x and nominal_z (or x and z), otherwise the first column with a unit; without
-    `y` the error is the only column left. `point` and `feature` are texts, `u` a standard uncertainty of the error.
-    Other columns are not read.
+    `y` the error is the only column left. `point` and `feature` are texts, `u` a standard uncertainty of the error,
+    `normal_x` and `normal_z`, without unit, the direction out of the material. Other columns are not read.
 
     :raises ExperimentError: everything that is wrong with the file at once.
     """
@@ -101,6 +105,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
     values: list[list[float]] = []
     names: list[str] = []
     features: list[str] = []
+    normals: list[list[float]] = []
     seen: dict[str, int] = {}
     for number, line in lines[1:]:
         if len(messages) >= MOST_MESSAGES or len(values) > MOST_POINTS:
@@ -124,6 +129,11 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
             except QuantityError as error:
                 messages.append(Mark(file, number, place).message("", str(error)))
         values.append(row)
+        if header.has_normals:
+            try:
+                normals.append(_direction([cells[header.texts[part]][1] for part in NORMALS]))
+            except QuantityError as error:
+                messages.append(Mark(file, number, cells[header.texts[NORMALS[0]]][0]).message("", str(error)))
         name = cells[header.texts[POINT]][1] if POINT in header.texts else str(len(names) + 1)
         if name in seen:
             messages.append(mark.message("", f'a second point "{shorten(name)}", as in line {seen[name]}; rename one'))
@@ -149,7 +159,20 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
         by_name[y_column.name],
         by_name.get(UNCERTAINTY),
         np.stack([by_name[column.name] for column in profile], axis=1) if profile else None,
+        np.array(normals) if header.has_normals else None,
     )
+
+
+def _direction(cells: Sequence[str]) -> list[float]:
+    """A unit vector from the texts of its parts.
+
+    :raises QuantityError: no numbers, or both zero.
+    """
+    parts = [float(exact_number(cell)) for cell in cells]
+    length = math.hypot(*parts)
+    if not 0 < length < math.inf:
+        raise QuantityError(f'"{cells[0]}" and "{cells[1]}" are no direction; give its parts, such as 0.6 and 0.8')
+    return [part / length for part in parts]
 
 
 def choose_points(points: Points, text: str, file: str) -> list[int]:
@@ -198,11 +221,14 @@ class _Header:
             if name in self.columns or cell in self.texts:
                 place = Mark(mark.file, mark.line, column)
                 messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one of them'))
-            elif cell in (POINT, FEATURE):
+            elif cell in (POINT, FEATURE, *NORMALS):
                 self.texts[cell] = k
             elif name and unit in units:
                 self.columns[name] = Column(name, unit, float(units[unit]), kind)
                 self.factors[name], self._index[name] = units[unit], k
+        self.has_normals = all(part in self.texts for part in NORMALS)
+        if any(part in self.texts for part in NORMALS) and not self.has_normals:
+            messages.append(mark.message("", "a normal has two parts; add the other of normal_x and normal_z"))
         if messages:
             raise ExperimentError(messages)
 

@@ -30,6 +30,8 @@ def random_places(count: int) -> np.ndarray:
     [
         (sums(Spline(3)), 7 + 9 * 1),
         (sums(Spline(4, (0.5,))), 7 + 9 * 3),
+        (sums(Spline(4, (0.5,), ends="zero slopes")), 7 + 9 * 1),
+        (sums(Spline(4, (0.3, 0.5), ends="periodic")), 7 + 9 * 2),
         (sums(Polynomial(2)), 7),
         (quadratic(), 10),
         (tensor(Spline(4, (0.5,))), 5**3),

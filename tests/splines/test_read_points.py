@@ -46,6 +46,21 @@ def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
     ]
 
 
+def test_normals_of_the_drawing(write: Path) -> None:
+    write.write_text("x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,3,4\n2,1,2,-1,0\n", encoding="utf-8")
+    points = read_points(write)
+    assert points.normals is not None
+    np.testing.assert_allclose(points.normals, [[0.6, 0.8], [-1.0, 0.0]])
+    np.testing.assert_allclose(points.chosen([1]).normals, [[-1.0, 0.0]])
+    assert told(write, "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,0,0\n2,1,2,a,1\n") == [
+        'data.csv:2:7: "0" and "0" are no direction; give its parts, such as 0.6 and 0.8',
+        'data.csv:3:7: "a" is not a number; write for example "500.0003"',
+    ]
+    assert told(write, "x_mm,z_mm,error_um,normal_x\n1,1,2,0\n") == [
+        "data.csv:1:1: a normal has two parts; add the other of normal_x and normal_z"
+    ]
+
+
 def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
     text = "point,position_mm,error_um,u_um\n1,0,1,0.1\n1,1,x,0.1\n3,2,,0.1\n4,3\n5,4,1,0\n6,5,2,1e30\n"
     assert told(write, text) == [
