@@ -31,9 +31,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         description="Fit a spline to errors along an axis or along the profile of a turned part, by least squares, "
         "with values and slopes prescribed at its ends or elsewhere, and write it as polynomials for a controller. The "
         "file has columns such as position_mm and error_um, or nominal_x_mm and nominal_z_mm for a profile, whose arc "
-        "length is then the abscissa; also point, feature, u_um, and normal_x and normal_z. A PLACE is an abscissa such as "
-        '"12.5 mm", start, '
-        'end, or nominal co-ordinates on the profile such as "37.084 mm, -37.084 mm".',
+        "length is then the abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa such "
+        'as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084 mm, -37.084 mm".',
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="measured points (CSV)")
     data = parser.add_argument_group("points")
