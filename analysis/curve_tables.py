@@ -61,8 +61,9 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
     where = f" at {listed} {x.unit}{more}" if knots else ""
     what = ORDERS.get(space.order, f"spline of order {space.order}")
     lines.append(
-        f"{what}, {len(knots)} knot{'s' if len(knots) != 1 else ''}{where}; "
-        f"{fitted.free} free coefficients, {fitted.degrees_of_freedom} degrees of freedom"
+        f"{what}, {_number_of(len(knots), 'knot')}{where}; "
+        f"{_number_of(fitted.free, 'free coefficient')}, "
+        f"{_number_of(fitted.degrees_of_freedom, 'degree')} of freedom"
     )
     for boundary in curve.boundaries:
         lines.append(f"features share value and slope at {shown(boundary, x)}")
@@ -80,6 +81,11 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
     if len(at):
         lines += ["", *_value_lines(curve, at)]
     return lines
+
+
+def _number_of(count: int, thing: str) -> str:
+    """A number of things, as in 1 knot, 2 knots."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def _sigma_lines(curve: Curve) -> list[str]:

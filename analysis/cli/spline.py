@@ -10,12 +10,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import count, print_json, print_lines
+from .common import count, draw, picture, print_json, print_lines
 
 if TYPE_CHECKING:
+    from simulator.experiment.messages import ExperimentError
+    from simulator.splines.problems import SplineError
     from simulator.splines.read import Column, Points
 
-    from ..curve import Curve, CurveSettings, Place
+    from ..curve import CurveSettings, Place
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -92,9 +94,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     output.add_argument(
         "--coefficients", metavar="FILE", type=Path, help="write the polynomials as CSV; - for the screen"
     )
-    output.add_argument("--plot", metavar="FILE", type=Path, help="draw points and curve (.svg, .png or .pdf)")
+    output.add_argument("--plot", metavar="FILE", type=picture, help="draw points and curve (.svg, .png or .pdf)")
     output.add_argument(
-        "--whiskers", metavar="FILE", type=Path, help="draw errors as bars normal to the profile (.svg, .png or .pdf)"
+        "--whiskers",
+        metavar="FILE",
+        type=picture,
+        help="draw errors as bars normal to the profile (.svg, .png or .pdf)",
     )
     output.add_argument("--magnification", metavar="N", type=float, help="of the bars; default: one that suits")
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
@@ -106,12 +111,15 @@ POWERS = "polynomials in the distance from the start of each piece (default), or
 
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
-    from simulator.experiment.messages import ExperimentError, Message, in_one_line
+    import numpy as np
+
+    from simulator.experiment.messages import in_one_line
     from simulator.splines.problems import SplineError
     from simulator.splines.read import choose_points, read_points
 
     from ..curve import fit_curve
-    from ..curve_tables import coefficients_csv, curve_data, curve_lines, shown
+    from ..curve_tables import coefficients_csv, curve_data, curve_lines
+    from ..report.curves import plot, whiskers
 
     everything = read_points(options.file, options.x, options.y)
     points = everything
@@ -127,22 +135,26 @@ def run(options: Namespace) -> int:
         return WRONG_USAGE
     try:
         curve = fit_curve(points, settings, uncertainty, options.sigma)
-        import numpy as np
-
         where = np.array(at, dtype=float)
         curve.fit.values(where)
         lines = [] if options.json else curve_lines(curve, options.file.name, options.powers, where)
+        drawings: list[tuple[Path | None, Callable[[Path], None]]] = [
+            (options.plot, lambda path: plot(curve, path)),
+            (options.whiskers, lambda path: whiskers(curve, everything, path, options.magnification)),
+        ]
+        if not all(draw(drawing, path) for path, drawing in drawings if path is not None):
+            return BAD_FILE
     except SplineError as error:
-        texts = [problem.told(lambda place: shown(place, points.x_column)) for problem in error.problems]
-        raise ExperimentError(Message(str(options.file), 0, 0, "", text) for text in texts) from None
-    status = _draw(options, curve, everything)
-    if status:
-        return status
+        raise _told(error, points.x_column, options.file) from None
     if options.coefficients is not None and str(options.coefficients) != "-":
         try:
             options.coefficients.write_text(coefficients_csv(curve, options.powers), encoding="utf-8")
         except OSError as error:
-            return _unwritten(options.coefficients, error)
+            print(
+                f"{options.coefficients}: cannot be written ({error.strerror or error}); check the folder",
+                file=sys.stderr,
+            )
+            return BAD_FILE
     if options.json:
         print_json([curve_data(curve, str(options.file), options.powers, where)])
     elif str(options.coefficients) == "-":
@@ -152,41 +164,14 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _draw(options: Namespace, curve: Curve, everything: Points) -> int:
-    if options.plot is None and options.whiskers is None:
-        return 0
+def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
+    """The problems with places in the unit of the abscissa."""
     from simulator.experiment.messages import ExperimentError, Message
-    from simulator.splines.problems import SplineError
 
     from ..curve_tables import shown
 
-    path = None
-    try:
-        from ..report.curves import plot, whiskers
-
-        if options.plot is not None:
-            path = options.plot
-            plot(curve, path)
-        if options.whiskers is not None:
-            path = options.whiskers
-            whiskers(curve, everything, path, options.magnification)
-    except SplineError as error:
-        texts = [problem.told(lambda place: shown(place, everything.x_column)) for problem in error.problems]
-        raise ExperimentError(Message(str(options.file), 0, 0, "", text) for text in texts) from None
-    except ImportError as error:
-        if error.name is None or error.name.partition(".")[0] != "matplotlib":
-            raise
-        told = "drawings need matplotlib; install it with: python -m pip install 'ballplate[report]'"
-        print(f"ballplate spline: {told}", file=sys.stderr)
-        return BAD_FILE
-    except OSError as error:
-        return _unwritten(path, error)
-    return 0
-
-
-def _unwritten(path: Path | None, error: OSError) -> int:
-    print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
-    return BAD_FILE
+    texts = [problem.told(lambda place: shown(place, column)) for problem in error.problems]
+    return ExperimentError(Message(str(file), 0, 0, "", text) for text in texts)
 
 
 def _check(options: Namespace, points: Points) -> None:
@@ -194,12 +179,6 @@ def _check(options: Namespace, points: Points) -> None:
 
     :raises OptionError: there are such.
     """
-    from ..report.svg import PICTURES
-
-    for name in ("plot", "whiskers"):
-        path = getattr(options, name)
-        if path is not None and path.suffix.lower() not in PICTURES:
-            raise OptionError(f"--{name} {path} should end in one of {', '.join(PICTURES)}")
     outputs = [path for path in (options.plot, options.whiskers, options.coefficients) if path is not None]
     resolved = [path.resolve() for path in outputs if str(path) != "-"]
     if options.file.resolve() in resolved or len(set(resolved)) < len(resolved):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from simulator.splines.read import Points
 
 from ..curve import Curve, whole_profile
 from ..curve_tables import derivative_unit, shown
-from .svg import INK, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
+from .svg import INK, MUTED, PAPER, SERIES, drawing, micro, placed_axes, round_number, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,12 +96,12 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
     extent = np.ptp(line, axis=0)
     largest = float(np.abs(points.y).max())
     if magnification is None:
-        magnification = _round(LONGEST * float(extent.max()) / largest) if largest else 1.0
+        magnification = round_number(LONGEST * float(extent.max()) / largest) if largest else 1.0
     tips = start + magnification * points.y[:, None] * normals
     everything = np.concatenate([line, tips])
     low, high = everything.min(axis=0), everything.max(axis=0)
     # A bar as long as a round error stands beside the profile as a scale.
-    scale = _round(0.7 * largest) if largest else 1e-6
+    scale = round_number(0.7 * largest) if largest else 1e-6
     margin = 0.04 * float((high - low).max())
     size = high - low + 2 * margin
     width = WIDTH - 68.0
@@ -152,13 +151,3 @@ def _scale(axes: Axes, length: float, text: str) -> None:
     x, y = left + 0.05 * (right - left), bottom + 0.08 * (top - bottom)
     axes.plot([x, x + length], [y, y], color=INK, linewidth=2.0)
     axes.text(x, y + 0.02 * (top - bottom), text, va="bottom", ha="left")
-
-
-def _round(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not larger.
-
-    >>> _round(730.0), _round(0.0021)
-    (500.0, 0.002)
-    """
-    power = 10.0 ** math.floor(math.log10(value))
-    return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= value * (1 + 1e-9))

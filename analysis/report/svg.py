@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -61,6 +62,16 @@ SETTINGS: Any = {
     "hatch.color": MUTED,
     "axes.unicode_minus": True,
 }
+
+
+def round_number(value: float) -> float:
+    """The largest of 1, 2, 5, 10, … and of 0.5, 0.2, 0.1, … that is not larger than a positive value.
+
+    >>> round_number(730.0), round_number(0.0021), round_number(1e6)
+    (500.0, 0.002, 1000000.0)
+    """
+    power = 10.0 ** math.floor(math.log10(value) + 1e-12)
+    return power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from simulator.readings import ObservedReadings
 
 from ..reversal import ReversalFit
 from ..study import Fit, reading_residuals
-from .svg import INK, MARKERS, MUTED, SERIES, WIDTH, drawing, placed_axes, save
+from .svg import INK, MARKERS, MUTED, SERIES, WIDTH, drawing, placed_axes, round_number, save
 
 # Of the drawing's extent, the longest vector takes this part at most.
 LONGEST = 0.2
@@ -57,9 +57,7 @@ def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
     longest = max((float(np.sqrt((g.residuals**2).sum(axis=1)).max(initial=0.0)) for g in groups), default=0.0)
     if longest == 0.0 or extent == 0.0:
         return 1.0
-    times = LONGEST * extent / longest
-    power = 10.0 ** np.floor(np.log10(times) + 1e-12)
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= times * (1.0 + 1e-9)))
+    return round_number(LONGEST * extent / longest)
 
 
 def draw_vectors(groups: tuple[Vectors, ...], title: str, path: Path) -> None:
@@ -106,8 +104,7 @@ def _style(k: int) -> tuple[str, str]:
 def _legend(figure, groups: tuple[Vectors, ...], times: float, per_millimetre: float) -> None:  # type: ignore[no-untyped-def]
     """Names of the groups, and a bar of one, two or five of some unit, that long in the drawing as a residual is."""
     longest = max(float(np.sqrt((g.residuals**2).sum(axis=1)).max()) for g in groups)
-    power = 10.0 ** np.floor(np.log10(longest)) if longest > 0.0 else 1e-6
-    length = power * max(step for step in (1.0, 2.0, 5.0) if step * power <= max(longest, power))
+    length = round_number(longest) if longest > 0.0 else 1e-6
     w, h = 72.0 * figure.get_size_inches()
     scale = placed_axes(figure, 0.0, 0.0, w, LINE * (len(groups) + 1) + 4.0)
     scale.set_axis_off()

@@ -163,7 +163,6 @@ def test_drawings(tmp_path: Path) -> None:
         (("--periodic", "-1 mm"), "must be above zero"),
         (("--boundary", "1 mm, 2 mm, 3 mm"), "should be one abscissa, or two nominal co-ordinates"),
         (("--uncertainty", "0 um"), "must be above zero"),
-        (("--plot", "a.gif"), "--plot a.gif should end in one of .svg, .png, .pdf"),
         (("--plot", "a.svg", "--whiskers", "a.svg"), "two of the files are the same"),
         (("--magnification", "nan"), "--magnification should be above 0"),
         (("--json", "--coefficients", "-"), "both go to the screen"),
@@ -231,6 +230,13 @@ def test_whiskers_need_a_profile(capsys: pytest.CaptureFixture[str], ring: Path,
     assert "--whiskers needs a profile" in capsys.readouterr().err
     assert run(*DOME, "--plot", tmp_path / "missing" / "a.svg") == 3
     assert "a.svg: cannot be written (No such file or directory)" in capsys.readouterr().err
+
+
+def test_a_picture_of_an_unknown_kind_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as leave:
+        run(*DOME, "--plot", "a.gif")
+    assert leave.value.code == 2
+    assert "a picture's name ends in .svg, .png, .pdf" in capsys.readouterr().err
 
 
 def test_help(capsys: pytest.CaptureFixture[str]) -> None:
