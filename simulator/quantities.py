@@ -49,16 +49,40 @@ RATIO_UNITS: Mapping[str, Fraction] = {
     "um/m": Fraction(1, 10**6),
     "nm/m": Fraction(1, 10**9),
 }
+TEMPERATURE_UNITS: Mapping[str, Fraction] = {"K": Fraction(1), "degC": Fraction(1), "mK": Fraction(1, 10**3)}
+EXPANSION_UNITS: Mapping[str, Fraction] = {
+    f"{ratio}/{degree}": factor
+    for ratio, factor in (("um/m", Fraction(1, 10**6)), ("ppm", Fraction(1, 10**6)), ("mm/m", Fraction(1, 10**3)))
+    for degree in ("K", "degC")
+}
+BENDING_UNITS: Mapping[str, Fraction] = {f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()}
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
-BASE_UNITS: Mapping[str, str] = {"length": "m", "angle": "rad", "ratio": "m/m"}
+BASE_UNITS: Mapping[str, str] = {
+    "length": "m",
+    "angle": "rad",
+    "ratio": "m/m",
+    "temperature difference": "K",
+    "thermal expansion": "m/m/K",
+    "angle per length": "rad/m",
+}
 # Kind of quantity → its units and an example for the messages.
 UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "length": LENGTH_UNITS,
     "angle": ANGLE_UNITS,
     "ratio": RATIO_UNITS,
+    "temperature difference": TEMPERATURE_UNITS,
+    "thermal expansion": EXPANSION_UNITS,
+    "angle per length": BENDING_UNITS,
 }
-EXAMPLES: Mapping[str, str] = {"length": "750 mm", "angle": "2 arcsec", "ratio": "5 ppm"}
+EXAMPLES: Mapping[str, str] = {
+    "length": "750 mm",
+    "angle": "2 arcsec",
+    "ratio": "5 ppm",
+    "temperature difference": "1.5 degC",
+    "thermal expansion": "11 um/m/degC",
+    "angle per length": "5 urad/m",
+}
 LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
@@ -139,6 +163,55 @@ def parse_angle(value: object) -> float:
     True
     """
     return _parse(value, "angle")
+
+
+def parse_positive_angle(value: object) -> float:
+    """Read an angle above zero and return it in radians.
+
+    :raises QuantityError: not a number with a unit of angle, or not above zero.
+    """
+    return _positive(value, parse_angle(value), "angle")
+
+
+def parse_temperature_difference(value: object) -> float:
+    """Read a difference of temperatures and return it in kelvins.
+
+    :raises QuantityError: not a number with K or degC.
+
+    >>> parse_temperature_difference("-1.5 degC")
+    -1.5
+    """
+    return _parse(value, "temperature difference")
+
+
+def parse_positive_temperature_difference(value: object) -> float:
+    """Read a difference of temperatures above zero and return it in kelvins.
+
+    :raises QuantityError: not a number with K or degC, or not above zero.
+    """
+    return _positive(value, parse_temperature_difference(value), "temperature difference")
+
+
+def parse_expansion(value: object) -> float:
+    """Read a coefficient of thermal expansion and return it in 1/K.
+
+    :raises QuantityError: not a number with um/m/K or the like.
+
+    >>> parse_expansion("11.5 um/m/degC")
+    1.15e-05
+    """
+    return _parse(value, "thermal expansion")
+
+
+def parse_bending(value: object) -> float:
+    """Read an angle that grows with a length and return it in radians per metre.
+
+    :raises QuantityError: not a number with urad/m or the like.
+
+    >>> parse_bending("5 urad/m")
+    5e-06
+    """
+    return _parse(value, "angle per length")
 
 
 def parse_ratio(value: object) -> float:
@@ -250,10 +323,12 @@ def _parse(value: object, kind: str) -> float:
     return metres_or_radians(number, units[plain], kind)
 
 
-def _positive(value: object, length: float) -> float:
-    if length > 0:
-        return length
-    remedy = "give a small one, such as 1 nm" if length == 0 else 'write for example "0.2 um"'
+def _positive(value: object, found: float, kind: str = "length") -> float:
+    if found > 0:
+        return found
+    small = {"length": "1 nm", "angle": "1 nrad", "temperature difference": "1 mK"}[kind]
+    example = "0.2 um" if kind == "length" else EXAMPLES[kind]
+    remedy = f"give a small one, such as {small}" if found == 0 else f'write for example "{example}"'
     raise QuantityError(f'"{value}" must be above zero; {remedy}')
 
 
@@ -279,4 +354,13 @@ def _schema(kind: str, *examples: str) -> WithJsonSchema:
 Length = Annotated[float, PlainValidator(parse_length), _schema("length", "750 mm", "0.2 um", "12.5 in")]
 PositiveLength = Annotated[float, PlainValidator(parse_positive_length), _schema("length", "750 mm", "0.2 um")]
 Angle = Annotated[float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")]
+PositiveAngle = Annotated[float, PlainValidator(parse_positive_angle), _schema("angle", "2 arcsec", "5 urad")]
+TemperatureDifference = Annotated[
+    float, PlainValidator(parse_temperature_difference), _schema("temperature difference", "1.5 degC", "-0.3 K")
+]
+PositiveTemperatureDifference = Annotated[
+    float, PlainValidator(parse_positive_temperature_difference), _schema("temperature difference", "0.5 degC")
+]
+Expansion = Annotated[float, PlainValidator(parse_expansion), _schema("thermal expansion", "11 um/m/degC")]
+Bending = Annotated[float, PlainValidator(parse_bending), _schema("angle per length", "5 urad/m")]
 Ratio = Annotated[float, PlainValidator(parse_ratio), _schema("ratio", "5 ppm", "0.1 %", "1.2 um/m")]

@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from .arrangement import AXES, Arrangement
+from .arrangement import Arrangement
 from .bases import Basis, Quoted
-from .kinematic import ROTATIONS, TRANSLATIONS, ErrorFunction, KinematicModel
+from .kinematic import ROTATIONS, TRANSLATIONS, KinematicModel, error_function
 from .protocol import Array
 
 Interpolation = Literal["linear", "cubic", "monotone"]
@@ -27,6 +27,11 @@ class Points:
 
     positions: tuple[float, ...]
     values: tuple[float, ...]
+
+    def curve(self, interpolation: Interpolation, lower: float, upper: float) -> Curve:
+        """The function of t that is 0 at `lower` and 1 at `upper`, both in metres."""
+        t = (np.array(self.positions) - lower) / (upper - lower)
+        return Curve(tuple(t.tolist()), self.values, interpolation)
 
 
 @dataclass(frozen=True)
@@ -82,10 +87,6 @@ def curves_model(
     """The machine with the given curves by ISO 230-1 name, each multiplied by a parameter; other functions are zero."""
     functions = []
     for name, points in curves.items():
-        kind, axis = name[1], AXES.index(name[2].lower())
-        t = (np.array(points.positions) - lower[axis]) / (upper[axis] - lower[axis])
-        rotation = kind in ROTATIONS
-        component = (ROTATIONS if rotation else TRANSLATIONS).index(kind)
-        basis = Curve(tuple(t.tolist()), points.values, interpolation)
-        functions.append(ErrorFunction(name, axis, component, rotation, basis))
+        axis = TRANSLATIONS.index(name[2])
+        functions.append(error_function(name, points.curve(interpolation, lower[axis], upper[axis])))
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)

@@ -60,7 +60,7 @@ class KinematicModel:
     """e(x, a, p) of a chain of axes; `full_rotations` multiplies rotation matrices out.
 
     `lower` and `upper` (3,) bound the volume in metres: the error functions depend on the position along
-    their axis scaled to [0, 1], and the chain starts from the lower corner.
+    their axis scaled to [0, 1], and the chain starts from `origin` (3,), by default the lower corner.
     """
 
     arrangement: Arrangement
@@ -68,6 +68,7 @@ class KinematicModel:
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     full_rotations: bool = False
+    origin: tuple[float, ...] | None = None
 
     @property
     def dimension(self) -> int:
@@ -116,10 +117,10 @@ class KinematicModel:
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         translation, rotation = self._motions(self._bases(x), a, len(x))
-        from_corner = x - np.asarray(self.lower)
+        from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
-            return _Chain(self.arrangement, from_corner, translation, rotation, p).error()
-        carried = carried_vectors(self.arrangement, from_corner, p)
+            return _Chain(self.arrangement, from_origin, translation, rotation, p).error()
+        carried = carried_vectors(self.arrangement, from_origin, p)
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
             moved = moved + sign * np.cross(rotation[:, axis], vector)
@@ -127,14 +128,14 @@ class KinematicModel:
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         bases = self._bases(x)
-        from_corner = x - np.asarray(self.lower)
+        from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
             translation, rotation = self._motions(bases, a, len(x))
             by_translation, by_rotation = _Chain(
-                self.arrangement, from_corner, translation, rotation, p
+                self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
-            by_translation, by_rotation = None, _cross_matrices(carried_vectors(self.arrangement, from_corner, p))
+            by_translation, by_rotation = None, _cross_matrices(carried_vectors(self.arrangement, from_origin, p))
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
         for f in self.functions:
             values, columns = bases[f.axis, f.basis], self.slices[f.name]
@@ -164,6 +165,19 @@ class KinematicModel:
             names += [f"{f.name} {name}" for name in q.names]
             units += ["rad" if f.rotation else "m"] * len(q.names)
         return Reported(tuple(names), tuple(units), matrix)
+
+
+def error_function(name: str, basis: Basis) -> ErrorFunction:
+    """One of the 18 functions by its ISO 230-1 name.
+
+    >>> from .bases import Polynomial
+    >>> found = error_function("ECX", Polynomial(3))
+    >>> found.axis, found.component, found.rotation
+    (0, 2, True)
+    """
+    rotation = name[1] in ROTATIONS
+    component = (ROTATIONS if rotation else TRANSLATIONS).index(name[1])
+    return ErrorFunction(name, TRANSLATIONS.index(name[2]), component, rotation, basis)
 
 
 def kinematic_model(
@@ -200,12 +214,11 @@ def kinematic_model_of(
     too.
     """
     functions = []
-    for letters, basis, is_rotation in ((TRANSLATIONS, position, False), (ROTATIONS, rotation, True)):
-        for axis, axis_name in enumerate(AXES):
-            for component, letter in enumerate(letters):
-                name = f"E{letter}{axis_name.upper()}"
-                own = basis.interior() if name in HELD_AT_FAR_END else basis
-                functions.append(ErrorFunction(name, axis, component, is_rotation, own))
+    for letters, basis in ((TRANSLATIONS, position), (ROTATIONS, rotation)):
+        for axis in TRANSLATIONS:
+            for letter in letters:
+                name = f"E{letter}{axis}"
+                functions.append(error_function(name, basis.interior() if name in HELD_AT_FAR_END else basis))
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
 
 

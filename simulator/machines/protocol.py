@@ -70,6 +70,14 @@ class ErrorModel(Protocol):
 
 
 @dataclass(frozen=True)
+class TrueMachine:
+    """An error model with its parameters `a` (n,)."""
+
+    model: ErrorModel
+    a: Array
+
+
+@dataclass(frozen=True)
 class Line:
     """Values of an error function along a line: `basis` (points, parameters of the function) times its parameters.
 

@@ -18,10 +18,11 @@ from .arrangement import ARRANGEMENTS, AXES, Arrangement
 from .bases import Basis, Ends, Monomial, Polynomial, Spline
 from .curves import Interpolation, Points, curves_model
 from .custom import custom_model
+from .description import MachineDescription, fitted_volumetric, true_volumetric
 from .empirical import FrameError, empirical_model
 from .kinematic import kinematic_model_of
 from .metric import MetricModel, Scale
-from .protocol import ErrorModel
+from .protocol import ErrorModel, TrueMachine
 from .terms import Radial, quadratic, sums, tensor
 
 Corner = tuple[float, ...]
@@ -270,6 +271,26 @@ class PythonSettings(Settings):
         self._folder = folder
 
 
+class MachineFileSettings(Settings):
+    """What a machine file states, as an error model to be estimated: its arrangement and errors, not their values."""
+
+    kind: Literal["machine"] = Field(description="the errors that a machine file states")
+    file: str = Field(description="Machine file (YAML), as for ballplate map.")
+    knots: int = Field(
+        default=3,
+        ge=0,
+        le=50,
+        description="Interior knots of the cubic splines that stand for errors given as tables, evenly spaced.",
+    )
+
+    # What the file says; filled in when the experiment is loaded.
+    _machine: MachineDescription | None = PrivateAttr(default=None)
+
+    def of(self, machine: MachineDescription) -> None:
+        """Take the machine that the file describes."""
+        self._machine = machine
+
+
 def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> ErrorModel:
     return kinematic_model_of(
         _arrangement(settings.arrangement),
@@ -299,11 +320,17 @@ def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorMode
     return custom_model(settings.object, settings.options, settings._folder, lower, upper)
 
 
+def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    assert settings._machine is not None
+    return fitted_volumetric(settings._machine, lower, upper, settings.knots)
+
+
 ERROR_MODELS: dict[type[Settings], tuple[int | None, Callable[[Any, Corner, Corner], ErrorModel]]] = {
     KinematicSettings: (3, _kinematic),
     EmpiricalSettings: (3, _empirical),
     MetricSettings: (2, _metric),
     PythonSettings: (None, _python),
+    MachineFileSettings: (3, _machine_file),
 }
 """Settings class of every error model, with its number of dimensions, None for any, and its builder."""
 
@@ -376,8 +403,28 @@ class CurvesSettings(Settings):
         )
 
 
+class TrueMachineFileSettings(Settings):
+    """The machine that a machine file describes."""
+
+    kind: Literal["machine"] = Field(description="the machine that a file describes")
+    file: str = Field(description="Machine file (YAML), as for ballplate map.")
+
+    # What the file says; filled in when the experiment is loaded.
+    _machine: MachineDescription | None = PrivateAttr(default=None)
+
+    def of(self, machine: MachineDescription) -> None:
+        """Take the machine that the file describes."""
+        self._machine = machine
+
+    def machine(self) -> TrueMachine:
+        """The systematic errors of the machine."""
+        assert self._machine is not None
+        return true_volumetric(self._machine)
+
+
 TrueMachineSettings = Annotated[
-    ZeroSettings | CoefficientSettings | RandomSettings | CurvesSettings, Field(discriminator="kind")
+    ZeroSettings | CoefficientSettings | RandomSettings | CurvesSettings | TrueMachineFileSettings,
+    Field(discriminator="kind"),
 ]
 
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import Settings, hint
-from .protocol import Array, ErrorModel, HasLines
-from .settings import CoefficientSettings, Corner, CurvesSettings, RandomSettings, ZeroSettings, build_error_model
+from .protocol import Array, ErrorModel, HasLines, TrueMachine
+from .settings import (
+    CoefficientSettings,
+    Corner,
+    CurvesSettings,
+    RandomSettings,
+    TrueMachineFileSettings,
+    ZeroSettings,
+    build_error_model,
+)
 
 _PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
@@ -20,14 +26,6 @@ class TruthError(ValueError):
     def __init__(self, problems: list[tuple[str, str]]) -> None:
         self.problems = tuple(problems)
         super().__init__("; ".join(f"{name}: {text}" for name, text in problems))
-
-
-@dataclass(frozen=True)
-class TrueMachine:
-    """An error model with its parameters `a` (n,)."""
-
-    model: ErrorModel
-    a: Array
 
 
 def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
@@ -46,6 +44,8 @@ def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: C
     if isinstance(settings, CurvesSettings):
         curves = settings.model(lower, upper)
         return TrueMachine(curves, np.ones(len(curves.parameters)))
+    if isinstance(settings, TrueMachineFileSettings):
+        return settings.machine()
     other = getattr(settings, "error_model", None)
     model = fitted if other is None else build_error_model(other, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))

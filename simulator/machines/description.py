@@ -1,0 +1,293 @@
+"""A machine as a file describes it, and the error functions at its reference point that follow.
+
+Source: Park, Burdekin and Peggs, sections 3 to 5 and Appendix A.2. A parametric error measured on some line differs
+from that on the line through the reference point by its axis's rotations, times what separates the two lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .arrangement import Arrangement
+from .bases import Basis, Polynomial, Quoted, Spline
+from .curves import Curve, Interpolation, Points
+from .kinematic import ROTATIONS, TRANSLATIONS, KinematicModel, carried_vectors, error_function
+from .protocol import Array, TrueMachine
+from .straightness import Criterion, reference_line
+from .volumetric import DROOP, Field, VolumetricModel, droop_field, squareness_field, thermal_field
+
+# Points at which a straightness error given as a polynomial is compared with a straight line.
+REDUCTION_POINTS = 101
+
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PowerSeries:
+    """A polynomial of t, constant first, in metres or radians."""
+
+    coefficients: tuple[float, ...]
+
+    def values(self, t: Array) -> Array:
+        """The polynomial at t (m,), as (m, 1).
+
+        >>> PowerSeries((1.0, 0.0, 2.0)).values(np.array([0.5]))
+        array([[1.5]])
+        """
+        return np.asarray(np.polynomial.polynomial.polyval(t, self.coefficients))[:, None]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A single function: a sum of multiples of others, less a straight line."""
+
+    parts: tuple[tuple[float, PowerSeries | Curve | Combination], ...]
+    intercept: float = 0.0
+    slope: float = 0.0
+
+    @property
+    def zero_at_one(self) -> bool:
+        return False
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def values(self, t: Array) -> Array:
+        """The function at t (m,), as (m, 1)."""
+        found = -self.intercept - self.slope * t[:, None]
+        for factor, part in self.parts:
+            found = found + factor * part.values(t)
+        return np.asarray(found)
+
+    def less(self, intercept: float, slope: float = 0.0) -> Combination:
+        """The function less another straight line."""
+        return Combination(self.parts, self.intercept + intercept, self.slope + slope)
+
+    def interior(self) -> Basis:
+        raise TypeError("a stated function is a single one")
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """The function as it is."""
+        return Quoted(("as stated",), np.eye(1))
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        raise TypeError("a stated function is a single one")
+
+
+@dataclass(frozen=True)
+class ParametricError:
+    """An error of an axis, as stated or measured.
+
+    `line` has the positions of the axes on the line of measurement, its own axis's without meaning, and `probe` the
+    offset of what was measured, a tip or a reflector, from the machine's own point that the scales tell; None for the
+    line through the reference point. `deviation` is the standard deviation of the random part, along the axis or at
+    points of it.
+    """
+
+    name: str
+    shape: PowerSeries | Points | None = None
+    line: Three | None = None
+    probe: Three = (0.0, 0.0, 0.0)
+    criterion: Criterion = "end points"
+    deviation: float | Points | None = None
+
+    @property
+    def axis(self) -> int:
+        return TRANSLATIONS.index(self.name[2])
+
+    @property
+    def is_rotation(self) -> bool:
+        return self.name[1] in ROTATIONS
+
+    @property
+    def is_straightness(self) -> bool:
+        return not self.is_rotation and self.name[1] != self.name[2]
+
+
+@dataclass(frozen=True)
+class Squareness:
+    """A squareness error by its ISO 230-1 name, and where the two lines cross on which it was measured."""
+
+    name: str
+    value: float
+    at: Three | None = None
+    deviation: float = 0.0
+
+
+@dataclass(frozen=True)
+class AxisTemperature:
+    """Expansion (1/K) of an axis whose temperature is off by `deviation` (K), known to `uncertainty` (K)."""
+
+    expansion: float
+    deviation: float
+    uncertainty: float = 0.0
+
+
+@dataclass(frozen=True)
+class MachineDescription:
+    """A machine's arrangement and errors, in metres and radians.
+
+    `arrangement_name` is one of the ten or "". `droop` has phi1 and phi2, in radians for each metre that the arm is
+    moved out; `probing` is the standard deviation of each co-ordinate that probing adds.
+    """
+
+    title: str
+    arrangement_name: str
+    arrangement: Arrangement
+    lower: Three
+    upper: Three
+    reference: Three
+    probe: Three = (0.0, 0.0, 0.0)
+    interpolation: Interpolation = "linear"
+    criterion: Criterion = "end points"
+    errors: tuple[ParametricError, ...] = ()
+    squareness: tuple[Squareness, ...] = ()
+    temperature: Mapping[str, AxisTemperature] = field(default_factory=dict)
+    droop: Mapping[str, float] = field(default_factory=dict)
+    probing: float = 0.0
+
+    def scaled(self, axis: int, position: Array | float) -> Array:
+        """Positions along an axis as fractions of it."""
+        return (np.asarray(position) - self.lower[axis]) / (self.upper[axis] - self.lower[axis])
+
+    @property
+    def arm_length(self) -> float:
+        """Length of the axis that is an arm, for machines that have one."""
+        axis = DROOP[self.arrangement_name][0]
+        return self.upper[axis] - self.lower[axis]
+
+
+def coupling(machine: MachineDescription, error: ParametricError) -> Array:
+    """What the three rotations of an error's axis add to it on its line of measurement, (3,) in metres per radian.
+
+    The rotation turns what the axis carries of the distance to the line through the reference point, and the probe.
+    Displacements along the axis itself count on both lines alike.
+    """
+    offset = np.zeros((1, 3))
+    if error.line is not None:
+        offset[0] = np.subtract(error.line, machine.reference)
+        offset[0, error.axis] = 0.0
+    sign, vector = carried_vectors(machine.arrangement, offset, np.array([error.probe]))[error.axis]
+    component = TRANSLATIONS.index(error.name[1])
+    return np.asarray(sign * np.cross(np.eye(3), vector)[:, component])
+
+
+def stated_function(machine: MachineDescription, error: ParametricError) -> PowerSeries | Curve | None:
+    """The error as the file has it, a function of the fraction of the axis."""
+    if isinstance(error.shape, Points):
+        return error.shape.curve(machine.interpolation, machine.lower[error.axis], machine.upper[error.axis])
+    return error.shape
+
+
+def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
+    """Errors on lines through the reference point, zero there, by ISO 230-1 name.
+
+    Rotations first, as displacements measured elsewhere need them; then straightness errors lose their straight line.
+    Where a rotation is not stated it counts as zero.
+    """
+    found: dict[str, Combination] = {}
+    for error in sorted(machine.errors, key=lambda one: not one.is_rotation):
+        shape = stated_function(machine, error)
+        if shape is None:
+            continue
+        parts: list[tuple[float, PowerSeries | Curve | Combination]] = [(1.0, shape)]
+        if not error.is_rotation:
+            for letter, factor in zip(ROTATIONS, coupling(machine, error), strict=True):
+                rotation = found.get(f"E{letter}{error.name[2]}")
+                if rotation is not None and factor:
+                    parts.append((-float(factor), rotation))
+        function = Combination(tuple(parts))
+        if error.is_straightness:
+            t = np.asarray(shape.t) if isinstance(shape, Curve) else np.linspace(0.0, 1.0, REDUCTION_POINTS)
+            function = function.less(*reference_line(t, function.values(t)[:, 0], error.criterion))
+        at_reference = machine.scaled(error.axis, machine.reference[error.axis])
+        found[error.name] = function.less(float(function.values(np.atleast_1d(at_reference))[0, 0]))
+    return found
+
+
+def true_volumetric(machine: MachineDescription) -> TrueMachine:
+    """The machine as an error model with its parameters: 1 for each function, and the numbers of the fields."""
+    functions = reference_functions(machine)
+    chain = _chain(machine, functions)
+    fields = [*_thermal(machine), *_droop(machine)]
+    values = [value for _, value in fields]
+    model = VolumetricModel(chain, tuple(one for one, _ in fields))
+    square = [(squareness_field(one.name), _at_reference(one, machine, model, values)) for one in machine.squareness]
+    every = [*square, *fields]
+    a = np.array([1.0] * len(chain.parameters) + [value for _, value in every])
+    return TrueMachine(VolumetricModel(chain, tuple(one for one, _ in every)), a)
+
+
+def _chain(machine: MachineDescription, functions: Mapping[str, Basis]) -> KinematicModel:
+    found = tuple(error_function(name, function) for name, function in functions.items())
+    return KinematicModel(machine.arrangement, found, machine.lower, machine.upper, origin=machine.reference)
+
+
+def _thermal(machine: MachineDescription) -> list[tuple[Field, float]]:
+    known = machine.temperature
+    return [(thermal_field("xyz".index(axis)), known[axis].expansion * known[axis].deviation) for axis in known]
+
+
+def _droop(machine: MachineDescription) -> list[tuple[Field, float]]:
+    if not machine.droop:
+        return []
+    length = machine.arm_length
+    return [
+        (droop_field(machine.arrangement_name, which, length), value * length) for which, value in machine.droop.items()
+    ]
+
+
+def _at_reference(one: Squareness, machine: MachineDescription, model: VolumetricModel, values: list[float]) -> float:
+    """The squareness error between lines through the reference point.
+
+    Rotations of the axes, and the droop, tilt the two lines of measurement: the angle alpha that is measured between
+    them shows as a sum of slopes -alpha, which is the sum at the reference point, -alpha*, plus the tilts. Displacements
+    tilt nothing, as straightness errors have lost their straight line.
+    """
+    if one.at is None:
+        return one.value
+    first, second = {"EC0Y": (0, 1), "EB0Z": (0, 2), "EA0Z": (1, 2)}[one.name]
+    sign = -1.0 if one.name == "EB0Z" else 1.0
+    a = np.array([float(f.rotation) for f in model.chain.functions] + values)
+    a[len(model.chain.functions) :] *= [not f.name.startswith("thermal") for f in model.fields]
+    tilt = 0.0
+    for along, across in ((first, second), (second, first)):
+        t = np.linspace(0.0, 1.0, REDUCTION_POINTS)
+        x = np.tile(np.asarray(one.at), (len(t), 1))
+        x[:, along] = machine.lower[along] + t * (machine.upper[along] - machine.lower[along])
+        tilted = model.error(x, a, np.zeros_like(x))[:, across]
+        tilt += reference_line(x[:, along], tilted, machine.criterion)[1]
+    return one.value + sign * tilt
+
+
+def fitted_volumetric(machine: MachineDescription, lower: Three, upper: Three, knots: int) -> VolumetricModel:
+    """The error model that estimates what the file states, in a volume from `lower` to `upper`; values are not used.
+
+    Polynomials have the stated numbers of coefficients, tables become cubic splines with so many interior `knots`,
+    evenly spaced. The frame is that of the equations: functions are zero at the lower corner, straightness errors at both
+    ends, so that what squareness errors are not stated are zero. Expansion is part of the positioning errors, and the
+    arm's bend phi2 of its straightness where that is stated; neither is a parameter then.
+    """
+    functions: dict[str, Basis] = {}
+    for error in machine.errors:
+        if error.shape is None:
+            continue
+        basis: Basis
+        if isinstance(error.shape, Points):
+            basis = Spline(4, tuple((np.arange(1, knots + 1) / (knots + 1)).tolist()))
+        else:
+            basis = Polynomial(len(error.shape.coefficients))
+        basis = basis.interior() if error.is_straightness else basis
+        if basis.size:
+            functions[error.name] = basis
+    found = tuple(error_function(name, basis) for name, basis in functions.items())
+    fields = [squareness_field(one.name) for one in machine.squareness]
+    for which in machine.droop:
+        axis, _, _ = DROOP[machine.arrangement_name]
+        if which == "phi1" or f"EZ{TRANSLATIONS[axis]}" not in functions:
+            fields.append(droop_field(machine.arrangement_name, which, upper[axis] - lower[axis]))
+    return VolumetricModel(KinematicModel(machine.arrangement, found, lower, upper), tuple(fields))

@@ -1,0 +1,162 @@
+"""Volumetric errors: the chain of axes with squareness, thermal expansion and the droop of an arm.
+
+Source: Park, Burdekin and Peggs, section 5.1 and Appendix A.1, which prints the sum for ten arrangements. The errors
+are those of the kinematic model; what comes in addition is linear in a few numbers, each times a polynomial of the
+position from the reference point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from .arrangement import AXES
+from .kinematic import KinematicModel, describe
+from .protocol import Array, Line, Parameter, Reported, Unit
+
+# Component, factor and exponents of x, y and z.
+Term = tuple[int, float, tuple[int, int, int]]
+
+
+@dataclass(frozen=True)
+class Field:
+    """An error that is one number times a polynomial of the position from the reference point."""
+
+    name: str
+    unit: Unit
+    meaning: str
+    terms: tuple[Term, ...]
+
+    def values(self, x: Array) -> Array:
+        """Displacement (m, 3) for each unit of the number, at positions x (m, 3) from the reference point."""
+        found = np.zeros(x.shape, x.dtype)
+        for component, factor, exponents in self.terms:
+            found[:, component] += factor * np.prod(x ** np.array(exponents), axis=1)
+        return found
+
+
+SQUARENESS: dict[str, tuple[Term, ...]] = {
+    "EC0Y": ((1, -1.0, (1, 0, 0)),),
+    "EB0Z": ((0, 1.0, (0, 0, 1)),),
+    "EA0Z": ((1, -1.0, (0, 0, 1)),),
+}
+"""Displacements by squareness errors: of Y to X about Z, of Z to X about Y, of Z to Y about X.
+
+In the document's symbols alpha = EC0Y, beta1 = -EB0Z and beta2 = EA0Z. Its equations hold the Y axis and let X turn
+by -alpha, where ISO 230-1 holds X: the same angle in frames that are turned to one another.
+"""
+
+# The arm's own axis, and the components in which the column's tilt and the arm's bend show, with the printed signs.
+DROOP: dict[str, tuple[int, tuple[int, float], tuple[int, float]]] = {
+    "MH1": (0, (0, 1.0), (2, -0.5)),
+    "MH2": (1, (1, 1.0), (2, 0.5)),
+}
+
+
+def squareness_field(name: str) -> Field:
+    """A squareness error by its ISO 230-1 name, in radians."""
+    return Field(name, "rad", f"squareness of {name[3]} to {'X' if name[1] in 'BC' else 'Y'}", SQUARENESS[name])
+
+
+def thermal_field(axis: int) -> Field:
+    """Expansion of an axis; its number is the coefficient times the deviation of the temperature."""
+    exponents = tuple(int(k == axis) for k in range(3))
+    return Field(f"thermal {AXES[axis]}", "1", f"thermal expansion along {AXES[axis]}", ((axis, 1.0, exponents),))  # type: ignore[arg-type]
+
+
+def droop_field(arrangement: str, which: str, length: float) -> Field:
+    """Droop of an arm; its number is phi1 or phi2 times `length`, the angle when the arm has moved so far.
+
+    As printed: MH1 has phi1 x z in X and -phi2 x^2 / 2 in Z, MH2 has phi1 y z in Y and +phi2 y^2 / 2 in Z. An arm
+    that sinks as it is driven out has phi1 > 0 in both, phi2 > 0 in MH1, but phi2 < 0 in MH2: the printed phi2 y is
+    a right-handed rotation about X, which lifts what is at +y.
+    """
+    axis, tilt, bend = DROOP[arrangement]
+    along = [int(k == axis) for k in range(3)]
+    if which == "phi1":
+        exponents = (along[0], along[1], 1)
+        return Field("phi1", "rad", "tilt of the column by the arm", ((tilt[0], tilt[1] / length, exponents),))
+    squared = (2 * along[0], 2 * along[1], 0)
+    return Field("phi2", "rad", "bend of the arm", ((bend[0], bend[1] / length, squared),))
+
+
+@dataclass(frozen=True)
+class VolumetricModel:
+    """e(x, a, p) of a chain of axes and of fields besides; a has the chain's parameters, then one for each field."""
+
+    chain: KinematicModel
+    fields: tuple[Field, ...]
+
+    @property
+    def dimension(self) -> int:
+        return 3
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        corners = np.array(list(product(*zip(self.chain.lower, self.chain.upper, strict=True))))
+        found = []
+        for field in self.fields:
+            effect = float(np.abs(field.values(self._from_origin(corners))).max())
+            found.append(Parameter(field.name, field.unit, field.name, field.meaning, effect))
+        return (*self.chain.parameters, *found)
+
+    def _from_origin(self, x: Array) -> Array:
+        return np.asarray(x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin))
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        n = len(self.chain.parameters)
+        found = self.chain.error(x, a[:n], p)
+        for field, value in zip(self.fields, a[n:], strict=True):
+            found = found + value * field.values(self._from_origin(x))
+        return np.asarray(found)
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        n = len(self.chain.parameters)
+        by_chain = self.chain.jacobian(x, a[:n], p)
+        by_fields = [field.values(self._from_origin(x))[:, :, None] for field in self.fields]
+        return np.concatenate([by_chain, *by_fields], axis=2)
+
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        """An axis's function along it, or a field's displacement along a diagonal of the volume."""
+        found = self.chain.lines(function, t)
+        for field in self.fields:
+            if field.name == function:
+                lower, upper = np.asarray(self.chain.lower), np.asarray(self.chain.upper)
+                values = field.values(self._from_origin(lower + t[:, None] * (upper - lower)))
+                found += (Line("along the diagonal", values.sum(axis=1, keepdims=True)),)
+        return found
+
+    def reported(self) -> Reported:
+        """Functions as the kinematic model reports them, and the fields' numbers as they are."""
+        chain = self.chain.reported()
+        rows, n = chain.matrix.shape
+        matrix = np.zeros((rows + len(self.fields), n + len(self.fields)))
+        matrix[:rows, :n] = chain.matrix
+        matrix[rows:, n:] = np.eye(len(self.fields))
+        names = (*chain.names, *(field.name for field in self.fields))
+        return Reported(names, (*chain.units, *(field.unit for field in self.fields)), matrix)
+
+
+def symbol(name: str) -> str:
+    """How Park, Burdekin and Peggs write an error that ISO 230-1 names.
+
+    >>> symbol("EXX"), symbol("EZY"), symbol("EBX"), symbol("EB0Z")
+    ('δx(x)', 'δz(y)', 'Ey(x)', '-β1')
+    """
+    if "0" in name:
+        return {"EC0Y": "α", "EB0Z": "-β1", "EA0Z": "β2"}[name]
+    if name[1] in "ABC":
+        return f"E{'xyz'['ABC'.index(name[1])]}({name[2].lower()})"
+    return f"δ{name[1].lower()}({name[2].lower()})"
+
+
+def meaning(name: str) -> str:
+    """Words for an error of an axis or a squareness error.
+
+    >>> meaning("EC0Y"), meaning("EXX")
+    ('squareness of Y to X', 'positioning error of X')
+    """
+    return squareness_field(name).meaning if "0" in name else describe(name)
