@@ -11,11 +11,21 @@ from ..design import pose_size
 from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.settings import CurvesSettings, PythonSettings, RandomSettings, build_error_model, dimension_of
+from ..machines.description import MachineDescription
+from ..machines.settings import (
+    CurvesSettings,
+    MachineFileSettings,
+    PythonSettings,
+    RandomSettings,
+    TrueMachineFileSettings,
+    build_error_model,
+    dimension_of,
+)
 from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing
 from .curves import read_curves
+from .machine_file import load_machine
 from .messages import ExperimentError, Steps
 from .model import Calibration, DistanceCalibration, Floats, Machine, Position, Volume
 from .problems import Problems, written_text
@@ -35,15 +45,22 @@ AXES = ("x", "y", "z")
 def check_error_model(sections: Sections, machine: Machine | None, references: References) -> None:
     """Report an error model for another number of dimensions than the volume has, or a user's own that is wrong."""
     settings = sections.get("error_model")
-    if settings is not None:
-        _check_model(settings, ("error_model",), machine, references)
+    if settings is not None and not _check_model(settings, ("error_model",), machine, references):
+        # What is wrong may stand in another file; nothing can be built of it.
+        del sections.values["error_model",]
 
 
-def _check_model(settings: Any, steps: Steps, machine: Machine | None, references: References) -> None:
+def _check_model(settings: Any, steps: Steps, machine: Machine | None, references: References) -> bool:
+    """Report what is wrong; tell whether the settings can be used further."""
+    if isinstance(settings, MachineFileSettings):
+        found = _machine_of_file(settings.file, steps, references)
+        if found is None:
+            return False
+        settings.of(found)
     if isinstance(settings, PythonSettings):
         settings.beside(references.folder)
         if machine is None:
-            return
+            return True
         try:
             build_error_model(settings, *_corners(machine))
         except CustomModelError as error:
@@ -54,6 +71,45 @@ def _check_model(settings: Any, steps: Steps, machine: Machine | None, reference
             f"{references.dimension}; change one of the two"
         )
         references.problems.add((*steps, "kind"), text)
+    elif (
+        isinstance(settings, MachineFileSettings)
+        and machine is not None
+        and not build_error_model(settings, *_corners(machine)).parameters
+    ):
+        text = f"{settings.file} states no error that could be estimated; give polynomials or tables"
+        references.problems.add((*steps, "file"), text)
+        return False
+    return True
+
+
+def _machine_of_file(file: str, steps: Steps, references: References) -> MachineDescription | None:
+    try:
+        return load_machine(references.folder / file)
+    except ExperimentError as error:
+        references.problems.take(error, (*steps, "file"))
+        return None
+
+
+def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | None, references: References) -> None:
+    """Let the true machine be that of its file, or report what is wrong with it."""
+    steps: Steps = ("true_machine", "file")
+    if references.dimension == 2:
+        text = 'kind "machine" has 3 dimensions, but machine.volume has 2; change one of the two'
+        references.problems.add(("true_machine", "kind"), text)
+    found = _machine_of_file(truth.file, ("true_machine",), references)
+    if found is None:
+        return
+    truth.of(found)
+    if machine is None or machine.dimension != 3:
+        return
+    for axis, name in enumerate(AXES):
+        low, high = machine.volume.lower[axis], machine.volume.upper[axis]
+        if low < found.lower[axis] - TOLERANCE or high > found.upper[axis] + TOLERANCE:
+            text = (
+                f"its volume goes from {format_length(found.lower[axis])} to {format_length(found.upper[axis])} in "
+                f"{name}, but machine.volume from {format_length(low)} to {format_length(high)}; stay within it"
+            )
+            references.problems.add(steps, text)
 
 
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
@@ -62,10 +118,13 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     if truth is None:
         return
     other = getattr(truth, "error_model", None)
-    if other is not None:
-        _check_model(other, ("true_machine", "error_model"), machine, references)
+    if other is not None and not _check_model(other, _TRUE_MODEL, machine, references):
+        return
     if isinstance(truth, CurvesSettings):
         _read_curves(truth, machine, references)
+        return
+    if isinstance(truth, TrueMachineFileSettings):
+        _true_machine_of_file(truth, machine, references)
         return
     problems = references.problems
     if isinstance(truth, RandomSettings) and truth.position is None and truth.rotation is None:

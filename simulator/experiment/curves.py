@@ -16,10 +16,13 @@ from .yamltree import Mark, read_text
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
+BANDWIDTH = "_bandwidth"
 
 
-def read_curves(path: Path) -> dict[str, Points]:
+def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
     """Read curves of one axis from a file whose first line names the columns, such as position_mm,EXX_um,EAX_urad.
+
+    With `bandwidths` columns such as EXX_bandwidth_um are curves too.
 
     :raises ExperimentError: everything that is wrong with the file at once.
     """
@@ -31,7 +34,8 @@ def read_curves(path: Path) -> dict[str, Points]:
     ]
     if not lines:
         raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")])
-    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1])
+    known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
+    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], known)
     messages: list[Message] = []
     rows: list[tuple[int, list[float]]] = []
     for number, line in lines[1:]:
@@ -66,7 +70,7 @@ def read_curves(path: Path) -> dict[str, Points]:
     }
 
 
-def _columns(mark: Mark, header: str) -> tuple[list[str], list[Fraction]]:
+def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str], list[Fraction]]:
     messages: list[Message] = []
     names: list[str] = []
     factors: list[Fraction] = []
@@ -75,9 +79,9 @@ def _columns(mark: Mark, header: str) -> tuple[list[str], list[Fraction]]:
         place = Mark(mark.file, mark.line, column)
         name, _, unit = cell.rpartition("_")
         unit = unit.replace("µ", "u").replace("μ", "u")
-        if name != POSITION and name not in NAMES:
-            known = cell in (POSITION, *NAMES)
-            remedy = f"write it with its unit, as in {EXAMPLE}" if known else hint(name or cell, [POSITION, *NAMES])
+        if name != POSITION and name not in errors:
+            known = cell in (POSITION, *errors)
+            remedy = f"write it with its unit, as in {EXAMPLE}" if known else hint(name or cell, [POSITION, *errors])
             problem = "has no unit" if known else "is no error of an axis"
             messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
             continue

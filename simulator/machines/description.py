@@ -37,7 +37,7 @@ class PowerSeries:
         >>> PowerSeries((1.0, 0.0, 2.0)).values(np.array([0.5]))
         array([[1.5]])
         """
-        return np.asarray(np.polynomial.polynomial.polyval(t, self.coefficients))[:, None]
+        return np.asarray(np.polynomial.polynomial.polyval(t, self.coefficients), float)[:, None]
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class MachineDescription:
 
     def scaled(self, axis: int, position: Array | float) -> Array:
         """Positions along an axis as fractions of it."""
-        return (np.asarray(position) - self.lower[axis]) / (self.upper[axis] - self.lower[axis])
+        return np.asarray((position - self.lower[axis]) / (self.upper[axis] - self.lower[axis]))
 
     @property
     def arm_length(self) -> float:
@@ -245,8 +245,8 @@ def _at_reference(one: Squareness, machine: MachineDescription, model: Volumetri
     """The squareness error between lines through the reference point.
 
     Rotations of the axes, and the droop, tilt the two lines of measurement: the angle alpha that is measured between
-    them shows as a sum of slopes -alpha, which is the sum at the reference point, -alpha*, plus the tilts. Displacements
-    tilt nothing, as straightness errors have lost their straight line.
+    them shows as a sum of slopes -alpha, which is the sum at the reference point, -alpha*, plus the tilts.
+    Displacements tilt nothing, as straightness errors have lost their straight line.
     """
     if one.at is None:
         return one.value
@@ -264,12 +264,14 @@ def _at_reference(one: Squareness, machine: MachineDescription, model: Volumetri
     return one.value + sign * tilt
 
 
-def fitted_volumetric(machine: MachineDescription, lower: Three, upper: Three, knots: int) -> VolumetricModel:
+def fitted_volumetric(
+    machine: MachineDescription, lower: tuple[float, ...], upper: tuple[float, ...], knots: int
+) -> VolumetricModel:
     """The error model that estimates what the file states, in a volume from `lower` to `upper`; values are not used.
 
     Polynomials have the stated numbers of coefficients, tables become cubic splines with so many interior `knots`,
-    evenly spaced. The frame is that of the equations: functions are zero at the lower corner, straightness errors at both
-    ends, so that what squareness errors are not stated are zero. Expansion is part of the positioning errors, and the
+    evenly spaced. The frame is that of the equations: functions are zero at the lower corner, straightness errors at
+    both ends; squareness errors that are not stated are zero. Expansion is part of the positioning errors, and the
     arm's bend phi2 of its straightness where that is stated; neither is a parameter then.
     """
     functions: dict[str, Basis] = {}

@@ -1,0 +1,146 @@
+"""Tables of one parametric error: positions and values, and in comments where and how it was measured."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+from ..machines.arrangement import AXES
+from ..machines.curves import Points
+from ..machines.description import Three
+from ..machines.straightness import Criterion
+from ..quantities import QuantityError, parse_length
+from ..settings import hint, listing, nearest, shorten
+from .curves import BANDWIDTH, read_curves
+from .messages import ExperimentError, Message
+from .yamltree import Mark, read_text
+
+COMMENT = re.compile(r"\s*#\s*([A-Za-z]+)\s*:\s*(.*?)\s*$")
+KEYS = ("line", "straightness", "probe")
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """A measured error: its points and bandwidth along the axis, and what the comments say.
+
+    `line` has the positions of other axes by their names.
+    """
+
+    points: Points
+    bandwidth: Points | None
+    line: dict[str, float]
+    probe: Three
+    criterion: Criterion | None
+
+
+class LineError(ValueError):
+    """A text is not a line along an axis."""
+
+
+def parse_line(text: str) -> dict[str, float]:
+    """Read a line along an axis, given by positions of other axes.
+
+    :raises LineError: written otherwise.
+
+    >>> parse_line("y = 600 mm, z = 0.2 m")
+    {'y': 0.6, 'z': 0.2}
+    """
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, value = (one.strip() for one in part.partition("="))
+        if not equals or name not in AXES:
+            raise LineError(f'"{shorten(part)}" is no position of an axis; write for example y = 600 mm, z = 200 mm')
+        if name in found:
+            raise LineError(f"{name} is given twice; leave one of them out")
+        try:
+            found[name] = parse_length(value)
+        except QuantityError as error:
+            raise LineError(f"{name}: {error}") from None
+    if len(found) > 2:
+        raise LineError("a line needs an axis along which it runs; leave that one out")
+    return found
+
+
+def read_error_table(path: Path, name: str) -> ErrorTable:
+    """Read the table of the error `name` from a CSV file such as position_mm,EYX_um,EYX_bandwidth_um.
+
+    :raises ExperimentError: everything that is wrong with the file at once.
+    """
+    messages: list[Message] = []
+    stated: dict[str, tuple[Mark, str]] = {}
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        match = COMMENT.match(line)
+        if match is None:
+            continue
+        key, mark = match[1], Mark(str(path), number, match.start(1) + 1)
+        if key not in KEYS:
+            # Any other comment is one.
+            if nearest(key, KEYS) is not None:
+                messages.append(mark.message("", f'unknown "{key}:"; {hint(key, KEYS)}'))
+        elif key in stated:
+            messages.append(mark.message("", f'"{key}:" stands already in line {stated[key][0].line}; remove one'))
+        else:
+            stated[key] = (Mark(str(path), number, match.start(2) + 1), match[2])
+    line_of, probe, criterion = _line(stated, name, messages), _probe(stated, messages), _criterion(stated, messages)
+    if criterion is not None and name[1] not in {"X", "Y", "Z"} - {name[2]}:
+        messages.append(stated["straightness"][0].message("", f"{name} is no straightness error; remove this line"))
+    curves: dict[str, Points] = {}
+    try:
+        curves = read_curves(path, bandwidths=True)
+    except ExperimentError as error:
+        messages += error.messages
+    others = [one for one in curves if one.removesuffix(BANDWIDTH) != name]
+    if curves and (others or name not in curves):
+        text = f"the file should have {name}" + (f" alone, but has {listing(others)}" if others else "")
+        messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
+    bandwidth = curves.get(name + BANDWIDTH)
+    if bandwidth is not None and min(bandwidth.values) < 0:
+        messages.append(Message(str(path), 0, 0, "", "a bandwidth is below zero; write half the width of the band"))
+    if messages:
+        raise ExperimentError(sorted(messages))
+    return ErrorTable(curves[name], bandwidth, line_of, probe, criterion)
+
+
+def _line(stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message]) -> dict[str, float]:
+    if "line" not in stated:
+        return {}
+    mark, text = stated["line"]
+    try:
+        found = parse_line(text)
+    except LineError as error:
+        messages.append(mark.message("", str(error)))
+        return {}
+    if name[2].lower() in found:
+        messages.append(mark.message("", f"the line runs along {name[2].lower()}; leave it out"))
+    return found
+
+
+def _probe(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> Three:
+    if "probe" not in stated:
+        return 0.0, 0.0, 0.0
+    mark, text = stated["probe"]
+    parts = text.strip("[]").split(",")
+    if len(parts) != 3:
+        messages.append(mark.message("", f"has {len(parts)} co-ordinates; give three, such as 0 mm, 0 mm, -100 mm"))
+        return 0.0, 0.0, 0.0
+    found = []
+    for part in parts:
+        try:
+            found.append(parse_length(part.strip()))
+        except QuantityError as error:
+            messages.append(mark.message("", str(error)))
+            found.append(0.0)
+    return found[0], found[1], found[2]
+
+
+def _criterion(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> Criterion | None:
+    if "straightness" not in stated:
+        return None
+    mark, text = stated["straightness"]
+    for known in get_args(Criterion):
+        if text == known:
+            return known
+    messages.append(mark.message("", f'unknown criterion "{shorten(text)}"; {hint(text, get_args(Criterion))}'))
+    return None

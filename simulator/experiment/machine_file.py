@@ -1,0 +1,242 @@
+"""Loads a machine file and the tables it names, or tells everything that is wrong with them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..machines.arrangement import ARRANGEMENTS, AXES, Arrangement
+from ..machines.curves import NAMES, Points
+from ..machines.description import (
+    AxisTemperature,
+    MachineDescription,
+    ParametricError,
+    PowerSeries,
+    Squareness,
+    Three,
+)
+from ..machines.volumetric import DROOP, SQUARENESS
+from ..quantities import format_length
+from ..settings import describe, listing
+from .error_tables import ErrorTable, read_error_table
+from .machine_sections import DescribedMachineSettings
+from .messages import ExperimentError, Steps
+from .problems import Problems
+from .wording import explain
+from .yamltree import Mapping, Scalar, read_tree, to_python, walk
+
+
+def load_machine(path: str | os.PathLike[str]) -> MachineDescription:
+    """Load a machine file. Tables that it names are read from the folder it is in.
+
+    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
+    """
+    source = Path(path)
+    refused: list[Any] = []
+    root = read_tree(source, refused)
+    problems = Problems(root)
+    if not isinstance(root, Mapping):
+        problems.add((), f"expected a mapping that begins with title: …, found {describe(to_python(root))}")
+    elif "positions" in root.items or "axes" in root.items and "base" in root.items:
+        text = "this is an experiment or a sweep; name a machine file, with arrangement, volume and errors"
+        problems.add((), text)
+    else:
+        for steps, node in walk(root):
+            if isinstance(node, Scalar) and node.value is None:
+                problems.add(steps, "empty; give a value, or leave it out")
+        found = _machine(root, source, problems)
+        if found is not None and not refused:
+            return found
+    made_up = {(one.file, one.line, one.column) for one in refused}
+    told = [one for one in problems.messages if (one.file, one.line, one.column) not in made_up]
+    raise ExperimentError(sorted({*told, *refused}, key=lambda one: (one.file != str(source), one)))
+
+
+def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescription | None:
+    try:
+        settings = _adapter().validate_python(to_python(root))
+    except ValidationError as error:
+        for one in explain(error.errors(include_url=False), root, _json_schema()):
+            problems.add(one.steps, one.text, one.of_key)
+        # Tables are told about as well, where the keys that name them can be read.
+        _read_tables(root, source, problems)
+        return None
+    machine = _bare(settings, problems)
+    if machine is None:
+        _read_tables(root, source, problems)
+        return None
+    errors = tuple(_errors(settings, machine, source, problems))
+    squareness = []
+    for name in SQUARENESS:
+        stated = getattr(settings.squareness, name, None)
+        if isinstance(stated, float):
+            squareness.append(Squareness(name, stated))
+        elif stated is not None:
+            _inside(stated.at, machine, ("squareness", name, "at"), problems)
+            squareness.append(Squareness(name, stated.value, stated.at, (stated.bandwidth or 0.0) / stated.sigmas))
+    return None if problems.messages else replace(machine, errors=errors, squareness=tuple(squareness))
+
+
+def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDescription | None:
+    """The machine without its errors."""
+    volume = settings.volume
+    if isinstance(volume, tuple):
+        ends = [(0.0, edge) for edge in volume]
+    else:
+        if volume.z is None:
+            problems.add(("volume", "z"), "missing; a machine file has three axes")
+            return None
+        ends = [volume.x, volume.y, volume.z]
+    for axis, (lower, upper) in zip(AXES, ends, strict=True):
+        if upper <= lower:
+            text = f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)}; exchange them"
+            problems.add(("volume", axis), text)
+    name = settings.arrangement if isinstance(settings.arrangement, str) else ""
+    stated = settings.arrangement
+    if isinstance(stated, str):
+        arrangement = ARRANGEMENTS[stated]
+    else:
+        arrangement = Arrangement(stated.probe_side, stated.workpiece_side)
+    droop = {which: value for which in ("phi1", "phi2") if (value := getattr(settings.droop, which, None)) is not None}
+    if droop and name not in DROOP:
+        text = f"only the arm of {listing(DROOP)} droops; leave it out, or name one of them as arrangement"
+        problems.add(("droop",), text, of_key=True)
+    if problems.messages:
+        return None
+    bottom, top = (_three(end) for end in zip(*ends, strict=True))
+    temperature = {
+        axis: AxisTemperature(one.expansion, one.deviation, one.standard_uncertainty or 0.0)
+        for axis in AXES
+        if (one := getattr(settings.temperature, axis, None)) is not None
+    }
+    machine = MachineDescription(
+        title=settings.title,
+        arrangement_name=name,
+        arrangement=arrangement,
+        lower=bottom,
+        upper=top,
+        reference=bottom if settings.reference_point is None else settings.reference_point,
+        probe=settings.probe or (0.0, 0.0, 0.0),
+        interpolation=settings.interpolation,
+        criterion=settings.straightness,
+        temperature=temperature,
+        droop=droop,
+        probing=settings.probing or 0.0,
+    )
+    _inside(settings.reference_point, machine, ("reference_point",), problems)
+    return machine
+
+
+def _three(values: Iterable[float]) -> Three:
+    x, y, z = values
+    return x, y, z
+
+
+def _errors(
+    settings: DescribedMachineSettings, machine: MachineDescription, source: Path, problems: Problems
+) -> Iterable[ParametricError]:
+    for name in NAMES:
+        one = getattr(settings.errors, name, None)
+        if one is None:
+            continue
+        steps: Steps = ("errors", name)
+        random = None if one.bandwidth is None else one.bandwidth / one.sigmas
+        error = ParametricError(name, criterion=machine.criterion, deviation=random)
+        if one.polynomial is not None:
+            line = _line(one.line, machine, error.axis, (*steps, "line"), problems)
+            criterion = getattr(one, "straightness", None) or machine.criterion
+            shape = PowerSeries(one.polynomial)
+            probe = one.probe or (0.0, 0.0, 0.0)
+            yield replace(error, shape=shape, line=line, probe=probe, criterion=criterion)
+        elif one.file is not None:
+            table = _table(source.parent / one.file, name, (*steps, "file"), problems)
+            if table is None:
+                continue
+            _check_range(table.points, machine, error.axis, (*steps, "file"), problems)
+            line = _complete(table.line, machine, error.axis)
+            _inside(line, machine, (*steps, "file"), problems)
+            if table.bandwidth is not None:
+                if random is not None:
+                    problems.add((*steps, "bandwidth"), "the file has a bandwidth as well; leave one of the two out")
+                deviations = tuple(value / one.sigmas for value in table.bandwidth.values)
+                error = replace(error, deviation=Points(table.bandwidth.positions, deviations))
+            criterion = table.criterion or machine.criterion
+            yield replace(error, shape=table.points, line=line, probe=table.probe, criterion=criterion)
+        else:
+            yield error
+
+
+def _table(path: Path, name: str, steps: Steps, problems: Problems) -> ErrorTable | None:
+    try:
+        return read_error_table(path, name)
+    except ExperimentError as error:
+        problems.take(error, steps)
+        return None
+
+
+def _read_tables(root: Mapping, source: Path, problems: Problems) -> None:
+    """Say what is wrong with the tables of a file that is wrong itself."""
+    errors = root.items.get("errors")
+    for name, node in errors.items.items() if isinstance(errors, Mapping) else ():
+        file = node.items.get("file") if isinstance(node, Mapping) else None
+        if name in NAMES and isinstance(file, Scalar) and isinstance(file.value, str):
+            _table(source.parent / file.value, name, ("errors", name, "file"), problems)
+
+
+def _line(settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> Three | None:
+    if settings is None:
+        return None
+    stated = {key: value for key in AXES if (value := getattr(settings, key)) is not None}
+    if AXES[axis] in stated:
+        problems.add((*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True)
+        return None
+    line = _complete(stated, machine, axis)
+    _inside(line, machine, steps, problems)
+    return line
+
+
+def _complete(stated: dict[str, float], machine: MachineDescription, axis: int) -> Three | None:
+    """Positions of all axes, those not stated being the reference point's."""
+    if not stated:
+        return None
+    x, y, z = (
+        stated.get(key, machine.reference[k]) if k != axis else machine.reference[k] for k, key in enumerate(AXES)
+    )
+    return x, y, z
+
+
+def _inside(point: Three | None, machine: MachineDescription, steps: Steps, problems: Problems) -> None:
+    for k, value in enumerate(point or ()):
+        if not machine.lower[k] <= value <= machine.upper[k]:
+            text = (
+                f"{AXES[k]} = {format_length(value)} is outside the volume, which goes from "
+                f"{format_length(machine.lower[k])} to {format_length(machine.upper[k])}; correct one of the two"
+            )
+            problems.add(steps, text)
+
+
+def _check_range(points: Points, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:
+    lower, upper = machine.lower[axis], machine.upper[axis]
+    covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
+    if covered < 0.5 * (upper - lower):
+        text = (
+            f"goes from {format_length(points.positions[0])} to {format_length(points.positions[-1])}, but the volume "
+            f"from {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most of it"
+        )
+        problems.add(steps, text)
+
+
+@cache
+def _adapter() -> TypeAdapter[DescribedMachineSettings]:
+    return TypeAdapter(DescribedMachineSettings)
+
+
+@cache
+def _json_schema() -> dict[str, Any]:
+    return _adapter().json_schema()

@@ -1,0 +1,190 @@
+"""The keys of a machine file: forms, units and ranges."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, Tag, create_model, model_validator
+
+from ..machines.curves import NAMES, Interpolation
+from ..machines.kinematic import ROTATIONS, describe
+from ..machines.settings import ARRANGEMENT, ArrangementName, ArrangementSettings
+from ..machines.straightness import Criterion
+from ..machines.volumetric import SQUARENESS, meaning
+from ..quantities import (
+    Angle,
+    Bending,
+    Expansion,
+    Length,
+    PositiveAngle,
+    PositiveLength,
+    PositiveTemperatureDifference,
+    TemperatureDifference,
+)
+from ..settings import FORM, Settings
+from .sections import Edges, Line, Text, VolumeSettings
+
+# Polynomials go to the tenth order.
+MOST_COEFFICIENTS = 11
+
+Point = tuple[Length, Length, Length]
+Sigmas = Annotated[Literal[1, 2, 3], Field()]
+BANDWIDTH = "random part, as so many standard deviations on either side as sigmas says, the same along the axis"
+SIGMAS = "standard deviations in a bandwidth: 1, 2 or 3"
+POLYNOMIAL = "coefficients of 1, t, t^2, … with t from 0 to 1 along the axis, to the tenth order"
+FILE = "CSV file with columns such as position_mm,EXX_um, whose comments may say # line, # straightness and # probe"
+LINE = "where it was measured, as positions of the other axes; default: through the reference point"
+PROBE = "offset of the reflector or tip from the reference point of the probe while it was measured; default 0"
+STRAIGHTNESS = "line that a straightness error is told from: end points, least squares or minimum zone"
+
+
+class LineSettings(Settings):
+    """A line along an axis, by the positions of the two other axes."""
+
+    x: Length | None = Field(None, description="position of the x axis")
+    y: Length | None = Field(None, description="position of the y axis")
+    z: Length | None = Field(None, description="position of the z axis")
+
+
+class _ErrorSettings(Settings):
+    file: Text | None = Field(None, description=FILE)
+    sigmas: Sigmas = Field(2, description=SIGMAS)
+    line: LineSettings | None = Field(None, description=LINE)
+    probe: Point | None = Field(None, description=PROBE)
+
+    @model_validator(mode="after")
+    def _what_belongs_together(self) -> Self:
+        polynomial, bandwidth = getattr(self, "polynomial", None), getattr(self, "bandwidth", None)
+        if polynomial is not None and self.file is not None:
+            raise ValueError("a polynomial and a file cannot both be the error; leave one of them out")
+        if polynomial is None and self.file is None and bandwidth is None:
+            raise ValueError("nothing is stated; give a polynomial, a file, or the bandwidth of a random error")
+        for key in ("line", "probe", "straightness"):
+            if key in self.model_fields_set and polynomial is None:
+                where = f"write # {key}: … into the file" if self.file else "remove it, or give a polynomial"
+                raise ValueError(f'"{key}" has no meaning here; {where}')
+        return self
+
+
+class PositioningSettings(_ErrorSettings):
+    """A positioning error of an axis."""
+
+    polynomial: Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_COEFFICIENTS)] | None = Field(
+        None, description=POLYNOMIAL
+    )
+    bandwidth: PositiveLength | None = Field(None, description=BANDWIDTH)
+
+
+class StraightnessSettings(PositioningSettings):
+    """A straightness error of an axis."""
+
+    straightness: Criterion | None = Field(None, description=f"{STRAIGHTNESS}; default: that of the machine")
+
+
+class RotationSettings(_ErrorSettings):
+    """A rotational error of an axis."""
+
+    polynomial: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=MOST_COEFFICIENTS)] | None = Field(
+        None, description=POLYNOMIAL
+    )
+    bandwidth: PositiveAngle | None = Field(None, description=BANDWIDTH)
+
+
+def _form_of(name: str) -> type[_ErrorSettings]:
+    if name[1] in ROTATIONS:
+        return RotationSettings
+    return PositioningSettings if name[1] == name[2] else StraightnessSettings
+
+
+ErrorsSettings = create_model(
+    "ErrorsSettings",
+    __base__=Settings,
+    __doc__="Errors of the axes by their ISO 230-1 names; those left out are zero.",
+    **{name: (_form_of(name) | None, Field(None, description=describe(name))) for name in NAMES},  # type: ignore[call-overload]
+)
+
+
+class SquarenessValue(Settings):
+    """A squareness error with its random part, or measured elsewhere."""
+
+    value: Angle = Field(description="right-handed rotation of the second axis to the first, from a right angle")
+    at: Point | None = Field(
+        None,
+        description="where the two lines cross on which it was measured; default: the reference point",
+    )
+    bandwidth: PositiveAngle | None = Field(None, description="random part, the same wherever the machine is")
+    sigmas: Sigmas = Field(2, description=SIGMAS)
+
+
+_Squareness = Annotated[
+    Annotated[Angle, Tag("<one>")] | Annotated[SquarenessValue, Tag("<mapping>")] | Annotated[Angle, Tag("<list>")],
+    FORM,
+]
+SquarenessSettings = create_model(
+    "SquarenessSettings",
+    __base__=Settings,
+    __doc__="Squareness errors by their ISO 230-1 names; those left out are zero.",
+    **{name: (_Squareness | None, Field(None, description=meaning(name))) for name in SQUARENESS},  # type: ignore[call-overload]
+)
+
+
+class AxisTemperatureSettings(Settings):
+    """Temperature of an axis's scale and what it does."""
+
+    deviation: TemperatureDifference = Field(description="temperature less the reference temperature of 20 degC")
+    expansion: Expansion = Field(description="coefficient of thermal expansion")
+    standard_uncertainty: PositiveTemperatureDifference | None = Field(
+        None, description="standard uncertainty of the deviation; part of the random error"
+    )
+
+
+class TemperatureSettings(Settings):
+    """Temperatures of the axes; those left out are at the reference temperature."""
+
+    x: AxisTemperatureSettings | None = Field(None, description="x axis")
+    y: AxisTemperatureSettings | None = Field(None, description="y axis")
+    z: AxisTemperatureSettings | None = Field(None, description="z axis")
+
+
+class DroopSettings(Settings):
+    """Droop of a horizontal arm, for each metre that it is moved out."""
+
+    phi1: Bending | None = Field(None, description="tilt of the column: phi1 x z in X (MH1), phi1 y z in Y (MH2)")
+    phi2: Bending | None = Field(None, description="bend of the arm: -phi2 x^2/2 (MH1), +phi2 y^2/2 (MH2), in Z")
+
+
+class DescribedMachineSettings(Settings):
+    """A machine and its parametric errors, for ballplate map and for kind: machine in experiments."""
+
+    title: Line = Field(description="what the machine is, in a line")
+    description: Text | None = Field(None, description="what else is worth knowing")
+    arrangement: ArrangementName | ArrangementSettings = Field(description=ARRANGEMENT)
+    volume: Annotated[
+        Annotated[VolumeSettings, Tag("<mapping>")]
+        | Annotated[Annotated[Edges, Field(min_length=3)], Tag("<list>")]
+        | Annotated[VolumeSettings, Tag("<one>")],
+        FORM,
+    ] = Field(description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]")
+    reference_point: Point | None = Field(
+        None, description="where all errors are zero and lines of reference cross; default: the lower corner"
+    )
+    probe: Point | None = Field(None, description="offset of the tip from the reference point of the probe; default 0")
+    interpolation: Interpolation = Field(
+        "linear", description="between the points of tables: linear, cubic splines, or monotone cubics"
+    )
+    straightness: Criterion = Field("end points", description=STRAIGHTNESS)
+    errors: ErrorsSettings | None = Field(None, description="errors of the axes by ISO 230-1 name")  # type: ignore[valid-type]
+    squareness: SquarenessSettings | None = Field(None, description="squareness errors by ISO 230-1 name")  # type: ignore[valid-type]
+    temperature: TemperatureSettings | None = Field(None, description="temperatures of the axes")
+    droop: DroopSettings | None = Field(None, description="droop of the arm, for MH1 and MH2")
+    probing: PositiveLength | None = Field(
+        None, description="standard deviation that probing adds to each co-ordinate; default 0"
+    )
+
+
+def machine_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a machine file."""
+    from .schema import DRAFT, tidied
+
+    found: dict[str, Any] = tidied(DescribedMachineSettings.model_json_schema())
+    return {"$schema": DRAFT, **found, "title": "ballplate machine"}
