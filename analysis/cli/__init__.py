@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from . import check, compare, export, fit, init, report, reproduce, run, schema, simulate, spline, sweep
+from . import check, compare, export, fit, init, map, report, reproduce, run, schema, simulate, spline, sweep
 
 AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE = 0, 1, 2, 3
 
@@ -21,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (check, run, simulate, fit, compare, sweep, export, report, spline, reproduce, schema, init):
+    for module in (check, run, simulate, fit, compare, map, sweep, export, report, spline, reproduce, schema, init):
         module.add_parser(commands)
     return top
 

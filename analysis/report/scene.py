@@ -52,8 +52,8 @@ class Scene:
 
 def scene(design: Design) -> Scene:
     """The scene of a design; one in two dimensions is seen from above."""
-    view, towards = _view(design.dimension)
-    edges, hidden = _box(design.lower, design.upper, towards)
+    view, towards = projection(design.dimension)
+    edges, hidden = box_edges(design.lower, design.upper, towards)
     where = locations(design, nominal_state(design), design.readings)
     places = []
     for k, name in enumerate(design.position_names):
@@ -85,7 +85,7 @@ def scene(design: Design) -> Scene:
     return Scene(edges @ view.T, hidden, tuple(places), _axes(design, view), tips)
 
 
-def _view(dimension: int) -> tuple[Array, Array]:
+def projection(dimension: int) -> tuple[Array, Array]:
     """Projection (2, d) on the paper, and the direction (d,) away from the eye."""
     if dimension == 2:
         return np.eye(2), np.zeros(2)
@@ -96,7 +96,7 @@ def _view(dimension: int) -> tuple[Array, Array]:
     return np.stack([right, up]), away
 
 
-def _box(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[np.bool_]]:
+def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Edges of the volume, and which are behind it."""
     d = len(lower)
     corners = np.array(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij")).reshape(d, -1).T

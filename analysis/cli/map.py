@@ -1,0 +1,174 @@
+"""`ballplate map`: volumetric errors of a machine that a file describes."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .common import count, draw, picture, print_json, print_lines
+
+if TYPE_CHECKING:
+    from ..volumetric import AlongAxis, Volumetric
+
+WRONG_USAGE, BAD_FILE = 2, 3
+
+# As ballplate.volumetric has it, which loads too much for --help.
+MOST_POINTS = 200_000
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser: ArgumentParser = commands.add_parser(
+        "map",
+        help="volumetric errors of a machine, from its parametric errors",
+        description="Combine the parametric errors of a machine file to volumetric errors, systematic and random: on a "
+        "grid with the length errors of the four body diagonals, along a line parallel to an axis, or one parametric "
+        "error along its axis. Errors are where the tip is, less where the scales say; the error of indication has the "
+        "opposite sign.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path, help="machine file (YAML)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--grid", metavar="N,N,N", type=_grid, default=(5, 5, 5), help="points along x, y and z; default 5,5,5"
+    )
+    where.add_argument(
+        "--line", metavar="LINE", type=_line, help='errors along a line instead, such as "y = 600 mm, z = 600 mm"'
+    )
+    where.add_argument("--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX")
+    parser.add_argument(
+        "--points", metavar="N", type=_points, help="points along the line, at least 2; default 21", default=21
+    )
+    parser.add_argument(
+        "--plot", metavar="FILE", type=picture, help="draw it as well, in three dimensions or along the line or axis"
+    )
+    parser.add_argument(
+        "--magnification", metavar="N", type=count, help="of errors in the drawing of the grid; default: as fits"
+    )
+    parser.add_argument(
+        "--format", choices=("text", "csv", "json"), default="text", help="csv: the points alone; json: metres, radians"
+    )
+    parser.add_argument("--json", action="store_const", dest="format", const="json", help="the same as --format json")
+    parser.set_defaults(run=run)
+
+
+def _grid(text: str) -> tuple[int, int, int]:
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) == 3 and all(part.isascii() and part.isdigit() and len(part) < 8 for part in parts):
+        x, y, z = (int(part) for part in parts)
+        if min(x, y, z) >= 2:
+            if x * y * z > MOST_POINTS:
+                raise ArgumentTypeError(f"{x * y * z} points are too many; at most {MOST_POINTS} are possible")
+            return x, y, z
+    raise ArgumentTypeError(f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"')
+
+
+def _points(text: str) -> int:
+    found = count(text)
+    if not 2 <= found <= MOST_POINTS:
+        raise ArgumentTypeError(f"a line has 2 to {MOST_POINTS} points, not {found}")
+    return found
+
+
+def _line(text: str) -> dict[str, float]:
+    from simulator.experiment.error_tables import LineError, parse_line
+
+    try:
+        found = parse_line(text)
+    except LineError as error:
+        raise ArgumentTypeError(str(error)) from None
+    if len(found) != 2:
+        raise ArgumentTypeError("two axes stand still on a line; write for example y = 600 mm, z = 600 mm")
+    return found
+
+
+def run(options: Namespace) -> int:
+    """Print, and draw, what was asked for."""
+    from simulator.experiment.machine_file import load_machine
+
+    from ..volumetric import Volumetric, along_axes
+
+    machine = load_machine(options.file)
+    if options.magnification is not None and (options.line is not None or options.error is not None):
+        print("ballplate map: --magnification is for the drawing of the grid; leave it out", file=sys.stderr)
+        return WRONG_USAGE
+    if options.error is not None:
+        from simulator.settings import hint
+
+        every = {one.error.name: one for one in along_axes(machine)}
+        if options.error not in every:
+            told = f'{options.file} states no error "{options.error}"; {hint(options.error, every)}'
+            print(f"ballplate map: {told}", file=sys.stderr)
+            return WRONG_USAGE
+        return _of_one(every[options.error], options)
+    if options.line is not None:
+        outside = [
+            name
+            for name, value in options.line.items()
+            if not machine.lower["xyz".index(name)] <= value <= machine.upper["xyz".index(name)]
+        ]
+        if outside:
+            print(f"ballplate map: the line is outside the volume in {' and '.join(outside)}", file=sys.stderr)
+            return WRONG_USAGE
+        return _on_a_line(Volumetric(machine), options)
+    return _on_a_grid(Volumetric(machine), options)
+
+
+def _of_one(found: AlongAxis, options: Namespace) -> int:
+    from ..report.volumetric import draw_along
+    from ..volumetric_tables import along_csv, along_data, along_lines
+
+    if options.format == "json":
+        print_json([along_data(found)])
+    else:
+        print_lines(along_lines(found) if options.format == "text" else list(along_csv(found)))
+    return _drawn(options, lambda path: draw_along(found, path))
+
+
+def _on_a_line(machine: Volumetric, options: Namespace) -> int:
+    from ..report.volumetric import draw_line
+    from ..volumetric_tables import error_csv, error_data, error_lines, machine_data
+
+    axis = next(k for k, name in enumerate("xyz") if name not in options.line)
+    found = machine.errors(machine.along(axis, options.line, options.points))
+    if options.format == "json":
+        print_json([{**machine_data(machine.machine), "line": error_data(found)}])
+    elif options.format == "csv":
+        print_lines(list(error_csv(found)))
+    else:
+        print_lines(error_lines(found))
+    return _drawn(options, lambda path: draw_line(found, axis, path))
+
+
+def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
+    from ..report.volumetric import draw_grid
+    from ..volumetric_tables import (
+        RANDOM,
+        diagonal_data,
+        diagonal_lines,
+        error_csv,
+        error_data,
+        error_lines,
+        machine_data,
+        machine_lines,
+    )
+
+    found = machine.errors(machine.grid(options.grid))
+    diagonals = machine.diagonals()
+    if options.format == "json":
+        data = {**machine_data(machine.machine), "diagonals": diagonal_data(diagonals), "grid": error_data(found)}
+        print_json([data])
+    elif options.format == "csv":
+        print_lines(list(error_csv(found)))
+    else:
+        print_lines([*machine_lines(machine.machine), RANDOM, "", *diagonal_lines(diagonals), "", *error_lines(found)])
+    return _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
+
+
+def _drawn(options: Namespace, draw_to) -> int:  # type: ignore[no-untyped-def]
+    if options.plot is None:
+        return 0
+    if options.plot.resolve() == options.file.resolve():
+        print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
+        return WRONG_USAGE
+    return 0 if draw(draw_to, options.plot) else BAD_FILE

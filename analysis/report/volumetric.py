@@ -1,0 +1,183 @@
+"""Drawings of volumetric errors: a displaced grid, errors along a line, and a parametric error along its axis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.machines.protocol import Array
+from simulator.machines.volumetric import meaning, symbol
+
+from ..tables import SHOWN, number
+from ..volumetric import AlongAxis, LengthErrors, VolumetricErrors
+from .scene import box_edges, projection
+from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, blank_axes, drawing, micro, placed_axes, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 30.0
+
+# Part of the volume's diagonal that the largest displacement is drawn as, about.
+LARGEST = 0.06
+
+# Points beyond which they are not marked one by one.
+MOST_MARKS = 60
+
+
+def magnification_of(found: VolumetricErrors) -> int:
+    """A round factor that makes the largest error well visible in the volume."""
+    size = float(np.linalg.norm(np.ptp(found.points, axis=0)))
+    largest = float(found.resultant.max())
+    if largest == 0.0:
+        return 1
+    wanted = LARGEST * size / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return max(int(max(step * power for step in (1, 2, 5) if step * power <= wanted)), 1)
+
+
+def draw_grid(
+    found: VolumetricErrors,
+    diagonals: LengthErrors,
+    counts: tuple[int, int, int],
+    magnification: int | None,
+    path: Path,
+) -> None:
+    """Write a picture of the grid's outside, nominal and displaced.
+
+    :raises OSError: the file cannot be written.
+    """
+    factor = magnification or magnification_of(found)
+    view, away = projection(3)
+    nominal = found.points.reshape(*counts, 3)
+    moved = nominal + factor * found.systematic.reshape(*counts, 3)
+    with drawing(430.0, WIDTH) as figure:
+        axes = blank_axes(figure)
+        edges, hidden = box_edges(nominal[0, 0, 0], nominal[-1, -1, -1], away)
+        for edge, is_hidden in zip(edges, hidden, strict=True):
+            axes.plot(*(edge @ view.T).T, color=MUTED, linewidth=0.9, linestyle=":" if is_hidden else "-")
+        for axis in range(3):
+            near = -1 if away[axis] < 0 else 0
+            for side, is_near in ((near, True), (-1 - near, False)):
+                # The front faces with all their lines, the rear ones by their edges, so that the front stays readable.
+                _face(axes, nominal.take(side, axis) @ view.T, MUTED, 0.5, is_near)
+                _face(axes, moved.take(side, axis) @ view.T, SERIES[0], 1.1, is_near)
+        size = float(np.ptp(edges @ view.T, axis=(0, 1)).max())
+        drawn = np.concatenate([edges.reshape(-1, 3), moved.reshape(-1, 3)]) @ view.T
+        low, high = drawn.min(axis=0), drawn.max(axis=0)
+        _axis_names(axes, nominal, view, size)
+        axes.plot([], [], color=MUTED, linewidth=0.9, label="nominal grid")
+        axes.plot([], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor} times")
+        axes.legend(loc="upper left", borderaxespad=0.8)
+        told = [f"diagonal {k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)]
+        figure.text(0.5, 0.025, "length errors of " + ", ".join(told), ha="center", fontsize=8.5)
+        axes.set_xlim(low[0] - 0.08 * size, high[0] + 0.08 * size)
+        axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
+        save(figure, path, f"Volumetric errors, magnified {factor} times: " + ", ".join(told))
+
+
+def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
+    """Lines of a face (n, m, 2) of the grid."""
+    for lines in (face, face.transpose(1, 0, 2)):
+        chosen = lines if is_near else lines[[0, -1]]
+        for line in chosen:
+            axes.plot(*line.T, color=colour, linewidth=width, linestyle="-" if is_near else ":")
+
+
+def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
+    """Names and ends of the axes along the lower front edges and the left one."""
+    middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
+    ends = [nominal[0, 0, 0], nominal[-1, -1, -1]]
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        choices = []
+        for one in (0, 1):
+            for two in (0, 1):
+                line = np.array([ends[0], ends[1]])
+                line[:, others[0]], line[:, others[1]] = ends[one][others[0]], ends[two][others[1]]
+                choices.append(line @ view.T)
+        # Horizontal axes stand lowest, the vertical one furthest to the left.
+        edge = min(choices, key=lambda line, axis=axis: float(line.mean(axis=0)[int(axis != 2)]))  # type: ignore[misc]
+        along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
+        out = np.array([along[1], -along[0]])
+        out = out if out @ (edge.mean(axis=0) - middle) > 0 else -out
+        texts = [(edge.mean(axis=0), f"{'xyz'[axis]}, mm")]
+        texts += [(edge[k] + (0.05 - 0.1 * k) * size * along, f"{1e3 * ends[k][axis]:.6g}") for k in (0, 1)]
+        for at, text in texts:
+            x, y = at + 0.055 * size * out
+            axes.text(x, y, text, ha="center", va="center")
+
+
+def draw_line(found: VolumetricErrors, axis: int, path: Path) -> None:
+    """Write a picture of the errors along a line: components, resultant, and twice the random part about them.
+
+    :raises OSError: the file cannot be written.
+    """
+    positions = 1e3 * found.points[:, axis]
+    others = [k for k in range(3) if k != axis]
+    where = ", ".join(f"{'xyz'[k]} = {1e3 * found.points[0, k]:.6g} mm" for k in others)
+    with drawing(300.0, WIDTH) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 300.0 - BELOW - ABOVE)
+        axes.set_title(where, loc="left")
+        for k, name in enumerate("XYZ"):
+            _band(axes, positions, 1e6 * found.systematic[:, k], 1e6 * found.deviation[:, k], k, name)
+        axes.plot(positions, 1e6 * found.resultant, color=INK, linewidth=1.2, linestyle=DASHES[3], label="resultant")
+        _finish(axes, f"{'xyz'[axis]}, mm", "error, µm")
+        worst = int(found.resultant.argmax())
+        words = (
+            f"Volumetric errors along {'xyz'[axis]} at {where}: largest resultant "
+            f"{number(1e6 * float(found.resultant[worst]))} µm at {positions[worst]:.6g} mm"
+        )
+        save(figure, path, words)
+
+
+def draw_along(one: AlongAxis, path: Path) -> None:
+    """Write a picture of a parametric error along its axis, as stated and at the reference point.
+
+    :raises OSError: the file cannot be written.
+    """
+    positions = 1e3 * one.positions
+    name, unit = one.error.name, micro(SHOWN["rad" if one.error.is_rotation else "m"])
+    with drawing(260.0, WIDTH) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 260.0 - BELOW - ABOVE)
+        band = "" if one.values is None else f", bandwidth {number(1e6 * one.bandwidth)} {unit}"
+        axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left")
+        values = np.zeros(len(positions)) if one.values is None else 1e6 * one.values
+        deviation = np.zeros(len(positions)) if one.deviation is None else 1e6 * one.deviation
+        label = "random part alone" if one.values is None else "at the reference point"
+        _band(axes, positions, values, deviation, 0, label, mark=False)
+        if one.stated is not None and one.values is not None and (one.stated != one.values).any():
+            axes.plot(positions, 1e6 * one.stated, color=SERIES[1], linestyle=DASHES[1], label="as stated")
+        if one.measured is not None:
+            x, y = 1e3 * np.array(one.measured.positions), 1e6 * np.array(one.measured.values)
+            axes.plot(
+                x, y, color=SERIES[1], linestyle="none", marker=MARKERS[1], markersize=4.0, markerfacecolor=PAPER,
+                label="measured",
+            )  # fmt: skip
+        _finish(axes, f"{name[2].lower()}, mm", unit)
+        save(figure, path, f"{name}, {meaning(name)}{band}")
+
+
+def _band(axes: Axes, x: Array, values: Array, deviation: Array, k: int, label: str, mark: bool = True) -> None:
+    """A curve, and twice its standard deviation on either side."""
+    marker = MARKERS[k] if mark and len(x) <= MOST_MARKS else ""
+    axes.plot(
+        x, values, color=SERIES[k], linestyle=DASHES[k], marker=marker, markersize=3.5, markerfacecolor=PAPER,
+        label=label,
+    )  # fmt: skip
+    if deviation.any():
+        axes.fill_between(
+            x, values - 2.0 * deviation, values + 2.0 * deviation, color=SERIES[k], alpha=0.15, linewidth=0,
+            label="± 2 standard deviations" if k == 0 else None,
+        )  # fmt: skip
+
+
+def _finish(axes: Axes, x: str, y: str) -> None:
+    axes.axhline(0.0, color=MUTED, linewidth=0.6)
+    axes.grid(True)
+    axes.margins(x=0.0)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.legend(loc="best", ncols=2)

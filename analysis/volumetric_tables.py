@@ -1,0 +1,223 @@
+"""Volumetric errors as text for people, as CSV and as plain data for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from simulator.machines.arrangement import AXES, Arrangement
+from simulator.machines.description import MachineDescription
+from simulator.machines.protocol import Array, Parameter
+from simulator.machines.volumetric import meaning, symbol
+from simulator.quantities import format_length
+
+from .tables import SHOWN, aligned, number
+from .volumetric import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
+
+CONVENTION = "errors are where the tip is, less where the scales say: corrections, to be added to readings"
+RANDOM = "random: standard deviation, what each approach draws and what lasts in quadrature"
+
+
+def machine_lines(machine: MachineDescription) -> list[str]:
+    """What the machine is and its parametric errors."""
+    name = f"{machine.arrangement_name}: " if machine.arrangement_name else ""
+    lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
+    rows = [["", "symbol", "error", "bandwidth", "random", "unit", "stated as"]]
+    for one in along_axes(machine):
+        unit = "rad" if one.error.is_rotation else "m"
+        factor = 1e6
+        random = "" if one.deviation is None else number(factor * float(one.deviation.max()))
+        bandwidth = "" if one.values is None else number(factor * one.bandwidth)
+        cells = [one.error.name, symbol(one.error.name), meaning(one.error.name), bandwidth, random, SHOWN[unit]]
+        rows.append([*cells, _stated_as(one, machine)])
+    lines += aligned(rows, [False, False, False, True, True, False, False]) if len(rows) > 1 else ["no errors of axes"]
+    others = _others(machine)
+    return [*lines, *(["", *aligned(others, [False, False, False, True, False])] if others else [])]
+
+
+def _chain(arrangement: Arrangement) -> str:
+    sides = []
+    for side, load in ((arrangement.probe_side, "the probe"), (arrangement.workpiece_side, "the workpiece")):
+        if side:
+            sides.append(" carries ".join([*side, load]))
+    return ", ".join(sides)
+
+
+def _stated_as(one: AlongAxis, machine: MachineDescription) -> str:
+    error = one.error
+    if one.values is None:
+        return "random"
+    form = f"table of {len(one.measured.positions)} points" if one.measured is not None else "polynomial"
+    if error.line is not None:
+        others = [k for k in range(3) if k != error.axis]
+        form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)
+    return form + (f", {error.criterion}" if error.is_straightness else "")
+
+
+def _others(machine: MachineDescription) -> list[list[str]]:
+    """Squareness, expansion and droop at the reference point."""
+    rows = []
+    for parameter, value in _numbers(machine):
+        square = parameter.name.startswith("E")
+        unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
+        told = parameter.meaning + ("" if square or parameter.unit == "1" else ", over the whole axis")
+        rows.append([parameter.name, symbol(parameter.name) if square else "", told, number(1e6 * value), unit])
+    return rows
+
+
+def _numbers(machine: MachineDescription) -> list[tuple[Parameter, float]]:
+    """Errors that are no functions, with their values."""
+    truth = Volumetric(machine).truth
+    every = zip(truth.model.parameters, truth.a.tolist(), strict=True)
+    names = {one.name for one in machine.errors}
+    return [(parameter, value) for parameter, value in every if parameter.function not in names]
+
+
+def diagonal_lines(found: LengthErrors) -> list[str]:
+    """Length errors of the body diagonals."""
+    rows = [["body diagonal", "from", "to", "length, mm", "error, um", "random, um"]]
+    for k in range(len(found.error)):
+        ends = [f"({', '.join(_millimetres(v) for v in point)})" for point in (found.starts[k], found.ends[k])]
+        error, deviation = number(1e6 * float(found.error[k])), number(1e6 * float(found.deviation[k]))
+        rows.append([str(k + 1), *ends, f"{1e3 * found.nominal[k]:.3f}", error, deviation])
+    return aligned(rows, [False, False, False, True, True, True])
+
+
+def error_lines(found: VolumetricErrors) -> list[str]:
+    """Errors point by point, and their extremes."""
+    heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant", "random X", "Y", "Z"]
+    rows = [heads]
+    for point, error, resultant, random in zip(
+        found.points, found.systematic, found.resultant, found.deviation, strict=True
+    ):
+        cells = [_millimetres(value) for value in point]
+        cells += [f"{1e6 * value + 0.0:.2f}" for value in (*error, resultant, *random)]
+        rows.append(cells)
+    return [*aligned(rows, [True] * len(heads)), *extreme_lines(found)]
+
+
+def extreme_lines(found: VolumetricErrors) -> list[str]:
+    """Bandwidths of the components, and the largest resultant."""
+    worst = int(found.resultant.argmax())
+    at = ", ".join(f"{axis} = {format_length(v)}" for axis, v in zip(AXES, found.points[worst].tolist(), strict=True))
+    bands = ", ".join(
+        f"{axis.upper()} {number(1e6 * float(np.ptp(found.systematic[:, k])))}" for k, axis in enumerate(AXES)
+    )
+    resultant = found.resultant
+    return [
+        f"bandwidth in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
+        f"largest resultant {number(1e6 * float(resultant[worst]))} um at {at}",
+    ]
+
+
+def along_lines(one: AlongAxis) -> list[str]:
+    """A parametric error along its axis."""
+    unit = SHOWN["rad" if one.error.is_rotation else "m"]
+    columns = [("stated", one.stated), ("at the reference point", one.values), ("random", one.deviation)]
+    given = [(name, values) for name, values in columns if values is not None]
+    positions = one.positions
+    keep = (
+        np.arange(0, len(positions), 5)
+        if one.measured is None
+        else np.flatnonzero(np.isin(positions, one.measured.positions))
+    )
+    axis = one.error.name[2].lower()
+    rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name, _ in given)]]
+    for k in keep:
+        rows.append([_millimetres(float(positions[k])), *(f"{1e6 * values[k] + 0.0:.3f}" for _, values in given)])
+    head = f"{one.error.name} {symbol(one.error.name)}: {meaning(one.error.name)}"
+    band = "" if one.values is None else f", bandwidth {number(1e6 * one.bandwidth)} {unit}"
+    return [head + band, *aligned(rows, [True] * len(rows[0]))]
+
+
+def error_csv(found: VolumetricErrors) -> Iterator[str]:
+    """Errors as lines of a CSV file."""
+    yield "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um,random_x_um,random_y_um,random_z_um"
+    columns = (1e3 * found.points, 1e6 * found.systematic, 1e6 * found.resultant[:, None], 1e6 * found.deviation)
+    for row in np.concatenate(columns, axis=1).tolist():
+        yield ",".join(f"{value + 0.0:.12g}" for value in row)
+
+
+def along_csv(one: AlongAxis) -> Iterator[str]:
+    """A parametric error along its axis as lines of a CSV file."""
+    unit = SHOWN["rad" if one.error.is_rotation else "m"]
+    columns = [("stated", one.stated), (one.error.name, one.values), ("random", one.deviation)]
+    given = [(name, values) for name, values in columns if values is not None]
+    yield ",".join(["position_mm", *(f"{name}_{unit}" for name, _ in given)])
+    for row in np.column_stack([1e3 * one.positions, *(1e6 * values for _, values in given)]).tolist():
+        yield ",".join(f"{value + 0.0:.12g}" for value in row)
+
+
+def machine_data(machine: MachineDescription) -> dict[str, Any]:
+    """What the machine is and its parametric errors, in metres and radians."""
+    functions = {}
+    for one in along_axes(machine):
+        functions[one.error.name] = {
+            "symbol": symbol(one.error.name),
+            "unit": "rad" if one.error.is_rotation else "m",
+            "bandwidth": None if one.values is None else one.bandwidth,
+            "random": None if one.deviation is None else float(one.deviation.max()),
+        }
+    return {
+        "machine": machine.title,
+        "arrangement": machine.arrangement_name or None,
+        "probe_side": list(machine.arrangement.probe_side),
+        "workpiece_side": list(machine.arrangement.workpiece_side),
+        "convention": CONVENTION,
+        "parametric_errors": functions,
+        "other_errors": {
+            parameter.name: {"value": value, "unit": parameter.unit} for parameter, value in _numbers(machine)
+        },
+    }
+
+
+def diagonal_data(found: LengthErrors) -> list[dict[str, Any]]:
+    """Length errors of the body diagonals, in metres."""
+    return [
+        {
+            "diagonal": k + 1,
+            "from": found.starts[k].tolist(),
+            "to": found.ends[k].tolist(),
+            "length": float(found.nominal[k]),
+            "error": float(found.error[k]),
+            "random": float(found.deviation[k]),
+        }
+        for k in range(len(found.error))
+    ]
+
+
+def error_data(found: VolumetricErrors) -> list[dict[str, Any]]:
+    """Errors point by point, in metres."""
+    return [
+        {"position": point, "error": error, "resultant": resultant, "random": random}
+        for point, error, resultant, random in zip(
+            found.points.tolist(),
+            found.systematic.tolist(),
+            found.resultant.tolist(),
+            found.deviation.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def along_data(one: AlongAxis) -> dict[str, Any]:
+    """A parametric error along its axis, in metres and radians."""
+
+    def listed(values: Array | None) -> list[float] | None:
+        return None if values is None else [float(value) for value in values]
+
+    return {
+        "error": one.error.name,
+        "symbol": symbol(one.error.name),
+        "unit": "rad" if one.error.is_rotation else "m",
+        "position": listed(one.positions),
+        "stated": listed(one.stated),
+        "value": listed(one.values),
+        "random": listed(one.deviation),
+    }
+
+
+def _millimetres(value: float) -> str:
+    return f"{1e3 * value + 0.0:.10g}"
