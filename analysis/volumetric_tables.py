@@ -87,15 +87,16 @@ def diagonal_lines(found: LengthErrors) -> list[str]:
 
 def error_lines(found: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
-    heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant", "random X", "Y", "Z"]
-    rows = [heads]
+    heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant"]
+    is_random = bool(found.deviation.any())
+    rows = [[*heads, *(["random X", "Y", "Z"] if is_random else [])]]
     for point, error, resultant, random in zip(
         found.points, found.systematic, found.resultant, found.deviation, strict=True
     ):
         cells = [_millimetres(value) for value in point]
-        cells += [f"{1e6 * value + 0.0:.2f}" for value in (*error, resultant, *random)]
+        cells += [f"{1e6 * value + 0.0:.2f}" for value in (*error, resultant, *(random if is_random else ()))]
         rows.append(cells)
-    return [*aligned(rows, [True] * len(heads)), *extreme_lines(found)]
+    return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(found)]
 
 
 def extreme_lines(found: VolumetricErrors) -> list[str]:

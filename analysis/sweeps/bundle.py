@@ -16,6 +16,7 @@ from simulator.experiment.yamltree import Node, Scalar, read_tree, to_python, wa
 from .model import Sweep
 
 MODULE = ".py"
+YAML = (".yaml", ".yml")
 MOST_MODULES = 1000
 
 
@@ -38,7 +39,7 @@ class Bundle:
 
 
 def bundle_of(sweep: Sweep) -> Bundle:
-    """The sweep file, its base, and all files beside these that a text in them names.
+    """The sweep file, its base, all files beside these that a text in them names, and those that machine files name.
 
     A file that is named by its place from the root of the file system is not taken along: it must be there, wherever
     the sweep is computed.
@@ -70,6 +71,16 @@ def files_of(sweep: Sweep) -> list[Path]:
     for file in (source, base):
         for text in _texts(read_tree(file)):
             paths |= set(_named(base.parent, text))
+    # A machine file names tables beside it.
+    for file in sorted(paths - {source, base}):
+        if file.suffix.lower() in YAML:
+            try:
+                texts = list(_texts(read_tree(file)))
+            except ExperimentError:
+                # Who uses the file is told about it when it is loaded.
+                continue
+            for text in texts:
+                paths |= set(_named(file.parent, text))
     return sorted(paths)
 
 

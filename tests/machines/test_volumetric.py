@@ -1,0 +1,277 @@
+"""Volumetric errors: closed forms, errors measured on other lines, random parts against Monte Carlo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.volumetric import Volumetric
+from simulator.experiment.machine_file import load_machine
+from simulator.machines.arrangement import ARRANGEMENTS
+from simulator.machines.description import (
+    AxisTemperature,
+    MachineDescription,
+    ParametricError,
+    PowerSeries,
+    Squareness,
+    fitted_volumetric,
+    true_volumetric,
+)
+from tests.published.rigid_body import tip_error
+
+SIZE = np.array([1.8, 1.2, 0.9])
+AXES = "xyz"
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
+
+def machine(name: str = "MB2", **more: object) -> MachineDescription:
+    plain = {
+        "title": name,
+        "arrangement_name": name,
+        "arrangement": ARRANGEMENTS[name],
+        "lower": (0.0, 0.0, 0.0),
+        "upper": tuple(SIZE.tolist()),
+        "reference": (0.0, 0.0, 0.0),
+    }
+    return MachineDescription(**{**plain, **more})  # type: ignore[arg-type]
+
+
+def test_diagonals_of_scale_errors_have_their_closed_form() -> None:
+    scales = np.array([11e-6, -7e-6, 23e-6])
+    errors = tuple(
+        ParametricError(f"E{axis}{axis}", PowerSeries((5e-6, scale * size)))
+        for axis, scale, size in zip("XYZ", scales.tolist(), SIZE.tolist(), strict=True)
+    )
+    found = Volumetric(machine(errors=errors)).diagonals()
+    expected = np.linalg.norm(SIZE * (1 + scales)) - np.linalg.norm(SIZE)
+    np.testing.assert_allclose(found.error, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.nominal, np.linalg.norm(SIZE), rtol=1e-15)
+
+
+def test_diagonals_of_squareness_have_their_closed_form() -> None:
+    alpha, beta1, beta2 = 31e-6, -12e-6, 19e-6
+    square = (Squareness("EC0Y", alpha), Squareness("EB0Z", -beta1), Squareness("EA0Z", beta2))
+    found = Volumetric(machine(squareness=square)).diagonals()
+    for k, (start, end) in enumerate(
+        [((0, 0, 0), (1, 1, 1)), ((1, 0, 0), (0, 1, 1)), ((0, 1, 0), (1, 0, 1)), ((0, 0, 1), (1, 1, 0))]
+    ):
+        x, y, z = (np.array(end) - start) * SIZE
+        turned = np.linalg.norm([x - beta1 * z, y - alpha * x - beta2 * z, z])
+        assert found.error[k] == pytest.approx(turned - np.linalg.norm(SIZE), abs=1e-15)
+        np.testing.assert_array_equal(found.starts[k], np.array(start) * SIZE)
+
+
+def test_a_square_machine_that_expands_evenly_has_no_error_but_its_scale() -> None:
+    temperature = {axis: AxisTemperature(10e-6, 2.5) for axis in AXES}
+    described = machine(temperature=temperature, reference=(0.3, 0.2, 0.1))
+    found = Volumetric(described).diagonals()
+    np.testing.assert_allclose(found.error, 25e-6 * np.linalg.norm(SIZE), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(Volumetric(described).systematic(np.array([[0.3, 0.2, 0.1]])), 0.0, atol=1e-20)
+
+
+def test_errors_along_a_line_have_their_closed_form() -> None:
+    # The x axis of MB2 carries y, z and the probe: a pitch 40 t^2 urad shows at z + zp in X, at x not at all.
+    errors = (
+        ParametricError("EXX", PowerSeries((0.0, 3e-6, 4e-6))),
+        ParametricError("EBX", PowerSeries((0.0, 0.0, 40e-6))),
+        ParametricError("EZX", PowerSeries((1e-6, 9e-6, -8e-6))),
+    )
+    built = Volumetric(machine(errors=errors, probe=(0.05, 0.0, -0.2)))
+    points = built.along(0, {"y": 0.4, "z": 0.7}, 9)
+    t = np.linspace(0.0, 1.0, 9)
+    pitch = 40e-6 * t**2
+    expected = np.stack(
+        [3e-6 * t + 4e-6 * t**2 + pitch * (0.7 - 0.2), 0.0 * t, 8e-6 * t * (1.0 - t) - pitch * 0.05], axis=1
+    )
+    # To rounding of the probe's offset, to which errors are added.
+    np.testing.assert_allclose(built.systematic(points), expected, rtol=0, atol=5e-17)
+
+
+def test_errors_are_zero_at_the_reference_point_wherever_it_is() -> None:
+    names = [f"E{kind}{axis}" for axis in "XYZ" for kind in "XYZABC"]
+    generator = np.random.default_rng(2)
+    errors = tuple(ParametricError(name, PowerSeries(tuple(generator.normal(0, 1e-5, 4).tolist()))) for name in names)
+    reference = (0.7, 0.5, 0.2)
+    for name in ARRANGEMENTS:
+        for criterion in ("end points", "least squares", "minimum zone"):
+            told = tuple(
+                ParametricError(one.name, one.shape, criterion=criterion)  # type: ignore[arg-type]
+                for one in errors
+            )
+            built = Volumetric(machine(name, errors=told, reference=reference, probe=(0.1, 0.2, -0.3)))
+            np.testing.assert_allclose(built.systematic(np.array([reference])), 0.0, atol=1e-20)
+
+
+# Smooth errors of all kinds, straightness errors zero at both ends, rotations and positioning errors at the first.
+def true_functions(seed: int) -> dict[str, Callable[[float], float]]:
+    found = {}
+    generator = np.random.default_rng(seed)
+    for axis in AXES:
+        for kind in "dE":
+            for component in AXES:
+                a, b, c = (generator.normal(0, 1e-5, 3)).tolist()
+                if kind == "d" and component != axis:
+                    found[f"{kind}{component}_{axis}"] = lambda t, a=a, b=b: t * (1 - t) * (a + b * t)
+                else:
+                    found[f"{kind}{component}_{axis}"] = lambda t, a=a, b=b, c=c: a * t + b * t**2 + c * t**3
+    return found
+
+
+def values_at(functions: dict[str, Callable[[float], float]], position: np.ndarray) -> dict[str, float]:
+    return {name: one(position[AXES.index(name[3])] / SIZE[AXES.index(name[3])]) for name, one in functions.items()}
+
+
+@pytest.mark.parametrize("name", ARRANGEMENTS)
+def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(name: str, tmp_path: Path) -> None:
+    """Rigid bodies are measured on lines all over the volume, with a reflector off the probe; the tables give the map.
+
+    Of a table that moves a point fixed to it is measured.
+    """
+    chain = [list(ARRANGEMENTS[name].probe_side), list(ARRANGEMENTS[name].workpiece_side)]
+    functions, square = true_functions(5), {"a": 2e-5, "b1": -1e-5, "b2": 3e-5}
+    generator = np.random.default_rng(6)
+    lines = ["errors:"]
+    for key in functions:
+        k, component = AXES.index(key[3]), AXES.index(key[1])
+        positions = np.linspace(0.0, SIZE[k], 41)
+        at, reflector = generator.uniform(0.1, 0.8, 3), generator.uniform(-0.1, 0.1, 3)
+        if key[0] == "E":
+            values = [functions[key](x / SIZE[k]) for x in positions]
+        else:
+            values = []
+            for x in positions:
+                where = at.copy()
+                where[k] = x
+                errors = values_at(functions, where) | square
+                seen_from = np.where((np.arange(3) == k) & (key[3] in chain[1]), 0.0, where)
+                values.append(tip_error(chain, seen_from, reflector, errors)[component])
+        letters = "XYZ" if key[0] == "d" else "ABC"
+        iso, unit = f"E{letters[component]}{key[3].upper()}", "um" if key[0] == "d" else "urad"
+        others = ", ".join(f"{AXES[j]} = {at[j]:.17g} m" for j in range(3) if j != k)
+        head = [f"# line: {others}", "# probe: " + ", ".join(f"{x:.17g} m" for x in reflector)]
+        rows = [
+            f"{1000 * x!r},{1e6 * value!r}" for x, value in zip(positions.tolist(), map(float, values), strict=True)
+        ]
+        text = "\n".join([*(head if key[0] == "d" else []), f"position_mm,{iso}_{unit}", *rows])
+        (tmp_path / f"{iso}.csv").write_text(text.replace("np.float64(", "").replace(")", ""), encoding="utf-8")
+        lines.append(f"  {iso}: {{file: {iso}.csv}}")
+    lines += [f"title: {name}", f"arrangement: {name}", "interpolation: cubic", "probe: [20 mm, -30 mm, -100 mm]"]
+    lines += [f"volume: [{', '.join(f'{1000 * x} mm' for x in SIZE.tolist())}]"]
+    lines += ["squareness: {EC0Y: 20 urad, EB0Z: 10 urad, EA0Z: 30 urad}"]
+    (tmp_path / "m.yaml").write_text("\n".join(lines), encoding="utf-8")
+    built = Volumetric(load_machine(tmp_path / "m.yaml"))
+    points = generator.uniform(0.0, 1.0, (10, 3)) * SIZE
+    probe = np.array([0.02, -0.03, -0.1])
+    expected = np.array([tip_error(chain, x, probe, values_at(functions, x) | square) for x in points])
+    assert np.abs(expected).max() > 2e-5
+    # Products of errors, and cubic splines between 41 points.
+    np.testing.assert_allclose(built.systematic(points), expected, rtol=0, atol=5e-9)
+
+
+RANDOM = {"dx_x": 1e-6, "dy_y": 2e-6, "dz_x": 0.5e-6, "Ey_x": 3e-6, "Ez_y": 2e-6, "Ex_y": 4e-6, "Ex_z": 5e-6}
+
+
+@pytest.mark.parametrize("name", ["MB1", "FB2", "CX1"])
+def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
+    """Functions are drawn anew at each end of a length, squareness and temperature once for both, on rigid bodies."""
+    chain = [list(ARRANGEMENTS[name].probe_side), list(ARRANGEMENTS[name].workpiece_side)]
+    errors = tuple(
+        ParametricError(f"E{('XYZ' if key[0] == 'd' else 'ABC')[AXES.index(key[1])]}{key[3].upper()}", deviation=size)
+        for key, size in RANDOM.items()
+    )
+    probe = np.array([0.03, -0.05, -0.12])
+    described = machine(
+        name,
+        errors=errors,
+        probe=tuple(probe.tolist()),
+        squareness=(Squareness("EC0Y", 0.0, deviation=2e-6), Squareness("EB0Z", 0.0, deviation=3e-6)),
+        temperature={"x": AxisTemperature(11e-6, 0.0, 0.2), "z": AxisTemperature(8e-6, 0.0, 0.3)},
+        probing=0.7e-6,
+    )
+    start, end = np.array([1.5, 0.1, 0.2]), np.array([0.2, 1.0, 0.8])
+    count = 3000
+    generator = np.random.default_rng(4)
+    found = {"start": np.zeros((count, 3)), "end": np.zeros((count, 3)), "length": np.zeros(count)}
+    for k in range(count):
+        lasting = {"a": generator.normal(0, 2e-6), "b1": generator.normal(0, 3e-6)}
+        stretch = np.array([11e-6 * generator.normal(0, 0.2), 0.0, 8e-6 * generator.normal(0, 0.3)])
+        tips = []
+        for x in (start, end):
+            drawn = {key: generator.normal(0, size) for key, size in RANDOM.items()}
+            tips.append(x + tip_error(chain, x, probe, drawn | lasting) + stretch * x + generator.normal(0, 0.7e-6, 3))
+        found["start"][k], found["end"][k] = tips[0] - start, tips[1] - end
+        found["length"][k] = np.linalg.norm(tips[1] - tips[0]) - np.linalg.norm(end - start)
+    built = Volumetric(described)
+    deviation = built.errors(np.array([start, end])).deviation
+    # The standard error of a standard deviation is a part 1 / sqrt(2 n) of it.
+    limit = 4.0 / np.sqrt(2 * count)
+    np.testing.assert_allclose(found["start"].std(axis=0), deviation[0], rtol=limit)
+    np.testing.assert_allclose(found["end"].std(axis=0), deviation[1], rtol=limit)
+    of_length = built.lengths(start[None], end[None]).deviation[0]
+    assert found["length"].std() == pytest.approx(of_length, rel=limit)
+
+
+def test_random_parts_add_in_quadrature() -> None:
+    # At x = y = 0 the Z slide of MB1 is carried by both others: roll of Y by z, and the pitch of X.
+    errors = (ParametricError("EBX", deviation=3e-6), ParametricError("EBY", deviation=4e-6))
+    found = Volumetric(machine("MB1", errors=errors, probing=1e-6)).errors(np.array([[0.0, 0.0, 0.6]]))
+    np.testing.assert_allclose(found.deviation[0], [np.hypot(0.6 * 5e-6, 1e-6), 1e-6, 1e-6], rtol=1e-12)
+
+
+def test_random_parts_of_a_length_do_not_cancel_at_a_common_position() -> None:
+    built = Volumetric(machine(errors=(ParametricError("EYX", deviation=2e-6),)))
+    found = built.lengths(np.array([[0.5, 0.0, 0.0]]), np.array([[0.5, 1.0, 0.0]]))
+    assert found.deviation[0] == pytest.approx(np.sqrt(2.0) * 2e-6, rel=1e-12)
+
+
+def test_temperature_and_squareness_do_cancel() -> None:
+    described = machine(
+        squareness=(Squareness("EC0Y", 0.0, deviation=2e-6),), temperature={"y": AxisTemperature(10e-6, 1.0, 0.5)}
+    )
+    along_x = Volumetric(described).lengths(np.array([[0.0, 1.0, 0.0]]), np.array([[1.5, 1.0, 0.0]]))
+    assert along_x.deviation[0] == pytest.approx(0.0, abs=1e-18)
+    along_y = Volumetric(described).lengths(np.array([[0.0, 0.2, 0.0]]), np.array([[0.0, 1.0, 0.0]]))
+    assert along_y.deviation[0] == pytest.approx(5e-6 * 0.8, rel=1e-12)
+
+
+def test_the_fitted_model_has_what_is_stated() -> None:
+    described = load_machine("designs/park/gec-like.yaml")
+    model = fitted_volumetric(described, (0.0, 0.0, 0.0), (1.8, 1.2, 1.2), 3)
+    names = [one.name for one in model.parameters]
+    assert names[-4:] == ["EC0Y", "EB0Z", "EA0Z", "phi1"]
+    # A cubic that is zero at one end has three coefficients, a straightness error of degree two one.
+    assert [name for name in names if name.startswith("EXX")] == ["EXX[1]", "EXX[2]", "EXX[3]"]
+    assert [name for name in names if name.startswith("EYX")] == ["EYX[1]"]
+    straight = MachineDescription(**{**vars(described), "errors": described.errors[:1]})
+    assert "phi2" in [one.name for one in fitted_volumetric(straight, (0.0,) * 3, (1.0,) * 3, 3).parameters]
+
+
+def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
+    """The same file as machine and as model: the stated coefficients are the fitted model's own.
+
+    The bend of the arm is told as straightness of its axis, whose own direction the fitted model's frame takes: the two
+    frames are turned to one another, and the probe is not.
+    """
+    described = load_machine("designs/park/gec-like.yaml")
+    truth = true_volumetric(described)
+    model = fitted_volumetric(described, described.lower, described.upper, 3)
+    generator = np.random.default_rng(1)
+    points = generator.uniform(described.lower, described.upper, (200, 3))
+    probe = generator.normal(0.0, 0.1, (200, 3))
+    wanted = truth.model.error(points, truth.a, probe) - probe
+    columns = model.jacobian(points, np.zeros(len(model.parameters)), probe).reshape(600, -1)
+    turns = np.stack([np.cross(one, points) for one in np.eye(3)], axis=2).reshape(600, 3)
+    columns = np.concatenate([columns, turns], axis=1)
+    solution = np.linalg.lstsq(columns, wanted.ravel(), rcond=None)[0]
+    np.testing.assert_allclose(columns @ solution, wanted.ravel(), rtol=0, atol=1e-15)
+    a, turn = solution[:-3], solution[-3:]
+    np.testing.assert_allclose(turn, [-9e-6 * 1.2 / 2, 0.0, 0.0], atol=1e-15)
+    reported = model.reported()
+    values = dict(zip(reported.names, (reported.matrix @ a).tolist(), strict=True))
+    assert values["EXX t^3"] == pytest.approx(44e-6) and values["EC0Y"] == pytest.approx(-45e-6)
+    assert values["phi1"] == pytest.approx(6e-6 * 1.2)
+    # What the arm's bend is not told apart from.
+    assert values["EZY t^2"] == pytest.approx(-12e-6 - 9e-6 * 1.2**2 / 2)
