@@ -89,6 +89,9 @@ def run(options: Namespace) -> int:
     from ..volumetric import Volumetric, along_axes
 
     machine = load_machine(options.file)
+    if options.plot is not None and options.plot.resolve() == options.file.resolve():
+        print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
+        return WRONG_USAGE
     if options.magnification is not None and (options.line is not None or options.error is not None):
         print("ballplate map: --magnification is for the drawing of the grid; leave it out", file=sys.stderr)
         return WRONG_USAGE
@@ -166,9 +169,4 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
 
 
 def _drawn(options: Namespace, draw_to) -> int:  # type: ignore[no-untyped-def]
-    if options.plot is None:
-        return 0
-    if options.plot.resolve() == options.file.resolve():
-        print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
-        return WRONG_USAGE
-    return 0 if draw(draw_to, options.plot) else BAD_FILE
+    return 0 if options.plot is None or draw(draw_to, options.plot) else BAD_FILE

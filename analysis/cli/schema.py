@@ -1,28 +1,45 @@
-"""`ballplate schema`: the JSON Schema of experiment and sweep files."""
+"""`ballplate schema`: the JSON Schema of experiment, sweep and machine files."""
 
 from __future__ import annotations
 
 import json
 from argparse import Namespace
+from typing import Any
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "schema",
-        help="print the JSON Schema of experiment or sweep files",
-        description="Print the JSON Schema of experiment files, or of sweep files, for editors that complete and check "
-        "as you type.",
+        help="print the JSON Schema of experiment, sweep or machine files",
+        description="Print the JSON Schema of experiment files, or of sweep or machine files, for editors that "
+        "complete and check as you type.",
     )
-    parser.add_argument("files", choices=("experiment", "sweep"), nargs="?", default="experiment", help="which files")
+    parser.add_argument("files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files")
     parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
     """Print the schema."""
+    print(json.dumps(SCHEMAS[options.files](), indent=2, ensure_ascii=False))
+    return 0
+
+
+def _experiment() -> dict[str, Any]:
     from simulator.experiment.schema import schema
 
-    from ..sweeps.schema import schema as sweep_schema
+    return schema()
 
-    found = sweep_schema() if options.files == "sweep" else schema()
-    print(json.dumps(found, indent=2, ensure_ascii=False))
-    return 0
+
+def _sweep() -> dict[str, Any]:
+    from ..sweeps.schema import schema
+
+    return schema()
+
+
+def _machine() -> dict[str, Any]:
+    from simulator.experiment.machine_sections import machine_schema
+
+    return machine_schema()
+
+
+SCHEMAS = {"experiment": _experiment, "sweep": _sweep, "machine": _machine}

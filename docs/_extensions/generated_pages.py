@@ -20,8 +20,18 @@ from analysis.reproduction.published import npl
 from analysis.reproduction.shipped import Shipped
 from analysis.reproduction.tables import reproduction_markdown
 from analysis.sweeps.schema import schema as sweep_schema
+from simulator.experiment.machine_sections import machine_schema
 from simulator.experiment.schema import schema
-from simulator.quantities import UNITS, Angle, Length, LengthFunction, Ratio
+from simulator.quantities import (
+    UNITS,
+    Angle,
+    Bending,
+    Expansion,
+    Length,
+    LengthFunction,
+    Ratio,
+    TemperatureDifference,
+)
 
 Schema = dict[str, Any]
 
@@ -36,6 +46,9 @@ QUANTITIES = {
         (Length, "length"),
         (Angle, "angle"),
         (Ratio, "ratio"),
+        (TemperatureDifference, "temperature difference"),
+        (Expansion, "thermal expansion"),
+        (Bending, "angle per length"),
         (LengthFunction, "length, or one that grows as `A + L/K`"),
     )
 }
@@ -49,6 +62,11 @@ def file_format() -> str:
 def sweep_format() -> str:
     """The keys of a sweep file, section by section, as Markdown."""
     return _keys(sweep_schema())
+
+
+def machine_format() -> str:
+    """The keys of a machine file, section by section, as Markdown."""
+    return _keys(machine_schema())
 
 
 def reproduction() -> str:
@@ -209,6 +227,7 @@ def _text(action: argparse.Action) -> str:
 PARTS = {
     "<!-- file format -->": file_format,
     "<!-- sweep format -->": sweep_format,
+    "<!-- machine format -->": machine_format,
     "<!-- units -->": units,
     "<!-- commands -->": commands,
     "<!-- reproduction -->": reproduction,

@@ -84,8 +84,6 @@ def read_error_table(path: Path, name: str) -> ErrorTable:
         else:
             stated[key] = (Mark(str(path), number, match.start(2) + 1), match[2])
     line_of, probe, criterion = _line(stated, name, messages), _probe(stated, messages), _criterion(stated, messages)
-    if criterion is not None and name[1] not in {"X", "Y", "Z"} - {name[2]}:
-        messages.append(stated["straightness"][0].message("", f"{name} is no straightness error; remove this line"))
     curves: dict[str, Points] = {}
     try:
         curves = read_curves(path, bandwidths=True)
@@ -95,6 +93,8 @@ def read_error_table(path: Path, name: str) -> ErrorTable:
     if curves and (others or name not in curves):
         text = f"the file should have {name}" + (f" alone, but has {listing(others)}" if others else "")
         messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
+    elif criterion is not None and name[1] not in {"X", "Y", "Z"} - {name[2]}:
+        messages.append(stated["straightness"][0].message("", f"{name} is no straightness error; remove this line"))
     bandwidth = curves.get(name + BANDWIDTH)
     if bandwidth is not None and min(bandwidth.values) < 0:
         messages.append(Message(str(path), 0, 0, "", "a bandwidth is below zero; write half the width of the band"))

@@ -130,7 +130,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         probing=settings.probing or 0.0,
     )
     _inside(settings.reference_point, machine, ("reference_point",), problems)
-    return machine
+    return None if problems.messages else machine
 
 
 def _three(values: Iterable[float]) -> Three:

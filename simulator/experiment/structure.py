@@ -52,6 +52,10 @@ def validate_sections(root: Node, problems: Problems) -> Sections:
     if "axes" in root.items and "machine" not in root.items:
         problems.add((), "this is a sweep of experiments; use it with ballplate sweep")
         return Sections(values)
+    if "arrangement" in root.items and "machine" not in root.items:
+        text = "this describes a machine; use it with ballplate map, or name it with kind: machine in an experiment"
+        problems.add((), text)
+        return Sections(values)
     for steps, node in walk(root):
         if isinstance(node, Scalar) and node.value is None:
             problems.add(steps, "empty; give a value, or leave it out")

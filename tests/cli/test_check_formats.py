@@ -204,6 +204,8 @@ def a_repository(top: Path) -> None:
     (top / "settings.yaml").write_text("colour: blue\n", encoding="utf-8")
     (top / "designs/sweeps").mkdir()
     (top / "designs/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
+    (top / "designs/machines").mkdir()
+    (top / "designs/machines/bridge.yaml").write_text("arrangement: MB1\n", encoding="utf-8")
     (top / "designs/old/sweeps").mkdir(parents=True)
     (top / "designs/old/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
 

@@ -291,7 +291,10 @@ def test_init_writes_the_quickstart(capsys: pytest.CaptureFixture[str], tmp_path
     assert "exists already" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("kind", "name"), [("experiment", "schema.json"), ("sweep", "sweep-schema.json")])
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("experiment", "schema.json"), ("sweep", "sweep-schema.json"), ("machine", "machine-schema.json")],
+)
 def test_schema_is_the_shipped_one(kind: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("schema", kind) == 0
     found = json.loads(capsys.readouterr().out)
@@ -302,7 +305,9 @@ def test_shipped_files_name_their_schema() -> None:
     for path in Path("designs").rglob("*.yaml"):
         first = path.read_text(encoding="utf-8").splitlines()[0]
         named = first.partition("$schema=")[2]
-        expected = "sweep-schema.json" if path.parent.name == "sweeps" else "schema.json"
+        expected = {"sweeps": "sweep-schema.json", "machines": "machine-schema.json"}.get(
+            path.parent.name, "schema.json"
+        )
         assert (path.parent / named).resolve() == Path("designs", expected).resolve(), path
 
 
@@ -316,7 +321,7 @@ def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[s
 
 
 def test_all_shipped_designs_are_as_expected() -> None:
-    paths = sorted(path for path in Path("designs").rglob("*.yaml") if path.parent.name != "sweeps")
+    paths = sorted(path for path in Path("designs").rglob("*.yaml") if path.parent.name not in ("sweeps", "machines"))
     assert len(paths) >= 11
     assert run("check", *paths) == 0
 

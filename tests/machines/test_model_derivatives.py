@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simulator.experiment.machine_file import load_machine
 from simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from simulator.machines.bases import Monomial, Polynomial, Spline
+from simulator.machines.description import fitted_volumetric, true_volumetric
 from simulator.machines.empirical import empirical_model
 from simulator.machines.joined import JoinedModel
 from simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
@@ -52,6 +54,14 @@ MODELS: dict[str, ErrorModel] = {
     "joined": JoinedModel(
         kinematic_model(ARRANGEMENTS["MB2"], 3, 3, LOWER, UPPER), empirical_model(quadratic(), LOWER, UPPER, True)
     ),
+    "volumetric stated": true_volumetric(load_machine("designs/park/machines/measured-errors.yaml")).model,
+    "volumetric with droop": true_volumetric(load_machine("designs/park/machines/gec-like.yaml")).model,
+    **{
+        f"volumetric fitted {name}": fitted_volumetric(
+            load_machine(f"designs/park/machines/{name}.yaml"), LOWER, UPPER, 2
+        )
+        for name in ("measured-errors", "gec-like", "npl-like")
+    },
     **{f"metric {scale}": MetricModel(scale) for scale in ("none", "x", "y", "split")},
 }
 

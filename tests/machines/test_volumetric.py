@@ -238,7 +238,7 @@ def test_temperature_and_squareness_do_cancel() -> None:
 
 
 def test_the_fitted_model_has_what_is_stated() -> None:
-    described = load_machine("designs/park/gec-like.yaml")
+    described = load_machine("designs/park/machines/gec-like.yaml")
     model = fitted_volumetric(described, (0.0, 0.0, 0.0), (1.8, 1.2, 1.2), 3)
     names = [one.name for one in model.parameters]
     assert names[-4:] == ["EC0Y", "EB0Z", "EA0Z", "phi1"]
@@ -255,7 +255,7 @@ def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
     The bend of the arm is told as straightness of its axis, whose own direction the fitted model's frame takes: the two
     frames are turned to one another, and the probe is not.
     """
-    described = load_machine("designs/park/gec-like.yaml")
+    described = load_machine("designs/park/machines/gec-like.yaml")
     truth = true_volumetric(described)
     model = fitted_volumetric(described, described.lower, described.upper, 3)
     generator = np.random.default_rng(1)

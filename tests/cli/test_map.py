@@ -1,0 +1,207 @@
+"""`ballplate map` as a user meets it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.volumetric import Volumetric
+from simulator.experiment.machine_file import load_machine
+
+MACHINES = Path("designs/park/machines")
+ARM, BRIDGE, MEASURED = (MACHINES / f"{name}.yaml" for name in ("gec-like", "npl-like", "measured-errors"))
+
+SCALES = """\
+title: scales of 10, 20 and 30 um/m
+arrangement: FB1
+volume: {x: [0 mm, 400 mm], y: [0 mm, 300 mm], z: [0 mm, 1200 mm]}
+errors:
+  EXX: {polynomial: [1 um, 4 um]}
+  EYY: {polynomial: [0 um, 6 um], bandwidth: 2 um}
+  EZZ: {polynomial: [0 um, 36 um]}
+"""
+
+
+def run(*arguments: str | Path) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def scales(tmp_path: Path) -> Path:
+    path = tmp_path / "scales.yaml"
+    path.write_text(SCALES, encoding="utf-8")
+    return path
+
+
+def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("map", scales, "--grid", "2,2,2") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    lines = out.split("\n")
+    assert lines[1].startswith(
+        "FB1: x carries z carries the probe, y carries the workpiece; errors are where the tip is"
+    )
+    assert ["EYY", "δy(y)", "positioning", "error", "of", "Y", "6.000", "1.000", "um", "polynomial"] in [
+        line.split() for line in lines
+    ]
+    # (0.4 x 4 + 0.3 x 6 + 1.2 x 36) / 1.3 = 35.85 along every diagonal; random: 0.3 / 1.3 of 1 um at both ends.
+    diagonals = [line.split() for line in lines if line.startswith(("1  ", "2  ", "3  ", "4  "))]
+    assert [row[-2:] for row in diagonals] == [["35.85", "0.3264"]] * 4
+    assert "bandwidth in um: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 um at x = 400" in out
+
+
+def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("map", BRIDGE, "--grid", "3,2,2", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    built = Volumetric(load_machine(BRIDGE))
+    expected = built.errors(built.grid((3, 2, 2)))
+    assert [one["error"] for one in found["grid"]] == expected.systematic.tolist()
+    assert [one["random"] for one in found["grid"]] == expected.deviation.tolist()
+    assert [one["error"] for one in found["diagonals"]] == built.diagonals().error.tolist()
+    assert found["arrangement"] == "MB1" and found["parametric_errors"]["EBX"]["symbol"] == "Ey(x)"
+    assert found["parametric_errors"]["ECX"] == {"symbol": "Ez(x)", "unit": "rad", "bandwidth": None, "random": 2e-6}
+    assert found["other_errors"]["thermal x"] == {"value": pytest.approx(6.3e-6), "unit": "1"}
+
+
+def test_csv_of_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("map", BRIDGE, "--line", "x = 450 mm, z = 0.2 m", "--points", "5", "--format", "csv") == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [float(row["y_mm"]) for row in rows] == np.linspace(0, 1150, 5).tolist()
+    assert {(row["x_mm"], row["z_mm"]) for row in rows} == {("450", "200")}
+    built = Volumetric(load_machine(BRIDGE))
+    expected = built.systematic(np.array([[0.45, float(row["y_mm"]) / 1000, 0.2] for row in rows]))
+    for row, error in zip(rows, expected, strict=True):
+        assert [float(row[f"error_{axis}_um"]) for axis in "xyz"] == pytest.approx((1e6 * error).tolist(), abs=1e-9)
+        assert float(row["resultant_um"]) == pytest.approx(1e6 * np.linalg.norm(error))
+
+
+def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("map", MEASURED, "--error", "EYX", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    # Measured at z = 400 mm, the roll EAX adds -z EAX; least squares over the 17 points leave no slope.
+    assert run("map", MEASURED, "--error", "EAX", "--json") == 0
+    roll = json.loads(capsys.readouterr().out)
+    at, stated, values = (np.array(found[key]) for key in ("position", "stated", "value"))
+    np.testing.assert_array_equal(at, roll["position"])
+    left = stated + 0.4 * np.array(roll["value"]) - values
+    np.testing.assert_allclose(left, np.polyval(np.polyfit(at, left, 1), at), atol=1e-15)
+    points = np.isin(np.round(at, 9), np.round(np.arange(0.0, 0.81, 0.05), 9))
+    assert points.sum() == 17
+    assert abs(np.polyfit(at[points], values[points], 1)[0]) < 1e-16
+    assert run("map", MEASURED, "--error", "EYX") == 0
+    assert capsys.readouterr().out.startswith("EYX δy(x): straightness of X in Y, bandwidth 3.062 um\n")
+    assert run("map", MEASURED, "--error", "EYX", "--format", "csv") == 0
+    assert capsys.readouterr().out.startswith("position_mm,stated_um,EYX_um,random_um\n0,3,0,0.5\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--grid", "4,3,3"), "Volumetric errors, magnified"),
+        (("--line", "y = 600 mm, z = 600 mm"), "Volumetric errors along x at y = 600 mm, z = 600 mm"),
+        (("--error", "EXX"), "EXX, positioning error of X, bandwidth 66.00 µm"),
+    ],
+)
+def test_pictures(options: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    written = []
+    for name in ("one.svg", "two.svg"):
+        assert run("map", ARM, *options, "--plot", tmp_path / name) == 0
+        written.append((tmp_path / name).read_bytes())
+    assert written[0] == written[1]
+    assert words in written[0].decode("utf-8") and b"http" not in written[0].replace(b"http://www.w3.org", b"").replace(
+        b"http://purl.org", b""
+    ).replace(b"http://creativecommons.org", b"")
+    assert run("map", ARM, *options, "--plot", tmp_path / "one.png") == 0
+    assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
+    assert capsys.readouterr().err == ""
+
+
+def test_magnification_is_round() -> None:
+    from analysis.report.volumetric import magnification_of
+
+    built = Volumetric(load_machine(ARM))
+    found = built.errors(built.grid((3, 3, 3)))
+    steps = [magnification_of(type(found)(found.points, factor * found.systematic, found.deviation))
+             for factor in (0.5, 1.0, 2.0, 0.0)]  # fmt: skip
+    assert steps == [2000, 1000, 500, 1]
+    assert all(one >= other for one, other in pairwise(steps))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--grid", "5"), 'expected three whole numbers, 2 or above, such as 13,9,9, not "5"'),
+        (("--grid", "5,1,5"), "expected three whole numbers, 2 or above"),
+        (("--grid", "1000,1000,1000"), "1000000000 points are too many; at most 200000 are possible"),
+        (("--line", "y = 600"), 'y: "600" has no unit'),
+        (("--line", "y = 600 mm"), "two axes stand still on a line; write for example y = 600 mm, z = 600 mm"),
+        (("--line", "y = 600 mm, z = 600 mm", "--points", "1"), "a line has 2 to 200000 points, not 1"),
+        (("--line", "y = 1 mm, z = 1 mm", "--error", "EXX"), "not allowed with argument"),
+        (("--plot", "map.gif"), "a picture's name ends in .svg, .png, .pdf"),
+    ],
+)
+def test_wrong_usage(options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run("map", ARM, *options)
+    assert caught.value.code == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--error", "EXY"), 'states no error "EXY"; did you mean'),
+        (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
+        (("--error", "EXX", "--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
+    ],
+)
+def test_wrong_usage_that_the_file_tells(
+    options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("map", ARM, *options) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and message in err
+
+
+def test_a_bad_file_is_status_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(SCALES.replace("FB1", "FB3").replace("[1 um, 4 um]", "[1 um, 4]"), encoding="utf-8")
+    assert run("map", path) == 3
+    out, err = capsys.readouterr()
+    assert out == "" and [line.partition(": ")[0] for line in err.strip().split("\n")] == [
+        f"{path}:2:14",
+        f"{path}:5:28",
+    ]
+    assert run("map", "designs/quickstart.yaml") == 3
+    assert "this is an experiment or a sweep; name a machine file" in capsys.readouterr().err
+    assert run("check", ARM) == 3
+    assert "this describes a machine; use it with ballplate map" in capsys.readouterr().err
+
+
+def test_a_picture_is_not_written_over_the_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "machine.svg"
+    path.write_text(SCALES, encoding="utf-8")
+    assert run("map", path, "--plot", path) == 2
+    assert path.read_text(encoding="utf-8") == SCALES
+    assert run("map", path, "--plot", tmp_path / "no" / "map.svg") == 3
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_a_missing_plotting_library_is_named(
+    scales: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [one for one in sys.modules if one.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert run("map", scales, "--plot", tmp_path / "map.svg") == 3
+    out, err = capsys.readouterr()
+    assert "body diagonal" in out and "python -m pip install 'ballplate[report]'" in err

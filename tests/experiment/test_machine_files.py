@@ -1,0 +1,251 @@
+"""Machine files: what they say arrives in metres and radians, and everything that is wrong is told at once."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simulator.experiment import ExperimentError, load
+from simulator.experiment.machine_file import load_machine
+from simulator.machines.curves import Points
+from simulator.machines.description import AxisTemperature, PowerSeries, Squareness
+
+MACHINE = """\
+title: moving horizontal arm
+arrangement: MH2
+volume: {x: [-100 mm, 1800 mm], y: [0 mm, 1200 mm], z: [0 mm, 1200 mm]}
+reference_point: [0 mm, 100 mm, 0 mm]
+probe: [0 mm, 0 mm, -100 mm]
+straightness: least squares
+errors:
+  EXX: {polynomial: [0 um, 12 um, -3 um], bandwidth: 6 um, sigmas: 3, line: {z: 250 mm}}
+  EYX: {file: eyx.csv, sigmas: 2}
+  EBX: {bandwidth: 4 urad}
+squareness: {EC0Y: 12 arcsec, EB0Z: {value: 3 urad, at: [100 mm, 200 mm, 300 mm], bandwidth: 2 urad}}
+temperature: {x: {deviation: -1.5 K, expansion: 11 um/m/degC, standard_uncertainty: 0.1 K}}
+droop: {phi1: 2 urad/m, phi2: -3 urad/m}
+probing: 1 um
+"""
+TABLE = """\
+# measured: last year
+# line: y = 400 mm, z = 250 mm
+# straightness: minimum zone
+# probe: 0 mm, 0 mm, -50 mm
+position_mm,EYX_um,EYX_bandwidth_nm
+900,3,1500
+-100,0,1000
+1800,-1,2000
+"""
+
+
+def written(folder: Path, machine: str = MACHINE, table: str = TABLE) -> Path:
+    (folder / "eyx.csv").write_text(table, encoding="utf-8")
+    path = folder / "m.yaml"
+    path.write_text(machine, encoding="utf-8")
+    return path
+
+
+def told(path: Path) -> list[str]:
+    with pytest.raises(ExperimentError) as caught:
+        load_machine(path)
+    return str(caught.value).replace(f"{path.parent}/", "").split("\n")
+
+
+def test_everything_arrives(tmp_path: Path) -> None:
+    found = pickle.loads(pickle.dumps(load_machine(written(tmp_path))))
+    assert (found.arrangement_name, found.arrangement.probe_side) == ("MH2", ("x", "z", "y"))
+    assert (found.lower, found.upper) == ((-0.1, 0.0, 0.0), (1.8, 1.2, 1.2))
+    assert (found.reference, found.probe, found.probing) == ((0.0, 0.1, 0.0), (0.0, 0.0, -0.1), 1e-6)
+    assert dict(found.droop) == {"phi1": 2e-6, "phi2": -3e-6}
+    assert dict(found.temperature) == {"x": AxisTemperature(11e-6, -1.5, 0.1)}
+    first, second = found.squareness
+    assert first.value == pytest.approx(12 * np.pi / 180 / 3600)
+    assert second == Squareness("EB0Z", 3e-6, (0.1, 0.2, 0.3), 1e-6)
+    exx, eyx, ebx = found.errors
+    assert exx.shape == PowerSeries((0.0, 12e-6, -3e-6)) and exx.deviation == pytest.approx(2e-6)
+    assert exx.line == (0.0, 0.1, 0.25)
+    assert eyx.shape == Points((-0.1, 0.9, 1.8), (0.0, 3e-6, -1e-6))
+    assert isinstance(eyx.deviation, Points)
+    np.testing.assert_allclose(eyx.deviation.values, [0.5e-6, 0.75e-6, 1e-6])
+    assert (eyx.line, eyx.probe, eyx.criterion) == ((0.0, 0.4, 0.25), (0.0, 0.0, -0.05), "minimum zone")
+    assert (ebx.name, ebx.shape, ebx.deviation, ebx.criterion) == ("EBX", None, 2e-6, "least squares")
+
+
+def test_what_may_be_left_out(tmp_path: Path) -> None:
+    text = "title: plain\narrangement: {probe_side: [x, z], workpiece_side: [y]}\nvolume: [1 m, 1 m, 1 m]\n"
+    found = load_machine(written(tmp_path, text))
+    assert found.reference == found.lower == (0.0, 0.0, 0.0)
+    assert not found.errors and not found.squareness and found.criterion == "end points"
+
+
+def test_several_mistakes_are_told_at_once(tmp_path: Path) -> None:
+    text = """\
+title: full of mistakes
+arrangement: MH3
+volume: {x: [0 mm, 1800 mm], y: [0 mm, 1200 mm], z: [0 mm, 1200 mm]}
+errors:
+  EXX: {polynomial: [0 um, 12 urad, -3], bandwidth: -2 um, sigmas: 4}
+  EYX: {file: none.csv}
+  EYQ: {file: eyx.csv}
+  EBX: {polynomial: [0 urad, 20 urad], file: eyx.csv}
+  EZX: {file: eyx.csv, line: {y: 1 mm}}
+  EAX: {}
+  EYY: {polynomial: [1 um, 2 um], straightness: end points}
+squareness: {EC0Y: 12, EB0Y: 3 urad}
+temperature: {x: {deviation: 1.5, expansion: 11 um/m}}
+drop: {phi1: 2 urad/m}
+probing: 0 um
+"""
+    expected = [
+        'm.yaml:2:14: arrangement: unknown value "MH3"; did you mean "MH2"?',
+        'm.yaml:5:28: errors.EXX.polynomial[1]: "12 urad" is an angle; a length is expected',
+        'm.yaml:5:37: errors.EXX.polynomial[2]: "-3" has no unit',
+        'm.yaml:5:53: errors.EXX.bandwidth: "-2 um" must be above zero',
+        "m.yaml:5:68: errors.EXX.sigmas: expected one of: 1, 2, 3; found the number 4",
+        "m.yaml:6:15: errors.EYX.file: none.csv: there is no such file",
+        'm.yaml:7:3: errors.EYQ: unknown key; did you mean "EZY"?',
+        "m.yaml:8:8: errors.EBX: a polynomial and a file cannot both be the error; leave one of them out",
+        "m.yaml:8:46: errors.EBX.file: eyx.csv: the file should have EBX alone, but has EYX, EYX_bandwidth",
+        'm.yaml:9:8: errors.EZX: "line" has no meaning here; write # line: … into the file',
+        "m.yaml:9:15: errors.EZX.file: eyx.csv: the file should have EZX alone",
+        "m.yaml:10:8: errors.EAX: nothing is stated; give a polynomial, a file, or the bandwidth of a random error",
+        "m.yaml:11:35: errors.EYY.straightness: unknown key",
+        'm.yaml:12:20: squareness.EC0Y: "12" has no unit; write for example "12 arcsec"',
+        'm.yaml:12:24: squareness.EB0Y: unknown key; did you mean "EC0Y"?',
+        'm.yaml:13:30: temperature.x.deviation: "1.5" has no unit; write for example "1.5 degC"',
+        'm.yaml:13:46: temperature.x.expansion: "11 um/m" is a ratio; a thermal expansion is expected',
+        'm.yaml:14:1: drop: unknown key; did you mean "droop"?',
+        'm.yaml:15:10: probing: "0 um" must be above zero; give a small one, such as 1 nm',
+    ]
+    lines = told(written(tmp_path, text))
+    assert len(lines) == len(expected), lines
+    for line, start in zip(lines, expected, strict=True):
+        assert line.startswith(start), line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("MH2", "MB1", "m.yaml:13:1: droop: only the arm of MH1, MH2 droops; leave it out, or name one of them"),
+        ("x: [-100 mm, 1800 mm]", "x: [2 m, 1 m]", "m.yaml:3:13: volume.x: ends at 1000 mm, not above its beginning"),
+        (", z: [0 mm, 1200 mm]}", "}", "m.yaml:3:9: volume.z: missing; a machine file has three axes"),
+        (
+            "[0 mm, 100 mm, 0 mm]",
+            "[0 mm, 2 m, 0 mm]",
+            "m.yaml:4:18: reference_point: y = 2000 mm is outside the volume",
+        ),
+        ("line: {z: 250 mm}", "line: {x: 1 mm}", "m.yaml:8:78: errors.EXX.line.x: the line runs along x; leave it out"),
+        ("line: {z: 250 mm}", "line: {z: 9 m}", "m.yaml:8:77: errors.EXX.line: z = 9000 mm is outside the volume"),
+        ("[0 um, 12 um, -3 um]", f"[{', '.join(['1 um'] * 12)}]", "m.yaml:8:21: errors.EXX.polynomial: has 12 entries"),
+        ("csv, sigmas", "csv, bandwidth: 1 um, sigmas", "m.yaml:9:35: errors.EYX.bandwidth: the file has a bandwidth"),
+        ("at: [100 mm", "at: [-1 m", "m.yaml:11:57: squareness.EB0Z.at: x = -1000 mm is outside the volume"),
+        (
+            "title: moving",
+            "positions: []\ntitle: moving",
+            "m.yaml:1:1: this is an experiment or a sweep; name a machine",
+        ),
+        ("probing: 1 um", "probing: 1 um\nprobing: 2 um", 'm.yaml:15:1: the key "probing" stands already in line 14'),
+        ("probing: 1 um", "probing:", "m.yaml:14:9: probing: empty; give a value, or leave it out"),
+    ],
+)
+def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in MACHINE
+    lines = told(written(tmp_path, MACHINE.replace(old, new)))
+    assert lines[0].startswith(message), lines
+    assert len(lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "messages"),
+    [
+        ("y = 400 mm, z", "y = 400 mm, y", ["eyx.csv:2:9: y is given twice; leave one of them out"]),
+        ("y = 400 mm", "y = 400", ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm"']),
+        ("y = 400 mm", "x = 400 mm", ["eyx.csv:2:9: the line runs along x; leave it out"]),
+        ("y = 400 mm", "at the front", ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y']),
+        ("y = 400 mm", "y = 4 m", ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"]),
+        ("# line", "# lines", ['eyx.csv:2:3: unknown "lines:"; did you mean "line"?']),
+        ("# straightness", "# line", ['eyx.csv:3:3: "line:" stands already in line 2; remove one']),
+        ("minimum zone", "minimal zone", ['eyx.csv:3:17: unknown criterion "minimal zone"; did you mean "minimum']),
+        ("0 mm, 0 mm, -50 mm", "0 mm, -50", ["eyx.csv:4:10: has 2 co-ordinates; give three, such as"]),
+        ("900,3,1500", "900,three,15,00", ["eyx.csv:6:1: 4 columns instead of 3"]),
+        ("1500", "-1500", ["m.yaml:9:15: errors.EYX.file: eyx.csv: a bandwidth is below zero"]),
+        ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write it with its unit']),
+        ("1800,", "950,", []),
+        ("1800,", "901,", []),
+    ],
+)
+def test_what_is_wrong_with_a_table(tmp_path: Path, old: str, new: str, messages: list[str]) -> None:
+    assert old in TABLE
+    if not messages:
+        # More than half of the axis, from -100 mm to 1800 mm, is enough.
+        load_machine(written(tmp_path, table=TABLE.replace(old, new)))
+        return
+    lines = told(written(tmp_path, table=TABLE.replace(old, new)))
+    assert len(lines) == len(messages)
+    for line, start in zip(lines, messages, strict=True):
+        assert line.startswith(start), line
+
+
+def test_a_table_of_a_part_of_the_axis(tmp_path: Path) -> None:
+    table = "position_mm,EYX_um\n0,0\n500,1\n"
+    (line,) = told(written(tmp_path, table=table))
+    assert line.startswith(
+        "m.yaml:9:15: errors.EYX.file: goes from 0 mm to 500 mm, but the volume from -100 mm to 1800"
+    )
+
+
+EXPERIMENT = """\
+title: a machine file
+machine: {volume: {x: [0 mm, 1 m], y: [0 mm, 1 m], z: [0 mm, 1 m]}, repeatability: 1 um}
+error_model: {kind: machine, file: m.yaml}
+true_machine: {kind: machine, file: m.yaml}
+probes: {down: [0 mm, 0 mm, -50 mm]}
+artefacts: {plate: {kind: grid, balls: [3, 3], size: [600 mm, 600 mm]}}
+positions: [{name: low, plane: z, level: 100 mm, corner: {x: 100 mm, y: 100 mm}}]
+"""
+
+
+def experiment(folder: Path, text: str = EXPERIMENT) -> Path:
+    path = folder / "e.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_an_experiment_with_a_machine_file(tmp_path: Path) -> None:
+    written(tmp_path)
+    (found,) = load(experiment(tmp_path))
+    again = pickle.loads(pickle.dumps(found))
+    assert again.true_machine.machine().a.tolist() == found.true_machine.machine().a.tolist()
+
+
+def test_mistakes_of_a_machine_file_are_told_with_the_experiment(tmp_path: Path) -> None:
+    written(tmp_path, MACHINE.replace("12 um", "12 urad").replace("probing: 1", "probing: 1 nm #"))
+    with pytest.raises(ExperimentError) as caught:
+        load(experiment(tmp_path, EXPERIMENT.replace("repeatability: 1 um", "repeatability: 1")))
+    lines = [line.replace(f"{tmp_path}/", "") for line in str(caught.value).split("\n")]
+    assert [line.partition(": ")[0] for line in lines] == ["e.yaml:2:84", "m.yaml:8:28"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("x: [0 mm, 1 m]", "x: [0 mm, 3 m]", "e.yaml:4:37: true_machine.file: its volume goes from -100 mm to 1800 mm"),
+        ("m.yaml}\nprobes", "n.yaml}\nprobes", "e.yaml:4:37: true_machine.file:"),
+        ("m.yaml}\ntrue", "n.yaml}\ntrue", "e.yaml:3:36: error_model.file:"),
+    ],
+)
+def test_what_is_wrong_with_the_use_of_a_machine_file(tmp_path: Path, old: str, new: str, message: str) -> None:
+    written(tmp_path)
+    with pytest.raises(ExperimentError) as caught:
+        load(experiment(tmp_path, EXPERIMENT.replace(old, new)))
+    (line,) = str(caught.value).replace(f"{tmp_path}/", "").split("\n")
+    assert line.startswith(message)
+
+
+def test_a_machine_that_states_nothing_to_be_estimated(tmp_path: Path) -> None:
+    written(tmp_path, "title: random\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors: {EXX: {bandwidth: 1 um}}\n")
+    with pytest.raises(ExperimentError, match=r"e.yaml:3:36: error_model.file: m.yaml states no error that could be"):
+        load(experiment(tmp_path))
