@@ -18,7 +18,7 @@ from .messages import ExperimentError, Message
 from .yamltree import Mark, read_text
 
 COMMENT = re.compile(r"\s*#\s*([A-Za-z]+)\s*:\s*(.*?)\s*$")
-KEYS = ("line", "straightness", "probe")
+KEYS = ("line", "straightness", "straightedge", "probe")
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class ErrorTable:
     line: dict[str, float]
     probe: Three
     criterion: Criterion | None
+    on_table: bool = False
 
 
 class LineError(ValueError):
@@ -93,14 +94,18 @@ def read_error_table(path: Path, name: str) -> ErrorTable:
     if curves and (others or name not in curves):
         text = f"the file should have {name}" + (f" alone, but has {listing(others)}" if others else "")
         messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
-    elif criterion is not None and name[1] not in {"X", "Y", "Z"} - {name[2]}:
-        messages.append(stated["straightness"][0].message("", f"{name} is no straightness error; remove this line"))
+    elif name[1] not in {"X", "Y", "Z"} - {name[2]}:
+        text = f"{name} is no straightness error; remove this line"
+        messages += [stated[key][0].message("", text) for key in ("straightness", "straightedge") if key in stated]
     bandwidth = curves.get(name + BANDWIDTH)
     if bandwidth is not None and min(bandwidth.values) < 0:
         messages.append(Message(str(path), 0, 0, "", "a bandwidth is below zero; write half the width of the band"))
+    if "straightedge" in stated and stated["straightedge"][1] != "table":
+        mark, text = stated["straightedge"]
+        messages.append(mark.message("", f'unknown place "{shorten(text)}"; write table, or leave the line out'))
     if messages:
         raise ExperimentError(sorted(messages))
-    return ErrorTable(curves[name], bandwidth, line_of, probe, criterion)
+    return ErrorTable(curves[name], bandwidth, line_of, probe, criterion, "straightedge" in stated)
 
 
 def _line(stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message]) -> dict[str, float]:

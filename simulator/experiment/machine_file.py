@@ -153,7 +153,9 @@ def _errors(
             criterion = getattr(one, "straightness", None) or machine.criterion
             shape = PowerSeries(one.polynomial)
             probe = one.probe or (0.0, 0.0, 0.0)
-            yield replace(error, shape=shape, line=line, probe=probe, criterion=criterion)
+            on_table = getattr(one, "straightedge", None) is not None
+            _check_table(on_table, machine, error.axis, (*steps, "straightedge"), problems)
+            yield replace(error, shape=shape, line=line, probe=probe, criterion=criterion, on_table=on_table)
         elif one.file is not None:
             table = _table(source.parent / one.file, name, (*steps, "file"), problems)
             if table is None:
@@ -166,8 +168,9 @@ def _errors(
                     problems.add((*steps, "bandwidth"), "the file has a bandwidth as well; leave one of the two out")
                 deviations = tuple(value / one.sigmas for value in table.bandwidth.values)
                 error = replace(error, deviation=Points(table.bandwidth.positions, deviations))
-            criterion = table.criterion or machine.criterion
-            yield replace(error, shape=table.points, line=line, probe=table.probe, criterion=criterion)
+            _check_table(table.on_table, machine, error.axis, (*steps, "file"), problems)
+            error = replace(error, line=line, probe=table.probe, on_table=table.on_table)
+            yield replace(error, shape=table.points, criterion=table.criterion or machine.criterion)
         else:
             yield error
 
@@ -219,6 +222,11 @@ def _inside(point: Three | None, machine: MachineDescription, steps: Steps, prob
                 f"{format_length(machine.lower[k])} to {format_length(machine.upper[k])}; correct one of the two"
             )
             problems.add(steps, text)
+
+
+def _check_table(on_table: bool, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:
+    if on_table and AXES[axis] not in machine.arrangement.workpiece_side:
+        problems.add(steps, f"the {AXES[axis]} axis moves no table; leave straightedge: table out")
 
 
 def _check_range(points: Points, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:

@@ -32,9 +32,10 @@ Sigmas = Annotated[Literal[1, 2, 3], Field()]
 BANDWIDTH = "random part, as so many standard deviations on either side as sigmas says, the same along the axis"
 SIGMAS = "standard deviations in a bandwidth: 1, 2 or 3"
 POLYNOMIAL = "coefficients of 1, t, t^2, … with t from 0 to 1 along the axis, to the tenth order"
-FILE = "CSV file with columns such as position_mm,EXX_um, whose comments may say # line, # straightness and # probe"
+FILE = "CSV file with columns such as position_mm,EXX_um, whose comments may say # line, # straightness, # probe"
 LINE = "where it was measured, as positions of the other axes; default: through the reference point"
 PROBE = "offset of the reflector or tip from the reference point of the probe while it was measured; default 0"
+STRAIGHTEDGE = "table, where it was measured along a straightedge on a table that the axis moves"
 STRAIGHTNESS = "line that a straightness error is told from: end points, least squares or minimum zone"
 
 
@@ -59,7 +60,7 @@ class _ErrorSettings(Settings):
             raise ValueError("a polynomial and a file cannot both be the error; leave one of them out")
         if polynomial is None and self.file is None and bandwidth is None:
             raise ValueError("nothing is stated; give a polynomial, a file, or the bandwidth of a random error")
-        for key in ("line", "probe", "straightness"):
+        for key in ("line", "probe", "straightness", "straightedge"):
             if key in self.model_fields_set and polynomial is None:
                 where = f"write # {key}: … into the file" if self.file else "remove it, or give a polynomial"
                 raise ValueError(f'"{key}" has no meaning here; {where}')
@@ -79,6 +80,7 @@ class StraightnessSettings(PositioningSettings):
     """A straightness error of an axis."""
 
     straightness: Criterion | None = Field(None, description=f"{STRAIGHTNESS}; default: that of the machine")
+    straightedge: Literal["table"] | None = Field(None, description=STRAIGHTEDGE)
 
 
 class RotationSettings(_ErrorSettings):

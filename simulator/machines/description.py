@@ -41,10 +41,23 @@ class PowerSeries:
 
 
 @dataclass(frozen=True)
+class Lever:
+    """A rotation times the distance of its axis from the reference point, in metres: `length` (t - `t0`)."""
+
+    rotation: Combination
+    length: float
+    t0: float
+
+    def values(self, t: Array) -> Array:
+        """The product at t (m,), as (m, 1)."""
+        return np.asarray(self.length * (t - self.t0)[:, None] * self.rotation.values(t))
+
+
+@dataclass(frozen=True)
 class Combination:
     """A single function: a sum of multiples of others, less a straight line."""
 
-    parts: tuple[tuple[float, PowerSeries | Curve | Combination], ...]
+    parts: tuple[tuple[float, PowerSeries | Curve | Combination | Lever], ...]
     intercept: float = 0.0
     slope: float = 0.0
 
@@ -84,8 +97,9 @@ class ParametricError:
 
     `line` has the positions of the axes on the line of measurement, its own axis's without meaning, and `probe` the
     offset of what was measured, a tip or a reflector, from the machine's own point that the scales tell; None for the
-    line through the reference point. `deviation` is the standard deviation of the random part, along the axis or at
-    points of it.
+    line through the reference point. `on_table` says that a table, which the axis moves, held the straightedge;
+    otherwise a point fixed to what the axis moves was followed. `deviation` is the standard deviation of the random
+    part, along the axis or at points of it.
     """
 
     name: str
@@ -94,6 +108,7 @@ class ParametricError:
     probe: Three = (0.0, 0.0, 0.0)
     criterion: Criterion = "end points"
     deviation: float | Points | None = None
+    on_table: bool = False
 
     @property
     def axis(self) -> int:
@@ -165,7 +180,8 @@ def coupling(machine: MachineDescription, error: ParametricError) -> Array:
     """What the three rotations of an error's axis add to it on its line of measurement, (3,) in metres per radian.
 
     The rotation turns what the axis carries of the distance to the line through the reference point, and the probe.
-    Displacements along the axis itself count on both lines alike.
+    Displacements along the axis itself count on both lines alike; what they do to a straightedge on a table comes in
+    addition.
     """
     offset = np.zeros((1, 3))
     if error.line is not None:
@@ -194,19 +210,34 @@ def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
         shape = stated_function(machine, error)
         if shape is None:
             continue
-        parts: list[tuple[float, PowerSeries | Curve | Combination]] = [(1.0, shape)]
-        if not error.is_rotation:
-            for letter, factor in zip(ROTATIONS, coupling(machine, error), strict=True):
-                rotation = found.get(f"E{letter}{error.name[2]}")
-                if rotation is not None and factor:
-                    parts.append((-float(factor), rotation))
-        function = Combination(tuple(parts))
+        function = Combination(((1.0, shape), *_by_rotations(machine, error, found)))
         if error.is_straightness:
             t = np.asarray(shape.t) if isinstance(shape, Curve) else np.linspace(0.0, 1.0, REDUCTION_POINTS)
             function = function.less(*reference_line(t, function.values(t)[:, 0], error.criterion))
         at_reference = machine.scaled(error.axis, machine.reference[error.axis])
         found[error.name] = function.less(float(function.values(np.atleast_1d(at_reference))[0, 0]))
     return found
+
+
+def _by_rotations(
+    machine: MachineDescription, error: ParametricError, known: Mapping[str, Combination]
+) -> list[tuple[float, Combination | Lever]]:
+    """What the rotations of its axis have added to an error where it was measured, with the opposite sign."""
+    if error.is_rotation:
+        return []
+    own = np.eye(3)[error.axis]
+    turned = np.cross(np.eye(3), own)[:, TRANSLATIONS.index(error.name[1])]
+    length = machine.upper[error.axis] - machine.lower[error.axis]
+    t0 = float(machine.scaled(error.axis, machine.reference[error.axis]))
+    parts: list[tuple[float, Combination | Lever]] = []
+    for letter, factor, lever in zip(ROTATIONS, coupling(machine, error), turned, strict=True):
+        rotation = known.get(f"E{letter}{error.name[2]}")
+        if rotation is not None and factor:
+            parts.append((-float(factor), rotation))
+        if rotation is not None and error.on_table and lever:
+            # A table turns the workpiece the other way.
+            parts.append((float(lever), Lever(rotation, length, t0)))
+    return parts
 
 
 def true_volumetric(machine: MachineDescription) -> TrueMachine:

@@ -170,6 +170,12 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         ("# straightness", "# line", ['eyx.csv:3:3: "line:" stands already in line 2; remove one']),
         ("minimum zone", "minimal zone", ['eyx.csv:3:17: unknown criterion "minimal zone"; did you mean "minimum']),
         ("0 mm, 0 mm, -50 mm", "0 mm, -50", ["eyx.csv:4:10: has 2 co-ordinates; give three, such as"]),
+        (
+            "# probe",
+            "# straightedge: table\n# probe",
+            ["m.yaml:9:15: errors.EYX.file: the x axis moves no table; leave"],
+        ),
+        ("# probe", "# straightedge: box\n# probe", ['eyx.csv:4:17: unknown place "box"; write table, or leave']),
         ("900,3,1500", "900,three,15,00", ["eyx.csv:6:1: 4 columns instead of 3"]),
         ("1500", "-1500", ["m.yaml:9:15: errors.EYX.file: eyx.csv: a bandwidth is below zero"]),
         ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write it with its unit']),

@@ -124,11 +124,18 @@ def values_at(functions: dict[str, Callable[[float], float]], position: np.ndarr
     return {name: one(position[AXES.index(name[3])] / SIZE[AXES.index(name[3])]) for name, one in functions.items()}
 
 
-@pytest.mark.parametrize("name", ARRANGEMENTS)
-def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(name: str, tmp_path: Path) -> None:
+TABLES = [name for name, one in ARRANGEMENTS.items() if one.workpiece_side]
+
+
+@pytest.mark.parametrize(
+    ("name", "straightedge"), [*((name, False) for name in ARRANGEMENTS), *((name, True) for name in TABLES)]
+)
+def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(
+    name: str, straightedge: bool, tmp_path: Path
+) -> None:
     """Rigid bodies are measured on lines all over the volume, with a reflector off the probe; the tables give the map.
 
-    Of a table that moves a point fixed to it is measured.
+    Of a table that moves a point fixed to it is measured, or the tip along a straightedge on it.
     """
     chain = [list(ARRANGEMENTS[name].probe_side), list(ARRANGEMENTS[name].workpiece_side)]
     functions, square = true_functions(5), {"a": 2e-5, "b1": -1e-5, "b2": 3e-5}
@@ -146,12 +153,15 @@ def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(name: st
                 where = at.copy()
                 where[k] = x
                 errors = values_at(functions, where) | square
-                seen_from = np.where((np.arange(3) == k) & (key[3] in chain[1]), 0.0, where)
+                follows = key[3] in chain[1] and not straightedge
+                seen_from = np.where((np.arange(3) == k) & follows, 0.0, where)
                 values.append(tip_error(chain, seen_from, reflector, errors)[component])
         letters = "XYZ" if key[0] == "d" else "ABC"
         iso, unit = f"E{letters[component]}{key[3].upper()}", "um" if key[0] == "d" else "urad"
         others = ", ".join(f"{AXES[j]} = {at[j]:.17g} m" for j in range(3) if j != k)
         head = [f"# line: {others}", "# probe: " + ", ".join(f"{x:.17g} m" for x in reflector)]
+        if straightedge and key[3] in chain[1] and component != k:
+            head.append("# straightedge: table")
         rows = [
             f"{1000 * x!r},{1e6 * value!r}" for x, value in zip(positions.tolist(), map(float, values), strict=True)
         ]
