@@ -101,6 +101,11 @@ class Volumetric:
         chain = KinematicModel(machine.arrangement, (), machine.lower, machine.upper, origin=machine.reference)
         return VolumetricModel(chain, tuple(one for one, _ in fields)), np.array([size for _, size in fields])
 
+    @property
+    def is_random(self) -> bool:
+        """Whether anything has a random part."""
+        return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
+
     def systematic(self, points: Array) -> Array:
         """Systematic errors (m, 3) where the axes stand at points (m, 3)."""
         probe = np.broadcast_to(self.machine.probe, points.shape)

@@ -17,7 +17,7 @@ from .tables import SHOWN, aligned, number
 from .volumetric import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = "errors are where the tip is, less where the scales say: corrections, to be added to readings"
-RANDOM = "random: standard deviation, what each approach draws and what lasts in quadrature"
+RANDOM = "random: one standard deviation; what each approach draws and what lasts, in quadrature"
 
 
 def machine_lines(machine: MachineDescription) -> list[str]:
@@ -34,7 +34,8 @@ def machine_lines(machine: MachineDescription) -> list[str]:
         rows.append([*cells, _stated_as(one, machine)])
     lines += aligned(rows, [False, False, False, True, True, False, False]) if len(rows) > 1 else ["no errors of axes"]
     others = _others(machine)
-    return [*lines, *(["", *aligned(others, [False, False, False, True, False])] if others else [])]
+    lines += ["", *aligned(others, [False, False, False, True, False])] if others else []
+    return [*lines, *(["", RANDOM] if Volumetric(machine).is_random else [])]
 
 
 def _chain(arrangement: Arrangement) -> str:
@@ -77,12 +78,13 @@ def _numbers(machine: MachineDescription) -> list[tuple[Parameter, float]]:
 
 def diagonal_lines(found: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
-    rows = [["body diagonal", "from", "to", "length, mm", "error, um", "random, um"]]
+    is_random = bool(found.deviation.any())
+    rows = [["body diagonal", "from", "to", "length, mm", "error, um", *(["random, um"] if is_random else [])]]
     for k in range(len(found.error)):
         ends = [f"({', '.join(_millimetres(v) for v in point)})" for point in (found.starts[k], found.ends[k])]
-        error, deviation = number(1e6 * float(found.error[k])), number(1e6 * float(found.deviation[k]))
-        rows.append([str(k + 1), *ends, f"{1e3 * found.nominal[k]:.3f}", error, deviation])
-    return aligned(rows, [False, False, False, True, True, True])
+        told = [float(found.error[k]), *([float(found.deviation[k])] if is_random else [])]
+        rows.append([str(k + 1), *ends, f"{1e3 * found.nominal[k]:.3f}", *(number(1e6 * value) for value in told)])
+    return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
 
 
 def error_lines(found: VolumetricErrors) -> list[str]:

@@ -146,7 +146,6 @@ def _on_a_line(machine: Volumetric, options: Namespace) -> int:
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
     from ..report.volumetric import draw_grid
     from ..volumetric_tables import (
-        RANDOM,
         diagonal_data,
         diagonal_lines,
         error_csv,
@@ -164,7 +163,7 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
     elif options.format == "csv":
         print_lines(list(error_csv(found)))
     else:
-        print_lines([*machine_lines(machine.machine), RANDOM, "", *diagonal_lines(diagonals), "", *error_lines(found)])
+        print_lines([*machine_lines(machine.machine), "", *diagonal_lines(diagonals), "", *error_lines(found)])
     return _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
 
 

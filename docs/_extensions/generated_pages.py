@@ -83,7 +83,7 @@ def _keys(whole: Schema) -> str:
         part = whole["$defs"][name]
         kind = part["properties"].get("kind", {}).get("const")
         title = f"`{paths[0]}`" + (f" of kind `{kind}`" if kind else "")
-        lines += ["", f"({_anchor(name)})=", f"### {title}", "", part["description"]]
+        lines += ["", f"({_anchor(name, whole)})=", f"### {title}", "", part["description"]]
         others = [path for path in dict.fromkeys(paths) if path != paths[0]]
         if others:
             lines += ["", f"The same may stand at {', '.join(f'`{path}`' for path in others)}."]
@@ -147,7 +147,7 @@ def _form(part: Schema, whole: Schema) -> str:
     if "$ref" in part:
         name = part["$ref"].removeprefix("#/$defs/")
         kind = whole["$defs"][name]["properties"].get("kind", {}).get("const")
-        return f"[{kind or 'mapping'}](#{_anchor(name)})"
+        return f"[{kind or 'mapping'}](#{_anchor(name, whole)})"
     choices = [*part.get("anyOf", ()), *part.get("oneOf", ())]
     if choices:
         return ", or ".join(dict.fromkeys(_form(choice, whole) for choice in choices))
@@ -188,8 +188,10 @@ def _range(part: Schema) -> str:
     return f" {' '.join(words)}" if words else ""
 
 
-def _anchor(name: str) -> str:
-    return f"file-format-{name.lower()}"
+def _anchor(name: str, whole: Schema) -> str:
+    # Several kinds of files have sections of the same name.
+    prefix = "machine-file" if whole["title"] == "ballplate machine" else "file-format"
+    return f"{prefix}-{name.lower()}"
 
 
 def commands() -> str:

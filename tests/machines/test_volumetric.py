@@ -184,7 +184,7 @@ def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(
 RANDOM = {"dx_x": 1e-6, "dy_y": 2e-6, "dz_x": 0.5e-6, "Ey_x": 3e-6, "Ez_y": 2e-6, "Ex_y": 4e-6, "Ex_z": 5e-6}
 
 
-@pytest.mark.parametrize("name", ["MB1", "FB2", "CX1"])
+@pytest.mark.parametrize("name", ["MB1", "CX1"])
 def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
     """Functions are drawn anew at each end of a length, squareness and temperature once for both, on rigid bodies."""
     chain = [list(ARRANGEMENTS[name].probe_side), list(ARRANGEMENTS[name].workpiece_side)]
@@ -202,7 +202,7 @@ def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
         probing=0.7e-6,
     )
     start, end = np.array([1.5, 0.1, 0.2]), np.array([0.2, 1.0, 0.8])
-    count = 3000
+    count = 2000
     generator = np.random.default_rng(4)
     found = {"start": np.zeros((count, 3)), "end": np.zeros((count, 3)), "length": np.zeros(count)}
     for k in range(count):
