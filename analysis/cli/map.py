@@ -14,9 +14,6 @@ if TYPE_CHECKING:
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
-# As ballplate.volumetric has it, which loads too much for --help.
-MOST_POINTS = 200_000
-
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
@@ -53,6 +50,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _grid(text: str) -> tuple[int, int, int]:
+    from ..volumetric import MOST_POINTS
+
     parts = [part.strip() for part in text.split(",")]
     if len(parts) == 3 and all(part.isascii() and part.isdigit() and len(part) < 8 for part in parts):
         x, y, z = (int(part) for part in parts)
@@ -64,6 +63,8 @@ def _grid(text: str) -> tuple[int, int, int]:
 
 
 def _points(text: str) -> int:
+    from ..volumetric import MOST_POINTS
+
     found = count(text)
     if not 2 <= found <= MOST_POINTS:
         raise ArgumentTypeError(f"a line has 2 to {MOST_POINTS} points, not {found}")

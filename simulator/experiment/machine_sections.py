@@ -28,7 +28,7 @@ from .sections import Edges, Line, Text, VolumeSettings
 MOST_COEFFICIENTS = 11
 
 Point = tuple[Length, Length, Length]
-Sigmas = Annotated[Literal[1, 2, 3], Field()]
+Sigmas = Literal[1, 2, 3]
 BANDWIDTH = "random part, as so many standard deviations on either side as sigmas says, the same along the axis"
 SIGMAS = "standard deviations in a bandwidth: 1, 2 or 3"
 POLYNOMIAL = "coefficients of 1, t, t^2, … with t from 0 to 1 along the axis, to the tenth order"

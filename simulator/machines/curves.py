@@ -30,8 +30,9 @@ class Points:
 
     def curve(self, interpolation: Interpolation, lower: float, upper: float) -> Curve:
         """The function of t that is 0 at `lower` and 1 at `upper`, both in metres."""
-        t = (np.array(self.positions) - lower) / (upper - lower)
-        return Curve(tuple(t.tolist()), self.values, interpolation)
+        # Positions may differ by less than fractions of a long axis can.
+        t, first = np.unique((np.array(self.positions) - lower) / (upper - lower), return_index=True)
+        return Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
 
 
 @dataclass(frozen=True)
