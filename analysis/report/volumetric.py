@@ -13,7 +13,20 @@ from simulator.machines.volumetric import meaning, symbol
 from ..tables import SHOWN, number
 from ..volumetric import AlongAxis, LengthErrors, VolumetricErrors
 from .scene import box_edges, projection
-from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, blank_axes, drawing, micro, placed_axes, save
+from .svg import (
+    DASHES,
+    INK,
+    MARKERS,
+    MUTED,
+    PAPER,
+    SERIES,
+    blank_axes,
+    drawing,
+    magnification,
+    micro,
+    placed_axes,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,29 +40,25 @@ LARGEST = 0.06
 MOST_MARKS = 60
 
 
-def magnification_of(found: VolumetricErrors) -> int:
+def magnification_of(found: VolumetricErrors) -> float:
     """A round factor that makes the largest error well visible in the volume."""
     size = float(np.linalg.norm(np.ptp(found.points, axis=0)))
     largest = float(found.resultant.max())
-    if largest == 0.0:
-        return 1
-    wanted = LARGEST * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return max(int(max(step * power for step in (1, 2, 5) if step * power <= wanted)), 1)
+    return round_number(LARGEST * size / largest) if largest else 1.0
 
 
 def draw_grid(
     found: VolumetricErrors,
     diagonals: LengthErrors,
     counts: tuple[int, int, int],
-    magnification: int | None,
+    magnified: int | None,
     path: Path,
 ) -> None:
     """Write a picture of the grid's outside, nominal and displaced.
 
     :raises OSError: the file cannot be written.
     """
-    factor = magnification or magnification_of(found)
+    factor = magnified or magnification_of(found)
     view, away = projection(3)
     nominal = found.points.reshape(*counts, 3)
     moved = nominal + factor * found.systematic.reshape(*counts, 3)
@@ -69,13 +78,13 @@ def draw_grid(
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         _axis_names(axes, nominal, view, size)
         axes.plot([], [], color=MUTED, linewidth=0.9, label="nominal grid")
-        axes.plot([], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor} times")
+        axes.plot([], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor:g} times")
         axes.legend(loc="upper left", borderaxespad=0.8)
         told = [f"diagonal {k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)]
         figure.text(0.5, 0.025, "length errors of " + ", ".join(told), ha="center", fontsize=8.5)
         axes.set_xlim(low[0] - 0.08 * size, high[0] + 0.08 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
-        save(figure, path, f"Volumetric errors, magnified {factor} times: " + ", ".join(told))
+        save(figure, path, f"Volumetric errors, magnified {factor:g} times: " + ", ".join(told))
 
 
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:

@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from analysis.cli import parser
+from simulator.experiment.machine_sections import machine_schema
 from simulator.experiment.schema import schema
 
 DOCS = Path("docs")
@@ -73,13 +74,13 @@ def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
 
 
 def test_reference_pages_have_everything(built: Path) -> None:
-    format_page = Page(built / "reference/file-format.html").text
-    whole = schema()
-    for section in (whole, *whole["$defs"].values()):
-        for key, value in section["properties"].items():
-            assert key in format_page
-            # Typography aside.
-            assert re.sub(r"\W+", " ", value["description"]) in re.sub(r"\W+", " ", format_page), (key, value)
+    for page, whole in (("file-format", schema()), ("machine-files", machine_schema())):
+        format_page = Page(built / f"reference/{page}.html").text
+        for section in (whole, *whole["$defs"].values()):
+            for key, value in section["properties"].items():
+                assert key in format_page
+                # Typography aside.
+                assert re.sub(r"\W+", " ", value["description"]) in re.sub(r"\W+", " ", format_page), (key, value)
     command_page = Page(built / "reference/commands.html").text
     (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
     for command in commands.choices.values():

@@ -64,7 +64,7 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: kinetic}", [
         '5:21: error_model.kind: unknown kind "kinetic"; did you mean "kinematic"?']),
     ("error_model: {kind: kinematic}", "error_model: {}", [
-        '5:14: error_model.kind: missing; add "kind", one of: kinematic, empirical, metric, python']),
+        '5:14: error_model.kind: missing; add "kind", one of: kinematic, empirical, metric, python, machine']),
     ("error_model: {kind: kinematic}", "error_model: {kind: metric}", [
         '5:21: error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; change '
         'one of the two']),
