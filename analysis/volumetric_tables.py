@@ -20,8 +20,9 @@ CONVENTION = "errors are where the tip is, less where the scales say: correction
 RANDOM = "random: one standard deviation; what each approach draws and what lasts, in quadrature"
 
 
-def machine_lines(machine: MachineDescription) -> list[str]:
+def machine_lines(built: Volumetric) -> list[str]:
     """What the machine is and its parametric errors."""
+    machine = built.machine
     name = f"{machine.arrangement_name}: " if machine.arrangement_name else ""
     lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
     rows = [["", "symbol", "error", "bandwidth", "random", "unit", "stated as"]]
@@ -33,9 +34,9 @@ def machine_lines(machine: MachineDescription) -> list[str]:
         cells = [one.error.name, symbol(one.error.name), meaning(one.error.name), bandwidth, random, SHOWN[unit]]
         rows.append([*cells, _stated_as(one, machine)])
     lines += aligned(rows, [False, False, False, True, True, False, False]) if len(rows) > 1 else ["no errors of axes"]
-    others = _others(machine)
+    others = _others(built)
     lines += ["", *aligned(others, [False, False, False, True, False])] if others else []
-    return [*lines, *(["", RANDOM] if Volumetric(machine).is_random else [])]
+    return [*lines, *(["", RANDOM] if built.is_random else [])]
 
 
 def _chain(arrangement: Arrangement) -> str:
@@ -57,10 +58,10 @@ def _stated_as(one: AlongAxis, machine: MachineDescription) -> str:
     return form + (f", {error.criterion}" if error.is_straightness else "")
 
 
-def _others(machine: MachineDescription) -> list[list[str]]:
+def _others(built: Volumetric) -> list[list[str]]:
     """Squareness, expansion and droop at the reference point."""
     rows = []
-    for parameter, value in _numbers(machine):
+    for parameter, value in _numbers(built):
         square = parameter.name.startswith("E")
         unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
         told = parameter.meaning + ("" if square or parameter.unit == "1" else ", over the whole axis")
@@ -68,11 +69,10 @@ def _others(machine: MachineDescription) -> list[list[str]]:
     return rows
 
 
-def _numbers(machine: MachineDescription) -> list[tuple[Parameter, float]]:
+def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
     """Errors that are no functions, with their values."""
-    truth = Volumetric(machine).truth
-    every = zip(truth.model.parameters, truth.a.tolist(), strict=True)
-    names = {one.name for one in machine.errors}
+    every = zip(built.truth.model.parameters, built.truth.a.tolist(), strict=True)
+    names = {one.name for one in built.machine.errors}
     return [(parameter, value) for parameter, value in every if parameter.function not in names]
 
 
@@ -153,8 +153,9 @@ def along_csv(one: AlongAxis) -> Iterator[str]:
         yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
 
-def machine_data(machine: MachineDescription) -> dict[str, Any]:
+def machine_data(built: Volumetric) -> dict[str, Any]:
     """What the machine is and its parametric errors, in metres and radians."""
+    machine = built.machine
     functions = {}
     for one in along_axes(machine):
         functions[one.error.name] = {
@@ -171,7 +172,7 @@ def machine_data(machine: MachineDescription) -> dict[str, Any]:
         "convention": CONVENTION,
         "parametric_errors": functions,
         "other_errors": {
-            parameter.name: {"value": value, "unit": parameter.unit} for parameter, value in _numbers(machine)
+            parameter.name: {"value": value, "unit": parameter.unit} for parameter, value in _numbers(built)
         },
     }
 

@@ -136,7 +136,7 @@ def _on_a_line(machine: Volumetric, options: Namespace) -> int:
     axis = next(k for k, name in enumerate("xyz") if name not in options.line)
     found = machine.errors(machine.along(axis, options.line, options.points))
     if options.format == "json":
-        print_json([{**machine_data(machine.machine), "line": error_data(found)}])
+        print_json([{**machine_data(machine), "line": error_data(found)}])
     elif options.format == "csv":
         print_lines(list(error_csv(found)))
     else:
@@ -159,12 +159,12 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
     found = machine.errors(machine.grid(options.grid))
     diagonals = machine.diagonals()
     if options.format == "json":
-        data = {**machine_data(machine.machine), "diagonals": diagonal_data(diagonals), "grid": error_data(found)}
+        data = {**machine_data(machine), "diagonals": diagonal_data(diagonals), "grid": error_data(found)}
         print_json([data])
     elif options.format == "csv":
         print_lines(list(error_csv(found)))
     else:
-        print_lines([*machine_lines(machine.machine), "", *diagonal_lines(diagonals), "", *error_lines(found)])
+        print_lines([*machine_lines(machine), "", *diagonal_lines(diagonals), "", *error_lines(found)])
     return _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
 
 

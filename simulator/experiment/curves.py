@@ -17,6 +17,8 @@ from .yamltree import Mark, read_text
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
 BANDWIDTH = "_bandwidth"
+# Far more than are measured along an axis.
+MOST_POINTS = 100_000
 
 
 def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
@@ -34,6 +36,9 @@ def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
     ]
     if not lines:
         raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")])
+    if len(lines) > MOST_POINTS + 1:
+        text = f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some of them out"
+        raise ExperimentError([Message(file, lines[0][0], 1, "", text)])
     known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
     names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], known)
     messages: list[Message] = []

@@ -195,6 +195,12 @@ def test_what_is_wrong_with_a_table(tmp_path: Path, old: str, new: str, messages
         assert line.startswith(start), line
 
 
+def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("simulator.experiment.curves.MOST_POINTS", 2)
+    (line,) = told(written(tmp_path))
+    assert line.startswith("eyx.csv:5:1: 3 points are too many; at most 2 are possible")
+
+
 def test_a_table_of_a_part_of_the_axis(tmp_path: Path) -> None:
     table = "position_mm,EYX_um\n0,0\n500,1\n"
     (line,) = told(written(tmp_path, table=table))
