@@ -246,12 +246,14 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
 
 
 def shape(t: Array, values: Array) -> str:
-    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it.
+    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it; none for a constant.
 
     >>> t = np.linspace(0, 1, 50)
-    >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5)
-    ('linear', 'quadratic', 'of degree 5')
+    >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5), shape(t, 0 * t + 2)
+    ('linear', 'quadratic', 'of degree 5', '')
     """
+    if not np.ptp(values):
+        return ""
     basis = np.polynomial.chebyshev.chebvander(2 * t - 1, HIGHEST)
     size = float(np.abs(values).max())
     for degree in range(1, HIGHEST + 1):

@@ -120,14 +120,10 @@ class VolumetricModel:
         return np.concatenate([by_chain, *by_fields], axis=2)
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """An axis's function along it, or a field's displacement along a diagonal of the volume."""
-        found = self.chain.lines(function, t)
-        for field in self.fields:
-            if field.name == function:
-                lower, upper = np.asarray(self.chain.lower), np.asarray(self.chain.upper)
-                values = field.values(self._from_origin(lower + t[:, None] * (upper - lower)))
-                found += (Line("along the diagonal", values.sum(axis=1, keepdims=True)),)
-        return found
+        """An axis's function along it; a field's number, which is the same everywhere."""
+        if any(field.name == function for field in self.fields):
+            return (Line("", np.ones((len(t), 1))),)
+        return self.chain.lines(function, t)
 
     def reported(self) -> Reported:
         """Functions as the kinematic model reports them, and the fields' numbers as they are."""

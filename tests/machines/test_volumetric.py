@@ -20,6 +20,8 @@ from simulator.machines.description import (
     fitted_volumetric,
     true_volumetric,
 )
+from simulator.machines.settings import RandomSettings
+from simulator.machines.truth import true_parameters
 from tests.published.rigid_body import tip_error
 
 SIZE = np.array([1.8, 1.2, 0.9])
@@ -285,3 +287,11 @@ def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
     assert values["phi1"] == pytest.approx(6e-6 * 1.2)
     # What the arm's bend is not told apart from.
     assert values["EZY t^2"] == pytest.approx(-12e-6 - 9e-6 * 1.2**2 / 2)
+
+
+def test_a_random_machine_of_the_fitted_family_has_the_stated_sizes() -> None:
+    described = load_machine("designs/park/machines/gec-like.yaml")
+    model = fitted_volumetric(described, described.lower, described.upper, 3)
+    a = true_parameters(RandomSettings(kind="random", position=2e-6, rotation=4e-6), model)
+    by_name = {one.name: value for one, value in zip(model.parameters, a, strict=True)}
+    assert [abs(by_name[name]) for name in ("EC0Y", "EB0Z", "EA0Z", "phi1")] == pytest.approx([4e-6] * 4)
