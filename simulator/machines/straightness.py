@@ -47,7 +47,11 @@ def _minimum_zone(t: Array, y: Array) -> tuple[float, float]:
     ones = np.ones_like(s)
     rows = np.concatenate([np.column_stack([ones, s, -ones]), np.column_stack([-ones, -s, -ones])])
     found = linprog(
-        (0.0, 0.0, 1.0), rows, np.concatenate([left, -left]) / size, bounds=[(None, None)] * 2 + [(0.0, None)]
+        (0.0, 0.0, 1.0),
+        rows,
+        np.concatenate([left, -left]) / size,
+        bounds=[(None, None)] * 2 + [(0.0, None)],
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )
     if not found.success:
         raise ArithmeticError(f"the minimum zone was not found: {found.message}")

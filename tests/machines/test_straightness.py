@@ -9,7 +9,7 @@ import pytest
 
 # Loaded beforehand, so that the first example does not take longer than examples may.
 import scipy.optimize  # noqa: F401
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from simulator.machines.straightness import reference_line
@@ -30,13 +30,16 @@ def narrowest(t: np.ndarray, y: np.ndarray) -> float:
     return float(min(widths))
 
 
+# Found by the search: a point almost on another one's level, which the solver's usual tolerance passes over.
+@example(([1.0] * 7, [2.0791914768435884e-06, 3.5560969828674295e-06, 1e-12, 3.6041486960862267e-06,
+                      9.474049520320464e-07, 0.0, 0.0]))  # fmt: skip
 @given(points)
 def test_minimum_zone_is_the_narrowest_strip(drawn: tuple[list[float], list[float]]) -> None:
     t, y = np.cumsum(drawn[0]), np.array(drawn[1])
     intercept, slope = reference_line(t, y, "minimum zone")
     left = y - intercept - slope * t
     assert np.ptp(left) == pytest.approx(narrowest(t, y), abs=1e-9 * np.ptp(y) + 1e-20)
-    assert left.max() == pytest.approx(-left.min(), abs=1e-7 * np.ptp(y) + 1e-20)
+    assert left.max() == pytest.approx(-left.min(), abs=1e-9 * np.ptp(y) + 1e-20)
 
 
 @given(points)

@@ -292,6 +292,8 @@ def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
 def test_a_random_machine_of_the_fitted_family_has_the_stated_sizes() -> None:
     described = load_machine("designs/park/machines/gec-like.yaml")
     model = fitted_volumetric(described, described.lower, described.upper, 3)
-    a = true_parameters(RandomSettings(kind="random", position=2e-6, rotation=4e-6), model)
+    a = true_parameters(
+        RandomSettings.model_validate({"kind": "random", "position": "2 um", "rotation": "4 urad"}), model
+    )
     by_name = {one.name: value for one, value in zip(model.parameters, a, strict=True)}
     assert [abs(by_name[name]) for name in ("EC0Y", "EB0Z", "EA0Z", "phi1")] == pytest.approx([4e-6] * 4)
