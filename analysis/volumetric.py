@@ -169,13 +169,17 @@ class Volumetric:
         sides = [np.linspace(low, high, count) for low, high, count in ends]
         return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
 
-    def along(self, axis: int, at: dict[str, float], count: int) -> Array:
-        """Points (m, 3) on a line along an axis; other axes stand at `at`, or at the reference point."""
-        points = np.tile(np.array(self.machine.reference), (count, 1))
+    def parallel(self, at: dict[str, float]) -> tuple[Array, Array]:
+        """Ends (3,) of the line along the axis that has no position in `at`."""
+        ends = np.array([self.machine.lower, self.machine.upper])
         for name, value in at.items():
-            points[:, AXES.index(name)] = value
-        points[:, axis] = np.linspace(self.machine.lower[axis], self.machine.upper[axis], count)
-        return points
+            ends[:, AXES.index(name)] = value
+        return ends[0], ends[1]
+
+
+def between(start: Array, end: Array, count: int) -> Array:
+    """Points (count, 3), evenly spaced from start to end."""
+    return np.asarray(np.linspace(start, end, count))
 
 
 @dataclass(frozen=True, eq=False)

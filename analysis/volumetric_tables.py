@@ -87,6 +87,12 @@ def diagonal_lines(found: LengthErrors) -> list[str]:
     return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
 
 
+def length_line(found: LengthErrors) -> str:
+    """The length error of a single line."""
+    random = f", random {number(1e6 * float(found.deviation[0]))} um" if found.deviation.any() else ""
+    return f"length {1e3 * found.nominal[0]:.3f} mm, length error {number(1e6 * float(found.error[0]))} um{random}"
+
+
 def error_lines(found: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
     heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant"]
@@ -179,9 +185,13 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
 
 def diagonal_data(found: LengthErrors) -> list[dict[str, Any]]:
     """Length errors of the body diagonals, in metres."""
+    return [{"diagonal": k + 1, **one} for k, one in enumerate(length_data(found))]
+
+
+def length_data(found: LengthErrors) -> list[dict[str, Any]]:
+    """Length errors, in metres."""
     return [
         {
-            "diagonal": k + 1,
             "from": found.starts[k].tolist(),
             "to": found.ends[k].tolist(),
             "length": float(found.nominal[k]),

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 from .common import count, draw, picture, print_json, print_lines
 
 if TYPE_CHECKING:
+    from simulator.machines.description import Three
+    from simulator.machines.protocol import Array
+
     from ..volumetric import AlongAxis, Volumetric
 
 WRONG_USAGE, BAD_FILE = 2, 3
@@ -30,7 +33,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--grid", metavar="N,N,N", type=_grid, default=(5, 5, 5), help="points along x, y and z; default 5,5,5"
     )
     where.add_argument(
-        "--line", metavar="LINE", type=_line, help='errors along a line instead, such as "y = 600 mm, z = 600 mm"'
+        "--line",
+        metavar="LINE",
+        type=_line,
+        help='errors along a line instead, parallel to an axis as in "y = 600 mm, z = 600 mm", or between two points '
+        'as in "0 mm, 0 mm, 0 mm to 1.8 m, 1.2 m, 1.2 m"',
     )
     where.add_argument("--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX")
     parser.add_argument(
@@ -71,10 +78,16 @@ def _points(text: str) -> int:
     return found
 
 
-def _line(text: str) -> dict[str, float]:
-    from simulator.experiment.error_tables import LineError, parse_line
+def _line(text: str) -> dict[str, float] | tuple[Three, Three]:
+    from simulator.experiment.error_tables import LineError, parse_line, parse_point
 
     try:
+        start, to, end = text.partition(" to ")
+        if to:
+            ends = parse_point(start), parse_point(end)
+            if ends[0] == ends[1]:
+                raise ArgumentTypeError("a line ends where it begins; give two points")
+            return ends
         found = parse_line(text)
     except LineError as error:
         raise ArgumentTypeError(str(error)) from None
@@ -85,6 +98,8 @@ def _line(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
+    import numpy as np
+
     from simulator.experiment.machine_file import load_machine
 
     from ..volumetric import Volumetric, along_axes
@@ -105,17 +120,17 @@ def run(options: Namespace) -> int:
             print(f"ballplate map: {told}", file=sys.stderr)
             return WRONG_USAGE
         return _of_one(every[options.error], options)
-    if options.line is not None:
-        outside = [
-            name
-            for name, value in options.line.items()
-            if not machine.lower["xyz".index(name)] <= value <= machine.upper["xyz".index(name)]
-        ]
-        if outside:
-            print(f"ballplate map: the line is outside the volume in {' and '.join(outside)}", file=sys.stderr)
-            return WRONG_USAGE
-        return _on_a_line(Volumetric(machine), options)
-    return _on_a_grid(Volumetric(machine), options)
+    built = Volumetric(machine)
+    if options.line is None:
+        return _on_a_grid(built, options)
+    start, end = built.parallel(options.line) if isinstance(options.line, dict) else np.array(options.line)
+    ends = np.stack([start, end])
+    outside = np.flatnonzero(((ends < machine.lower) | (ends > machine.upper)).any(axis=0))
+    if len(outside):
+        named = " and ".join("xyz"[k] for k in outside)
+        print(f"ballplate map: the line is outside the volume in {named}", file=sys.stderr)
+        return WRONG_USAGE
+    return _on_a_line(built, start, end, options)
 
 
 def _of_one(found: AlongAxis, options: Namespace) -> int:
@@ -129,19 +144,20 @@ def _of_one(found: AlongAxis, options: Namespace) -> int:
     return _drawn(options, lambda path: draw_along(found, path))
 
 
-def _on_a_line(machine: Volumetric, options: Namespace) -> int:
+def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace) -> int:
     from ..report.volumetric import draw_line
-    from ..volumetric_tables import error_csv, error_data, error_lines, machine_data
+    from ..volumetric import between
+    from ..volumetric_tables import error_csv, error_data, error_lines, length_data, length_line, machine_data
 
-    axis = next(k for k, name in enumerate("xyz") if name not in options.line)
-    found = machine.errors(machine.along(axis, options.line, options.points))
+    found = machine.errors(between(start, end, options.points))
+    length = machine.lengths(start[None], end[None])
     if options.format == "json":
-        print_json([{**machine_data(machine), "line": error_data(found)}])
+        print_json([{**machine_data(machine), "length": length_data(length)[0], "line": error_data(found)}])
     elif options.format == "csv":
         print_lines(list(error_csv(found)))
     else:
-        print_lines(error_lines(found))
-    return _drawn(options, lambda path: draw_line(found, axis, path))
+        print_lines([*error_lines(found), length_line(length)])
+    return _drawn(options, lambda path: draw_line(found, path))
 
 
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:

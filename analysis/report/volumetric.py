@@ -119,27 +119,32 @@ def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
             axes.text(x, y, text, ha="center", va="center")
 
 
-def draw_line(found: VolumetricErrors, axis: int, path: Path) -> None:
+def draw_line(found: VolumetricErrors, path: Path) -> None:
     """Write a picture of the errors along a line: components, resultant, and twice the random part about them.
 
     :raises OSError: the file cannot be written.
     """
-    positions = 1e3 * found.points[:, axis]
-    others = [k for k in range(3) if k != axis]
-    where = ", ".join(f"{'xyz'[k]} = {1e3 * found.points[0, k]:.6g} mm" for k in others)
+    start, end = 1e3 * found.points[0], 1e3 * found.points[-1]
+    moving = np.flatnonzero(start != end)
+    if len(moving) == 1:
+        axis = int(moving[0])
+        name, positions = "xyz"[axis], 1e3 * found.points[:, axis]
+        where = ", ".join(f"{'xyz'[k]} = {start[k]:.6g} mm" for k in range(3) if k != axis)
+        along = f"along {name} at {where}"
+    else:
+        name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
+        ends = [f"({', '.join(f'{value:.6g}' for value in point)})" for point in (start, end)]
+        where = along = f"from {ends[0]} to {ends[1]} mm"
     with drawing(300.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 300.0 - BELOW - ABOVE)
         axes.set_title(where, loc="left")
-        for k, name in enumerate("XYZ"):
-            _band(axes, positions, 1e6 * found.systematic[:, k], 1e6 * found.deviation[:, k], k, name)
+        for k, letter in enumerate("XYZ"):
+            _band(axes, positions, 1e6 * found.systematic[:, k], 1e6 * found.deviation[:, k], k, letter)
         axes.plot(positions, 1e6 * found.resultant, color=INK, linewidth=1.2, linestyle=DASHES[3], label="resultant")
-        _finish(axes, f"{'xyz'[axis]}, mm", "error, µm")
+        _finish(axes, f"{name}, mm", "error, µm")
         worst = int(found.resultant.argmax())
-        words = (
-            f"Volumetric errors along {'xyz'[axis]} at {where}: largest resultant "
-            f"{number(1e6 * float(found.resultant[worst]))} µm at {positions[worst]:.6g} mm"
-        )
-        save(figure, path, words)
+        told = f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at {positions[worst]:.6g} mm"
+        save(figure, path, f"Volumetric errors {along}: {told}")
 
 
 def draw_along(one: AlongAxis, path: Path) -> None:

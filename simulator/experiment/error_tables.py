@@ -37,7 +37,7 @@ class ErrorTable:
 
 
 class LineError(ValueError):
-    """A text is not a line along an axis."""
+    """A text is no line or point."""
 
 
 def parse_line(text: str) -> dict[str, float]:
@@ -122,22 +122,33 @@ def _line(stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message
     return found
 
 
+def parse_point(text: str) -> Three:
+    """Read three co-ordinates.
+
+    :raises LineError: written otherwise.
+
+    >>> parse_point("0 mm, 0.5 m, -100 mm")
+    (0.0, 0.5, -0.1)
+    """
+    parts = text.strip().strip("[]").split(",")
+    if len(parts) != 3:
+        raise LineError(f"has {len(parts)} co-ordinates; give three, such as 0 mm, 0 mm, -100 mm")
+    try:
+        x, y, z = (parse_length(part.strip()) for part in parts)
+    except QuantityError as error:
+        raise LineError(str(error)) from None
+    return x, y, z
+
+
 def _probe(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> Three:
     if "probe" not in stated:
         return 0.0, 0.0, 0.0
     mark, text = stated["probe"]
-    parts = text.strip("[]").split(",")
-    if len(parts) != 3:
-        messages.append(mark.message("", f"has {len(parts)} co-ordinates; give three, such as 0 mm, 0 mm, -100 mm"))
+    try:
+        return parse_point(text)
+    except LineError as error:
+        messages.append(mark.message("", str(error)))
         return 0.0, 0.0, 0.0
-    found = []
-    for part in parts:
-        try:
-            found.append(parse_length(part.strip()))
-        except QuantityError as error:
-            messages.append(mark.message("", str(error)))
-            found.append(0.0)
-    return found[0], found[1], found[2]
 
 
 def _criterion(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> Criterion | None:

@@ -83,6 +83,17 @@ def test_csv_of_a_line(capsys: pytest.CaptureFixture[str]) -> None:
         assert float(row["resultant_um"]) == pytest.approx(1e6 * np.linalg.norm(error))
 
 
+def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:
+    diagonal = "900 mm, 0 mm, 0 mm to [0 mm, 1.15 m, 400 mm]"
+    assert run("map", BRIDGE, "--line", diagonal, "--points", "3", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["position"] for one in found["line"]] == [[0.9, 0.0, 0.0], [0.45, 0.575, 0.2], [0.0, 1.15, 0.4]]
+    second = Volumetric(load_machine(BRIDGE)).diagonals()
+    assert found["length"]["error"] == second.error[1] and found["length"]["random"] == second.deviation[1]
+    assert run("map", BRIDGE, "--line", diagonal, "--points", "3") == 0
+    assert "length 1514.100 mm, length error 21.65 um, random 5.762 um" in capsys.readouterr().out
+
+
 def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("map", MEASURED, "--error", "EYX", "--json") == 0
     found = json.loads(capsys.readouterr().out)
@@ -107,6 +118,7 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytes
     [
         (("--grid", "3,2,2"), "Volumetric errors, magnified"),
         (("--line", "y = 600 mm, z = 600 mm"), "Volumetric errors along x at y = 600 mm, z = 600 mm"),
+        (("--line", "0 mm, 0 mm, 0 mm to 1 m, 1 m, 0 mm"), "Volumetric errors from (0, 0, 0) to (1000, 1000, 0) mm"),
         (("--error", "EXX"), "EXX, positioning error of X, bandwidth 66.00 µm"),
     ],
 )
@@ -147,6 +159,8 @@ def test_magnification_is_round() -> None:
         (("--grid", "5,1,5"), "expected three whole numbers, 2 or above"),
         (("--grid", "1000,1000,1000"), "1000000000 points are too many; at most 200000 are possible"),
         (("--line", "y = 600"), 'y: "600" has no unit'),
+        (("--line", "1 m, 1 m, 1 m to 1 m, 1 m, 1 m"), "a line ends where it begins; give two points"),
+        (("--line", "1 m, 1 m to 1 m, 1 m, 1 m"), "has 2 co-ordinates; give three"),
         (("--line", "y = 600 mm"), "two axes stand still on a line; write for example y = 600 mm, z = 600 mm"),
         (("--line", "y = 600 mm, z = 600 mm", "--points", "1"), "a line has 2 to 200000 points, not 1"),
         (("--line", "y = 1 mm, z = 1 mm", "--error", "EXX"), "not allowed with argument"),

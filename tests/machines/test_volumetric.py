@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.volumetric import Volumetric
+from analysis.volumetric import Volumetric, between
 from simulator.experiment.machine_file import load_machine
 from simulator.machines.arrangement import ARRANGEMENTS
 from simulator.machines.description import (
@@ -82,7 +82,7 @@ def test_errors_along_a_line_have_their_closed_form() -> None:
         ParametricError("EZX", PowerSeries((1e-6, 9e-6, -8e-6))),
     )
     built = Volumetric(machine(errors=errors, probe=(0.05, 0.0, -0.2)))
-    points = built.along(0, {"y": 0.4, "z": 0.7}, 9)
+    points = between(*built.parallel({"y": 0.4, "z": 0.7}), 9)
     t = np.linspace(0.0, 1.0, 9)
     pitch = 40e-6 * t**2
     expected = np.stack(
