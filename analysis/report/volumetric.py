@@ -22,9 +22,9 @@ from .svg import (
     SERIES,
     blank_axes,
     drawing,
-    magnification,
     micro,
     placed_axes,
+    round_number,
     save,
 )
 
