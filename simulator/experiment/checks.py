@@ -15,6 +15,7 @@ from ..machines.description import MachineDescription
 from ..machines.settings import (
     CurvesSettings,
     MachineFileSettings,
+    MetricSettings,
     PythonSettings,
     RandomSettings,
     TrueMachineFileSettings,
@@ -65,6 +66,11 @@ def _check_model(settings: Any, steps: Steps, machine: Machine | None, reference
             build_error_model(settings, *_corners(machine))
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
+    elif isinstance(settings, MetricSettings):
+        allowed = {2: ("none", "x", "y", "split"), 3: ("each", "none")}.get(references.dimension or 0)
+        if allowed and settings.scale is not None and settings.scale not in allowed:
+            text = f"has no meaning in {references.dimension} dimensions; choose from: {listing(allowed)}"
+            references.problems.add((*steps, "scale"), text)
     elif references.dimension not in (None, dimension_of(settings)):
         text = (
             f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '

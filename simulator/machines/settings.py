@@ -21,8 +21,9 @@ from .custom import custom_model
 from .description import MachineDescription, fitted_volumetric, true_volumetric
 from .empirical import FrameError, empirical_model
 from .kinematic import kinematic_model_of
-from .metric import MetricModel, Scale
+from .metric import MetricModel
 from .protocol import ErrorModel, TrueMachine
+from .spatial_metric import SpatialMetricModel
 from .terms import Radial, quadratic, sums, tensor
 
 Corner = tuple[float, ...]
@@ -245,11 +246,13 @@ class EmpiricalSettings(Settings):
 
 
 class MetricSettings(Settings):
-    """A two-dimensional machine of straight axes: squareness and scale difference."""
+    """A machine of straight axes: squareness and scales."""
 
-    kind: Literal["metric"] = Field(description="straight axes in two dimensions")
-    scale: Scale = Field(
-        default="none", description="Which axis takes the scale difference gamma: x, y, split between both, or none."
+    kind: Literal["metric"] = Field(description="straight axes that need not be square, and their scales")
+    scale: Literal["none", "x", "y", "split", "each"] | None = Field(
+        default=None,
+        description="In two dimensions which axis takes the scale difference gamma: x, y, split between both, or none "
+        "(default). In three dimensions each (default), for a scale error of every axis, or none.",
     )
 
 
@@ -313,7 +316,10 @@ def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> Err
 
 
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    return MetricModel(settings.scale, max(b - a for a, b in zip(lower, upper, strict=True)))
+    if len(lower) == 3:
+        return SpatialMetricModel(settings.scale != "none", lower, upper)
+    scale = "none" if settings.scale is None or settings.scale == "each" else settings.scale
+    return MetricModel(scale, max(b - a for a, b in zip(lower, upper, strict=True)))
 
 
 def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:
@@ -328,7 +334,7 @@ def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -
 ERROR_MODELS: dict[type[Settings], tuple[int | None, Callable[[Any, Corner, Corner], ErrorModel]]] = {
     KinematicSettings: (3, _kinematic),
     EmpiricalSettings: (3, _empirical),
-    MetricSettings: (2, _metric),
+    MetricSettings: (None, _metric),
     PythonSettings: (None, _python),
     MachineFileSettings: (3, _machine_file),
 }

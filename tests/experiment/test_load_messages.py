@@ -65,9 +65,8 @@ SECTIONS = [
         '5:21: error_model.kind: unknown kind "kinetic"; did you mean "kinematic"?']),
     ("error_model: {kind: kinematic}", "error_model: {}", [
         '5:14: error_model.kind: missing; add "kind", one of: kinematic, empirical, metric, python, machine']),
-    ("error_model: {kind: kinematic}", "error_model: {kind: metric}", [
-        '5:21: error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; change '
-        'one of the two']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: metric, scale: split}", [
+        "5:36: error_model.scale: has no meaning in 3 dimensions; choose from: each, none"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, arrangement: MB9}", [
         '5:45: error_model.arrangement: unknown value "MB9"; did you mean "MB2"? '
         "allowed: MB1, MB2, FB1, FB2, FH1, FH2, MH1, MH2, CX1, CY1"]),
@@ -107,9 +106,8 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: 9}", [
         "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
     ("error_model: {kind: kinematic}",
-     "error_model: {kind: kinematic}\ntrue_machine: {kind: random, position: 1 um, error_model: {kind: metric}}", [
-         '6:66: true_machine.error_model.kind: kind "metric" has 2 dimensions, but machine.volume has 3; '
-         "change one of the two"]),
+     "error_model: {kind: kinematic}\ntrue_machine: {kind: random, position: 1 um, error_model: {kind: metric, scale: x}}", [
+         "6:81: true_machine.error_model.scale: has no meaning in 3 dimensions; choose from: each, none"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: {kind: random}", [
         "6:15: true_machine: without sizes it is a machine without errors; "
         "give position: 2 um, rotation: 4 urad, or both"]),
@@ -295,6 +293,11 @@ CALIBRATION = [
         "14:63: calibration[0].dimensions: unknown key; known: values"]),
 ]  # fmt: skip
 PLANE_CASES = [
+    ("{kind: metric}", "{kind: kinematic}", [
+        '3:21: error_model.kind: kind "kinematic" has 3 dimensions, but machine.volume has 2; change '
+        'one of the two']),
+    ("{kind: metric}", "{kind: metric, scale: each}", [
+        "3:36: error_model.scale: has no meaning in 2 dimensions; choose from: none, x, y, split"]),
     ("corner: {x: 0 mm, y: 0 mm}", "plane: z, corner: {x: 0 mm, y: 0 mm}", [
         "5:25: positions[0].plane: has no meaning in two dimensions; remove it"]),
     ("corner: {x: 0 mm, y: 0 mm}", "pose: {origin: [0 m, 0 m], rotation: [0 deg, 0 deg, 0 deg]}", [

@@ -16,6 +16,7 @@ from simulator.machines.joined import JoinedModel
 from simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
 from simulator.machines.metric import MetricModel
 from simulator.machines.protocol import ErrorModel, HasLines
+from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.machines.terms import Radial, quadratic, sums, tensor
 from tests.reference.derivatives import assert_derivative, complex_step
 
@@ -63,6 +64,7 @@ MODELS: dict[str, ErrorModel] = {
         for name in ("measured-errors", "gec-like", "npl-like")
     },
     **{f"metric {scale}": MetricModel(scale) for scale in ("none", "x", "y", "split")},
+    **{f"spatial metric {scales}": SpatialMetricModel(scales, LOWER, UPPER) for scales in (True, False)},
 }
 
 models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
