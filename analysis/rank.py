@@ -187,7 +187,7 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
     effect = np.abs(shared / layout.scale)
     largest = max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
     positions = []
-    for k in design.plate_positions:
+    for k in design.posed_positions:
         columns = layout.pose_columns[k]
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
         if effect[columns[columns >= 0]].max(initial=0.0) > NEGLIGIBLE * largest:

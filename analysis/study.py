@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from simulator.design import Design, Readings, nominal_state, probe_offsets
+from simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import GaussNewtonSettings, Solution, gauss_newton
@@ -223,17 +223,21 @@ def _estimates(
     turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
     poses = np.concatenate([state.origins, turned], axis=1)
     words = pose_parameter_names(design.dimension)
-    for k in design.plate_positions:
+    for k in design.posed_positions:
         for j, column in enumerate(layout.pose_columns[k]):
             if column >= 0:
                 unit: Unit = "m" if j < design.dimension else "rad"
                 add(f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
 
-    of_offsets = spread.of_shared(own[layout.model.stop :])
+    of_offsets = spread.of_shared(own[layout.offsets])
     for probe, axis in np.argwhere(layout.offset_columns >= 0):
         column = layout.offset_columns[probe, axis]
         value = probe_offsets(design, state)[probe, axis]
         add(layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
+
+    of_lengths = spread.of_shared(own[layout.lengths])
+    for name, value, uncertainty in zip(design.length_names, unknown_lengths(design, state), of_lengths, strict=True):
+        add(name, value, uncertainty, "m")
 
     of_balls = spread.of_balls()
     for ball in design.plate_balls:

@@ -93,7 +93,7 @@ def uncertainties(
     add("U2 lengths", of_poses[~angle], "m", [n for n, a in zip(names, angle, strict=True) if not a])
     add("U2 angles", of_poses[angle], "rad", [n for n, a in zip(names, angle, strict=True) if a])
 
-    offsets = slice(layout.model.stop, len(layout))
+    offsets = layout.offsets
     names = [p.name for p in layout.parameters[offsets]]
     add("U2 offsets", found.of_shared(np.eye(len(layout))[offsets]), "m", names)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,12 +79,14 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class Lengths:
-    """Known lengths of a length standard read in the volume; arrays (m,), metres.
+    """Lengths of length standards read in the volume; arrays (m,), metres.
 
-    `first` and `second` index the readings that a length takes part in. `projected` says whether the
+    `first` and `second` index the readings that a length takes part in; `second` is -1 where the other end is the
+    pivot of a Bryan gauge, which is not read: the origin of the first reading's position. `projected` says whether the
     difference of the corrected points is projected on the standard's nominal direction (m, d) instead of its
     norm being taken; `with_repeatability` whether the readings' own scatter along that direction adds to
     `uncertainty`. Lengths of the same `certificate`, counted from 0, share that error wherever they are read.
+    `free` is the number of the design's unknown length that a length is, -1 where its `value` is known.
     """
 
     first: Integers
@@ -94,9 +97,20 @@ class Lengths:
     direction: Array
     with_repeatability: NDArray[np.bool_]
     certificate: Integers
+    free: Integers | None = None
 
     def __len__(self) -> int:
         return len(self.first)
+
+    @property
+    def to_pivot(self) -> NDArray[np.bool_]:
+        """Which lengths (m,) are from a reading to a pivot."""
+        return self.second < 0
+
+    def select(self, chosen: NDArray[np.bool_] | Integers) -> Lengths:
+        """The lengths at the given indices."""
+        values: dict[str, Any] = {name: None if v is None else v[chosen] for name, v in vars(self).items()}
+        return Lengths(**values)
 
 
 @dataclass(frozen=True)
@@ -136,7 +150,10 @@ class Design:
     marking the pose parameters (origin, then rotation about the machine's axes) that fix a frame or that
     turn an artefact of collinear balls about its own axis.
     Balls and positions of length standards stand in the same lists; `is_plate` (artefacts,) tells which
-    artefacts have parameters. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none is.
+    artefacts are plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose pivots are:
+    the origins of their positions. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none is.
+    `length_names` and `drawn_lengths` (in metres) are those of length standards without certificates, which are
+    parameters.
     """
 
     model: ErrorModel
@@ -163,6 +180,9 @@ class Design:
     point_probe: int = 0
     priors: Priors = field(default_factory=no_priors)
     free_offsets: NDArray[np.bool_] | None = None
+    is_gauge: NDArray[np.bool_] | None = None
+    length_names: tuple[str, ...] = ()
+    drawn_lengths: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def dimension(self) -> int:
@@ -179,9 +199,16 @@ class Design:
         return np.flatnonzero(self.is_plate[self.ball_artefact])
 
     @cached_property
-    def plate_positions(self) -> Integers:
-        """Indices of the positions whose poses are parameters."""
-        return np.flatnonzero(self.is_plate[self.position_artefact])
+    def gauge_positions(self) -> Integers:
+        """Indices of the positions of Bryan gauges."""
+        gauges = np.zeros_like(self.is_plate) if self.is_gauge is None else self.is_gauge
+        return np.flatnonzero(gauges[self.position_artefact])
+
+    @cached_property
+    def posed_positions(self) -> Integers:
+        """Indices of the positions whose poses, or pivots, are parameters."""
+        of_plates = np.flatnonzero(self.is_plate[self.position_artefact])
+        return np.sort(np.concatenate([of_plates, self.gauge_positions]))
 
     @property
     def observations(self) -> int:
@@ -192,10 +219,11 @@ class Design:
 
     @property
     def parameter_count(self) -> int:
-        """Number of free parameters: balls, poses less what is held, the error model's, and free probe offsets."""
-        poses = int((~self.held[self.plate_positions]).sum())
+        """Number of free parameters: balls, poses less what is held, the error model's, probe offsets, unknown lengths."""
+        poses = int((~self.held[self.posed_positions]).sum())
         offsets = 0 if self.free_offsets is None else int(self.free_offsets.sum())
-        return self.dimension * len(self.plate_balls) + poses + len(self.model.parameters) + offsets
+        lengths = len(self.length_names)
+        return self.dimension * len(self.plate_balls) + poses + len(self.model.parameters) + offsets + lengths
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
@@ -208,7 +236,7 @@ class Design:
 class State:
     """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a` (parameters,).
 
-    `probes` (l, d) are the probe offsets, None where they are those of the design.
+    `probes` (l, d) are the probe offsets, and `lengths` the unknown lengths, None where they are those of the design.
     """
 
     balls: Array
@@ -216,6 +244,12 @@ class State:
     origins: Array
     a: Array
     probes: Array | None = None
+    lengths: Array | None = None
+
+
+def unknown_lengths(design: Design, state: State) -> Array:
+    """Lengths of standards without certificates at `state`, in metres."""
+    return design.drawn_lengths if state.lengths is None else state.lengths
 
 
 def probe_offsets(design: Design, state: State) -> Array:

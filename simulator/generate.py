@@ -59,7 +59,8 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
 
     Of all artefacts that differ so from their certificate, the nearest to the drawing; where there are more certified
     items than can vary independently, as nearly as a real artefact can. For a length standard, each length moves the
-    second of its balls along the line between the two.
+    second of its balls along the line between the two; for a Bryan gauge it moves the places of its ball. Lengths without
+    certificates are as drawn.
     """
     balls = design.balls.copy()
     tied = distance_rows(design, nominal_state(design))
@@ -90,6 +91,14 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
         move[used] = np.linalg.lstsq(rows[:, used], wanted[together], rcond=None)[0]
         balls[ends] += move.reshape(-1, design.dimension)
     given = design.lengths
+    given = given.select(np.ones(len(given), bool) if given.free is None else given.free < 0)
+    pivoted = given.select(given.to_pivot)
+    for certificate in np.unique(pivoted.certificate):
+        k = int(np.flatnonzero(pivoted.certificate == certificate)[0])
+        own = design.ball_artefact == design.ball_artefact[design.readings.ball[pivoted.first[k]]]
+        true = pivoted.value[k] + pivoted.uncertainty[k] * generator.standard_normal()
+        balls[own] *= true / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
+    given = given.select(~given.to_pivot)
     ends = np.stack([design.readings.ball[given.first], design.readings.ball[given.second]])
     pairs, first = np.unique(ends, axis=1, return_index=True)
     for (one, other), k in zip(pairs.T.tolist(), first.tolist(), strict=True):

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import Coordinates, Design, Distances, Lengths, Priors, Readings, pose_size
+from .design import Coordinates, Design, Distances, Priors, Readings, pose_size
 from .experiment.messages import ExperimentError
-from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior
+from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior, RadiusCalibration
 from .experiment.yamltree import Mark
+from .geometry.artefacts import BryanGaugeSettings
+from .lengths import standard_lengths
 from .machines.protocol import Array
 from .machines.settings import build_error_model
 
@@ -37,6 +39,12 @@ def lay_out(experiment: Experiment) -> Design:
     sizes = [len(layout.names) for layout in layouts]
     first_ball = dict(zip(artefacts, np.cumsum([0, *sizes[:-1]]), strict=True))
     balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
+    for item in experiment.calibration:
+        if isinstance(item, RadiusCalibration):
+            own = slice(
+                first_ball[item.artefact], first_ball[item.artefact] + len(experiment.layouts[item.artefact].names)
+            )
+            balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
     is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
     probe_index = {name: k for k, name in enumerate(experiment.probes)}
     places = experiment.positions
@@ -44,13 +52,20 @@ def lay_out(experiment: Experiment) -> Design:
     position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
-    distances, lengths = _distances(experiment, readings, first_ball, rotations, position_artefact, balls)
+    distances = _distances(experiment, first_ball)
+    lengths, length_names, drawn = standard_lengths(
+        experiment, readings, first_ball, rotations, position_artefact, balls
+    )
     coordinates = _coordinates(experiment, first_ball)
     ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
     points = experiment.evaluation.points
     if not len(points):
         points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
-    held = _held(readings, balls, ball_artefact, position_artefact, rotations, coordinates, d)
+    held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
+    for k, place in enumerate(places):
+        if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
+            # A pivot has a place; how the bar turns about it is what the readings say.
+            held[k] = np.arange(pose_size(d)) >= d
     return Design(
         model=model,
         lower=lower,
@@ -76,6 +91,9 @@ def lay_out(experiment: Experiment) -> Design:
         point_probe=probe_index[experiment.evaluation.probe],
         priors=_priors(experiment, held, len(model.parameters)),
         free_offsets=_free_offsets(experiment),
+        is_gauge=np.array([isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]),
+        length_names=length_names,
+        drawn_lengths=drawn,
     )
 
 
@@ -162,73 +180,23 @@ def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordina
     return Coordinates(_integers(ball), _integers(axis), _floats(value), _floats(uncertainty))
 
 
-def _distances(
-    experiment: Experiment,
-    readings: Readings,
-    first_ball: dict[str, int],
-    rotations: Array,
-    position_artefact: NDArray[np.int64],
-    balls: Array,
-) -> tuple[Distances, Lengths]:
-    """Distances between balls of plates, and the lengths that length standards contribute.
-
-    A length standard contributes each of its calibrated distances once for every position and probe with
-    which both its balls are read. The error of a certificate is the same in all of them, but where the readings'
-    repeatability is ignored: then the stated uncertainty stands for all that a length may be off, each time anew.
-    """
-    plates: list[tuple[DistanceCalibration, NDArray[np.int64]]] = []
-    first, second, value, uncertainty, projected, direction, scatter, certificate = [], [], [], [], [], [], [], []
-    artefacts = list(experiment.artefacts)
-    key = {
-        (int(b), int(k), int(p)): i
-        for i, (b, k, p) in enumerate(zip(readings.ball, readings.position, readings.probe, strict=True))
-    }
-    for number, item in enumerate(experiment.calibration):
-        if not isinstance(item, DistanceCalibration):
-            continue
-        pairs = np.asarray(item.pairs + first_ball[item.artefact], np.int64)
-        if experiment.artefacts[item.artefact].role == "plate":
-            plates.append((item, pairs))
-            continue
-        for k in np.flatnonzero(position_artefact == artefacts.index(item.artefact)):
-            for probe in range(len(experiment.probes)):
-                given = zip(pairs, item.values, item.standard_uncertainties, strict=True)
-                for row, (pair, length, u) in enumerate(given):
-                    ends = [key.get((int(ball), int(k), probe)) for ball in pair]
-                    if ends[0] is None or ends[1] is None:
-                        continue
-                    first.append(ends[0])
-                    second.append(ends[1])
-                    along = rotations[k] @ (balls[pair[0]] - balls[pair[1]])
-                    direction.append(along / np.sqrt(along @ along))
-                    value.append(length)
-                    uncertainty.append(u)
-                    projected.append(item.form == "projection")
-                    scatter.append(item.repeatability == "included")
-                    certificate.append((number, row) if scatter[-1] else (-1, len(first)))
-    certificates = {one: i for i, one in enumerate(dict.fromkeys(certificate))}
-    lengths = Lengths(
-        np.array(first, np.int64),
-        np.array(second, np.int64),
-        np.array(value, float),
-        np.array(uncertainty, float),
-        np.array(projected, bool),
-        np.array(direction, float).reshape(-1, experiment.dimension),
-        np.array(scatter, bool),
-        np.array([certificates[one] for one in certificate], np.int64),
-    )
-    distances = Distances(
+def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
+    """Calibrated distances between balls of plates."""
+    plates = [
+        (item, np.asarray(item.pairs + first_ball[item.artefact], np.int64))
+        for item in experiment.calibration
+        if isinstance(item, DistanceCalibration) and experiment.artefacts[item.artefact].role == "plate"
+    ]
+    return Distances(
         _integers([pairs[:, 0] for _, pairs in plates]),
         _integers([pairs[:, 1] for _, pairs in plates]),
         _integers([np.full(len(pairs), item.dimensions) for item, pairs in plates]),
         _floats([item.values for item, _ in plates]),
         _floats([item.standard_uncertainties for item, _ in plates]),
     )
-    return distances, lengths
 
 
 def _held(
-    readings: Readings,
     balls: Array,
     ball_artefact: NDArray[np.int64],
     position_artefact: NDArray[np.int64],

@@ -6,11 +6,12 @@ import csv
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
-from .design import Design, Integers, Readings
+from .design import Design, Integers, Lengths, Readings
+from .estimation.spheres import fit_sphere
 from .experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .experiment.tables import Row, column_names, read_table
 from .experiment.yamltree import Mark
@@ -202,13 +203,16 @@ def _combine_standards(
 ) -> ObservedReadings:
     """Take the mean of what a length standard's repeats read, and let its lengths point to it.
 
-    A length of which an end was not read drops out.
+    A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of its own, since its ball
+    need not be where it was before.
     """
     on_plate = design.is_plate[design.ball_artefact[readings.ball]]
     groups: dict[tuple[int, int, int], list[int]] = {}
     keys = _key(readings)
-    for i in np.flatnonzero(~on_plate):
+    of_gauge = np.isin(readings.position, design.gauge_positions)
+    for i in np.flatnonzero(~on_plate & ~of_gauge):
         groups.setdefault(keys[i], []).append(int(i))
+    carried = np.flatnonzero(of_gauge)
     plate = np.flatnonzero(on_plate)
     means = np.array([x[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
     first = np.array([members[0] for members in groups.values()], np.int64)
@@ -220,23 +224,43 @@ def _combine_standards(
         return np.array([place.get(planned[i], -1) for i in old], np.int64)
 
     ends = moved(design.lengths.first), moved(design.lengths.second)
-    present = (ends[0] >= 0) & (ends[1] >= 0)
-    lengths = replace(
-        design.lengths,
-        first=ends[0][present],
-        second=ends[1][present],
-        **{
-            name: getattr(design.lengths, name)[present]
-            for name in ("value", "uncertainty", "projected", "direction", "with_repeatability", "certificate")
-        },
-    )
-    chosen = np.concatenate([plate, first])
-    combined = replace(readings.select(chosen), repeats=np.concatenate([np.ones(len(plate), np.int64), repeats]))
+    present = ~design.lengths.to_pivot & (ends[0] >= 0) & (ends[1] >= 0)
+    lengths = replace(design.lengths, first=ends[0], second=ends[1]).select(present)
+    if len(carried):
+        lengths = _with_radii(design, lengths, readings, x, carried, len(plate) + len(first))
+    chosen = np.concatenate([plate, first, carried])
+    ones = np.ones(len(readings), np.int64)
+    combined = replace(readings.select(chosen), repeats=np.concatenate([ones[plate], repeats, ones[carried]]))
     if readings.uncertainty is not None:
         variance = readings.uncertainty**2
         # The mean is a plain one, whatever the uncertainties of its parts.
         of_means = np.sqrt([variance[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
-        combined = replace(combined, uncertainty=np.concatenate([readings.uncertainty[plate], of_means]))
+        of_others = readings.uncertainty
+        combined = replace(combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]]))
     observed = replace(design, readings=combined, lengths=lengths)
     chosen_marks = tuple(marks[i] for i in chosen)
-    return ObservedReadings(observed, np.concatenate([x[plate], means]), missing, unplanned, chosen_marks)
+    return ObservedReadings(observed, np.concatenate([x[plate], means, x[carried]]), missing, unplanned, chosen_marks)
+
+
+def _with_radii(
+    design: Design, lengths: Lengths, readings: Readings, x: Array, carried: Integers, start: int
+) -> Lengths:
+    """Lengths with those of the readings `carried` of Bryan gauges added, which stand from `start` on."""
+    given = design.lengths
+    planned = np.flatnonzero(given.to_pivot)
+    # Of the same gauge all are alike.
+    of_gauge = design.ball_artefact[design.readings.ball[given.first[planned]]]
+    own = design.ball_artefact[readings.ball[carried]]
+    like = planned[[int(np.flatnonzero(of_gauge == gauge)[0]) for gauge in own]]
+    seen = x[carried] + design.probes[readings.probe[carried]]
+    direction = np.empty_like(seen)
+    for k in np.unique(readings.position[carried]):
+        rows = readings.position[carried] == k
+        away = seen[rows] - fit_sphere(seen[rows], design.origins[k])[0]
+        direction[rows] = away / np.sqrt((away**2).sum(axis=1))[:, None]
+    added = replace(given.select(like), first=start + np.arange(len(carried)), direction=direction)
+    both: dict[str, Any] = {
+        name: None if values is None else np.concatenate([values, getattr(added, name)])
+        for name, values in vars(lengths).items()
+    }
+    return Lengths(**both)

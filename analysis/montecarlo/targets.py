@@ -84,10 +84,10 @@ def targets(shared: Reference) -> tuple[Target, ...]:
 def _uncertain(target: Target) -> Target | None:
     """A target without the members that no observation could change; None where nothing is left."""
     kept = target.uncertainty > 0.0
-    if kept.all():
-        return target
     if not kept.any():
         return None
+    if kept.all():
+        return target
     units = tuple(unit for unit, keep in zip(target.units, kept, strict=True) if keep)
 
     def change(replicates: Deviations) -> Array:

@@ -21,8 +21,7 @@ from ..threads import scipy_linalg, single_threaded
 from .observations import (
     coordinate_rows,
     distance_rows,
-    length_offset_rows,
-    length_rows,
+    length_shared_rows,
     prior_rows,
     reading_blocks,
 )
@@ -93,13 +92,9 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     top = np.concatenate(tops) if tops else np.zeros((0, d, s + 1))
 
     if len(design.lengths):
-        residual, derivative = length_rows(design, state, x)
-        rows = np.zeros((len(residual), s + 1))
-        if design.free_offsets is not None:
-            rows[:, :-1] = length_offset_rows(design, layout, state, x)
-        rows[:, layout.model], rows[:, -1] = derivative, residual
+        residual, derivative = length_shared_rows(design, layout, state, x)
         total += float(residual @ residual)
-        shared = np.concatenate([shared, rows])
+        shared = np.concatenate([shared, np.column_stack([derivative, residual])])
 
     if len(design.priors):
         residual, derivative = prior_rows(design, layout, state)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..design import Design, State, probe_offsets
+from ..design import Design, State, probe_offsets, unknown_lengths
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
@@ -82,7 +82,9 @@ def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSe
         shared, balls = newton_step(design, factor, found)
         size = max(float(np.abs(shared / layout.scale).max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
         length = float(np.sqrt(shared @ shared + (balls**2).sum()))
-        state = moved(design, state, layout.pose_columns, shared, balls, layout.model, layout.offset_columns)
+        state = moved(
+            design, state, layout.pose_columns, shared, balls, layout.model, layout.offset_columns, layout.lengths
+        )
         rounding = size > 0.5 * previous and size < 1e-9
         if size < settings.smallest_step or rounding:
             status = "converged"
@@ -121,6 +123,7 @@ def moved(
     balls: Array,
     model: slice,
     offset_columns: np.ndarray | None = None,
+    lengths: slice | None = None,
 ) -> State:
     """The state after a step; rotations are turned about the machine's axes and stay orthogonal."""
     d = design.dimension
@@ -136,4 +139,5 @@ def moved(
         state.origins + poses[:, :d],
         state.a + shared[model],
         probes,
+        unknown_lengths(design, state) + shared[lengths] if lengths is not None else state.lengths,
     )

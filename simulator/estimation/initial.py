@@ -12,6 +12,7 @@ import numpy as np
 from ..design import Design, Integers, State
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array
+from .spheres import fit_sphere
 
 # Points whose spread across their main line is below this fraction of their length do not fix a pose.
 FLAT = 1e-3
@@ -46,7 +47,30 @@ def initial_state(design: Design, x: Array) -> State:
         for place, (rotation, origin) in zip(places, poses, strict=True):
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
-    return State(balls, rotations, origins, np.zeros(len(design.model.parameters)))
+    readings = design.readings
+    for k in design.gauge_positions:
+        rows = readings.position == k
+        if rows.any():
+            origins[k] = fit_sphere(x[rows] + design.probes[readings.probe[rows]], origins[k])[0]
+    return State(
+        balls, rotations, origins, np.zeros(len(design.model.parameters)), lengths=_measured_lengths(design, origins, x)
+    )
+
+
+def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
+    """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
+    given = design.lengths
+    if given.free is None or not len(design.length_names):
+        return None
+    seen = x + design.probes[design.readings.probe]
+    other = np.where(
+        given.to_pivot[:, None], origins[design.readings.position[given.first]], seen[np.maximum(given.second, 0)]
+    )
+    length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
+    found = design.drawn_lengths.copy()
+    for number in np.unique(given.free[given.free >= 0]):
+        found[number] = length[given.free == number].mean()
+    return found
 
 
 def _mean_locations(design: Design, x: Array) -> Array:

@@ -72,7 +72,24 @@ class _Motions:
 
 
 def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
-    """Positions and readings that cannot be right, from scale readings x (readings, d)."""
+    """Positions and readings that cannot be right, from scale readings x (readings, d).
+
+    Readings of Bryan gauges pass: their directions need not be those of the drawing.
+    """
+    compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
+    if len(compared) < len(design.readings):
+        of_others = replace(
+            design, readings=design.readings.select(compared), lengths=design.lengths.select(np.zeros(0, np.int64))
+        )
+        positions, found = _misreadings(of_others, x[compared]) if len(compared) else ([], [])
+        back = np.append(compared, -1)
+        return positions, [
+            replace(one, reading=int(back[one.reading]), partner=int(back[one.partner])) for one in found
+        ]
+    return _misreadings(design, x)
+
+
+def _misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
     seen = x + design.probes[readings.probe]
     pitch = _pitches(design)

@@ -11,7 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design, Readings, State, locations, pose_size, probe_offsets, reading_uncertainties
+from ..design import (
+    Design,
+    Integers,
+    Readings,
+    State,
+    locations,
+    pose_size,
+    probe_offsets,
+    reading_uncertainties,
+    unknown_lengths,
+)
 from ..geometry.motions import vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel
 from .parameters import SharedLayout
@@ -132,44 +142,81 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
     length between corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
     """
     residual, unit, ends, white = _length_residuals(design, state, x)
-    jacobians = [design.model.jacobian(points, state.a, p) for points, p in ends]
-    return residual, white.whitened(np.einsum("md,mdn->mn", unit, jacobians[0] - jacobians[1]))
+    rows = np.zeros((len(residual), len(state.a)))
+    for end in ends:
+        by_model = design.model.jacobian(end.points, state.a, end.offsets)
+        rows[end.rows] += end.sign * np.einsum("md,mdn->mn", unit[end.rows], by_model)
+    return residual, white.whitened(rows)
 
 
-def length_offset_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
-    """Derivative (m, s) of the same residuals by the shared parameters, those of the probe offsets only."""
+def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> tuple[Array, Array]:
+    """The same residuals (m,), with the derivative (m, s) by all shared parameters."""
     given = design.lengths
-    _, unit, ends, white = _length_residuals(design, state, x)
+    residual, unit, ends, white = _length_residuals(design, state, x)
+    # What is held goes to the extra column.
     rows = np.zeros((len(given), len(layout) + 1))
-    for sign, chosen, (points, p) in zip((1.0, -1.0), (given.first, given.second), ends, strict=True):
-        by_offset = np.einsum("md,mdj->mj", unit, offset_sensitivity(design.model, points, state.a, p))
-        # Held offsets go to the extra column.
-        columns = layout.offset_columns[design.readings.probe[chosen]]
-        np.add.at(rows, (np.arange(len(given))[:, None], columns), sign * by_offset)
-    return white.whitened(rows[:, :-1])
+    for end in ends:
+        along = unit[end.rows]
+        by_model = design.model.jacobian(end.points, state.a, end.offsets)
+        rows[end.rows, layout.model] += end.sign * np.einsum("md,mdn->mn", along, by_model)
+        if design.free_offsets is not None:
+            by_offset = offset_sensitivity(design.model, end.points, state.a, end.offsets)
+            columns = layout.offset_columns[end.probe]
+            np.add.at(rows, (end.rows[:, None], columns), end.sign * np.einsum("md,mdj->mj", along, by_offset))
+    pivoted = np.flatnonzero(given.to_pivot)
+    columns = layout.pose_columns[design.readings.position[given.first[pivoted]], : design.dimension]
+    np.add.at(rows, (pivoted[:, None], columns), -unit[pivoted])
+    if given.free is not None:
+        free = np.flatnonzero(given.free >= 0)
+        rows[free, layout.lengths.start + given.free[free]] -= 1.0
+    return residual, white.whitened(rows[:, :-1])
+
+
+@dataclass(frozen=True)
+class _End:
+    """Ends of lengths `rows` (k,) that are read: scale readings and probe offsets (k, d), probes (k,)."""
+
+    sign: float
+    rows: Integers
+    points: Array
+    offsets: Array
+    probe: Integers
 
 
 def _length_residuals(
     design: Design, state: State, x: Array | None
-) -> tuple[Array, Array, list[tuple[Array, Array]], Whitening]:
-    """Residuals (m,), directions (m, d), points and offsets of both ends, and the whitening of known lengths."""
+) -> tuple[Array, Array, tuple[_End, _End], Whitening]:
+    """Residuals (m,), directions (m, d), the ends that are read, and the whitening of lengths."""
     given = design.lengths
-    corrected, ends, noise = [], [], []
-    for chosen in (given.first, given.second):
-        readings = design.readings.select(chosen)
+    difference, noise = np.zeros((2, len(given), design.dimension))
+    ends = []
+    for sign, chosen, rows in (
+        (1.0, given.first, np.arange(len(given))),
+        (-1.0, given.second, np.flatnonzero(~given.to_pivot)),
+    ):
+        readings = design.readings.select(chosen[rows])
         p = probe_offsets(design, state)[readings.probe]
-        points = expected_readings(design, state, readings) if x is None else x[chosen]
-        corrected.append(points + (p if x is None else design.model.error(points, state.a, p)))
-        ends.append((points, p))
-        noise.append(reading_weights(design, readings) ** -2)
-    difference = corrected[0] - corrected[1]
+        points = expected_readings(design, state, readings) if x is None else x[chosen[rows]]
+        difference[rows] += sign * (points + (p if x is None else design.model.error(points, state.a, p)))
+        noise[rows] += reading_weights(design, readings) ** -2
+        ends.append(_End(sign, rows, points, p, readings.probe))
+    pivoted = np.flatnonzero(given.to_pivot)
+    difference[pivoted] -= state.origins[design.readings.position[given.first[pivoted]]]
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected[:, None], given.direction, unit)
     length = np.einsum("md,md->m", unit, difference)
     # Along the nominal direction, so that weights stay what they are while parameters change.
-    scatter = np.einsum("md,md->m", given.direction**2, noise[0] + noise[1]) * given.with_repeatability
+    scatter = np.einsum("md,md->m", given.direction**2, noise) * given.with_repeatability
     white = whitening(np.sqrt(scatter), given.uncertainty, given.certificate)
-    return white.whitened(length - given.value), unit, ends, white
+    return white.whitened(length - length_values(design, state)), unit, (ends[0], ends[1]), white
+
+
+def length_values(design: Design, state: State) -> Array:
+    """Values (m,) at `state` that lengths of standards are compared with: those certified, or the unknown ones."""
+    given = design.lengths
+    if given.free is None or not len(design.length_names):
+        return given.value
+    return np.where(given.free >= 0, unknown_lengths(design, state)[given.free], given.value)
 
 
 def prior_values(design: Design, state: State) -> Array:

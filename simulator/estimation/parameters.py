@@ -27,10 +27,11 @@ def pose_parameter_names(dimension: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class SharedLayout:
-    """Columns of the shared parameters: the free ones of every pose, the error model's, the free probe offsets.
+    """Columns of the shared parameters: free ones of every pose, the error model's, free probe offsets, unknown lengths.
 
     `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or belongs to a
-    length standard, and `offset_columns` (l, d) the same for probe offsets. `scale` (columns,) is the size of each
+    length standard, and `offset_columns` (l, d) the same for probe offsets; `lengths` are the columns of unknown
+    lengths. `scale` (columns,) is the size of each
     parameter, in its own unit, that moves a point somewhere by about one metre.
     """
 
@@ -39,6 +40,7 @@ class SharedLayout:
     model: slice
     scale: Array
     offset_columns: Integers
+    lengths: slice
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -46,6 +48,10 @@ class SharedLayout:
     @property
     def poses(self) -> slice:
         return slice(0, self.model.start)
+
+    @property
+    def offsets(self) -> slice:
+        return slice(self.model.stop, self.lengths.start)
 
     @cached_property
     def is_angle(self) -> NDArray[np.bool_]:
@@ -58,7 +64,7 @@ def shared_layout(design: Design) -> SharedLayout:
     names = pose_parameter_names(d)
     columns = np.full((len(design.position_names), q), -1, np.int64)
     parameters: list[Parameter] = []
-    for k in design.plate_positions:
+    for k in design.posed_positions:
         own = design.balls[design.ball_artefact == design.position_artefact[k]]
         arm = max(float(np.ptp(own, axis=0).max(initial=0.0)), 1e-3)
         for j in np.flatnonzero(~design.held[k]):
@@ -82,5 +88,7 @@ def shared_layout(design: Design) -> SharedLayout:
         name, letter = design.probe_names[probe], AXIS_NAMES[axis]
         meaning = f"offset {letter} of probe {name}"
         parameters.append(Parameter(f"probe {name}: offset {letter}", "m", "offset", meaning))
+    lengths = slice(len(parameters), len(parameters) + len(design.length_names))
+    parameters += [Parameter(name, "m", "length", name) for name in design.length_names]
     scale = np.array([1.0 / p.effect for p in parameters])
-    return SharedLayout(tuple(parameters), columns, model, scale, offsets)
+    return SharedLayout(tuple(parameters), columns, model, scale, offsets, lengths)

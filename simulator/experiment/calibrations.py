@@ -6,12 +6,19 @@ from typing import cast
 
 import numpy as np
 
-from ..geometry.artefacts import COINCIDENT, BallLayout, corners, pairs
+from ..geometry.artefacts import COINCIDENT, BallLayout, BryanGaugeSettings, corners, pairs
 from ..settings import hint, listing
 from .messages import ExperimentError, Steps
-from .model import Calibration, CoordinateCalibration, DistanceCalibration, Floats, Indices
+from .model import (
+    Calibration,
+    CoordinateCalibration,
+    DistanceCalibration,
+    Floats,
+    Indices,
+    RadiusCalibration,
+)
 from .references import References, frozen
-from .sections import CoordinatesSettings, DistancesSettings
+from .sections import CoordinatesSettings, DistancesSettings, RadiusSettings
 from .tables import read_table
 from .yamltree import Mark, mark_of
 
@@ -25,15 +32,38 @@ FAR_FROM_DRAWING = 0.1
 
 
 def resolve_calibration(
-    settings: DistancesSettings | CoordinatesSettings, steps: Steps, references: References
+    settings: DistancesSettings | CoordinatesSettings | RadiusSettings, steps: Steps, references: References
 ) -> Calibration | None:
     """Return a calibration with its indices and values, or None after saying what is wrong."""
     artefact = references.artefact(settings.artefact, steps)
     if artefact is None or artefact not in references.layouts:
         return None
+    if isinstance(settings, RadiusSettings):
+        return _radius(settings, artefact, steps, references)
+    if isinstance(references.artefacts[artefact], BryanGaugeSettings):
+        text = f'"{artefact}" is a Bryan gauge and has a radius only; use kind: radius'
+        references.problems.add((*steps, "kind"), text)
+        return None
     if isinstance(settings, DistancesSettings):
         return _distances(settings, artefact, steps, references)
     return _coordinates(settings, artefact, steps, references)
+
+
+def _radius(settings: RadiusSettings, artefact: str, steps: Steps, references: References) -> RadiusCalibration | None:
+    gauge = references.artefacts[artefact]
+    if not isinstance(gauge, BryanGaugeSettings):
+        text = f'only a Bryan gauge has a radius, and "{artefact}" is none; use kind: distances'
+        references.problems.add((*steps, "kind"), text)
+        return None
+    value = gauge.radius if settings.value is None else settings.value
+    text = f"{_far_from_drawing(value, gauge.radius)}; correct the one or the other"
+    if not references.require(abs(value - gauge.radius) <= FAR_FROM_DRAWING * gauge.radius, (*steps, "value"), text):
+        return None
+    return RadiusCalibration(artefact, value, settings.standard_uncertainty)
+
+
+def _far_from_drawing(certified: float, drawn: float) -> str:
+    return f"{1e3 * certified:.6g} mm is far from the {1e3 * drawn:.6g} mm of the artefact's drawing"
 
 
 def _distances(
@@ -167,8 +197,8 @@ def _certified_distances(
     for names, distance, mark, place in entries:
         expected = drawn.get(frozenset(names))
         if expected is not None and distance > 0 and not abs(distance - expected) <= FAR_FROM_DRAWING * expected:
-            text = f"{1e3 * distance:.6g} mm is far from the {1e3 * expected:.6g} mm of the artefact's drawing"
-            problems.add_at(mark, place, f"{text}; correct the one or the other")
+            text = f"{_far_from_drawing(distance, expected)}; correct the one or the other"
+            problems.add_at(mark, place, text)
     if missing and len(problems.messages) == before:
         problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")
     if len(problems.messages) > before:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..design import pose_size
+from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
@@ -28,7 +29,7 @@ from ..settings import listing
 from .curves import read_curves
 from .machine_file import load_machine
 from .messages import ExperimentError, Steps
-from .model import Calibration, DistanceCalibration, Floats, Machine, Position, Volume
+from .model import Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
 from .problems import Problems, written_text
 from .references import References
 from .structure import Sections
@@ -230,7 +231,10 @@ def excess(points: Floats, volume: Volume) -> tuple[Floats, Floats, list[str]]:
 
 
 def check_use(sections: Sections, positions: dict[int, Position], position_count: int, references: References) -> None:
-    """Report artefacts never placed, balls of plates never read, and uncalibrated length standards."""
+    """Report artefacts never placed, balls of plates never read, and uncalibrated length standards of many balls.
+
+    Of a ball bar or a Bryan gauge without a certificate the length is a parameter.
+    """
     problems = references.problems
     placed: set[str] = set()
     uncertain: set[str] = set()
@@ -250,7 +254,8 @@ def check_use(sections: Sections, positions: dict[int, Position], position_count
             _check_balls_read(name, [one for one in positions.values() if one.artefact == name], references)
     calibration_count = len(sections.entries("calibration"))
     for name, settings in references.artefacts.items():
-        if settings.role == "length_standard" and not problems.has_below(("calibration",)):
+        with_one_length = isinstance(settings, TwoSpheresSettings | BryanGaugeSettings)
+        if settings.role == "length_standard" and not with_one_length and not problems.has_below(("calibration",)):
             kinds = (
                 [one.kind for one in sections.entries("calibration").values() if one.artefact in (name, None)]
                 if calibration_count
@@ -269,7 +274,8 @@ def check_calibration_read(
     references: References,
 ) -> None:
     """Report calibrated balls of a length standard that no position reads; of plates, all are reported."""
-    if references.artefacts[calibration.artefact].role != "length_standard" or len(positions) < position_count:
+    is_standard = references.artefacts[calibration.artefact].role == "length_standard"
+    if not is_standard or isinstance(calibration, RadiusCalibration) or len(positions) < position_count:
         return
     own = [position for position in positions.values() if position.artefact == calibration.artefact]
     used = calibration.pairs if isinstance(calibration, DistanceCalibration) else calibration.balls
@@ -281,6 +287,20 @@ def check_calibration_read(
         references.problems.add(
             (*steps, key), f"no position reads {_balls(len(unread))} {names}; read them, or leave them out"
         )
+
+
+def check_radii(calibrations: Mapping[int, Calibration], problems: Problems) -> None:
+    """Report a gauge whose radius is calibrated twice."""
+    first: dict[str, int] = {}
+    for i, calibration in calibrations.items():
+        if not isinstance(calibration, RadiusCalibration):
+            continue
+        if calibration.artefact in first:
+            text = (
+                f'the radius of "{calibration.artefact}" stands in calibration[{first[calibration.artefact]}] already'
+            )
+            problems.add(("calibration", i), f"{text}; remove one of the two")
+        first.setdefault(calibration.artefact, i)
 
 
 def check_size(
@@ -297,14 +317,20 @@ def check_size(
         return
     d = machine.dimension
     poses = sum(references.artefacts[one.artefact].role == "plate" for one in positions.values())
+    gauges = {name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)}
+    pivots = [one for one in positions.values() if one.artefact in gauges]
     errors = len(build_error_model(settings, *_corners(machine)).parameters)
-    shared = errors + pose_size(d) * poses + d * len(offset_uncertainties)
+    shared = errors + pose_size(d) * poses + d * (len(pivots) + len(offset_uncertainties))
     if shared > MOST_SHARED:
         text = (
-            f"{poses} poses, {errors} machine errors and {len(offset_uncertainties)} probe offsets make "
+            f"{poses + len(pivots)} poses, {errors} machine errors and {len(offset_uncertainties)} probe offsets make "
             f"{shared} parameters besides the balls; at most {MOST_SHARED} are "
             "possible: leave positions out, or give the machine fewer coefficients"
         )
+        problems.add(("positions",), text, of_key=True)
+    rows = sum(len(group.balls) * len(group.probes) for one in pivots for group in one.readings)
+    if rows > MOST_LENGTHS:
+        text = f"Bryan gauges are read in {rows} places; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
     for i, calibration in calibrations.items():
         name = calibration.artefact

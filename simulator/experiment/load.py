@@ -11,6 +11,7 @@ from .checks import (
     check_error_model,
     check_inside,
     check_names,
+    check_radii,
     check_size,
     check_true_machine,
     check_use,
@@ -115,6 +116,7 @@ def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | Non
         if calibration is not None:
             calibrations[i] = calibration
             check_calibration_read(calibration, ("calibration", i), positions, position_count, references)
+    check_radii(calibrations, problems)
     priors = resolve_priors(sections, machine, positions, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)

@@ -104,7 +104,17 @@ class CoordinateCalibration:
     kind: Literal["coordinates"] = "coordinates"
 
 
-Calibration = DistanceCalibration | CoordinateCalibration
+@dataclass(frozen=True, eq=False)
+class RadiusCalibration:
+    """The calibrated radius of a Bryan gauge: ``value`` and ``standard_uncertainty`` in metres."""
+
+    artefact: str
+    value: float
+    standard_uncertainty: float
+    kind: Literal["radius"] = "radius"
+
+
+Calibration = DistanceCalibration | CoordinateCalibration | RadiusCalibration
 
 
 @dataclass(frozen=True, eq=False)

@@ -211,7 +211,16 @@ class CoordinatesSettings(Settings):
     )
 
 
-CalibrationSettings = Annotated[DistancesSettings | CoordinatesSettings, Field(discriminator="kind")]
+class RadiusSettings(Settings):
+    """The calibrated radius of a Bryan gauge."""
+
+    kind: Literal["radius"] = Field(description="calibrated radius of a Bryan gauge")
+    artefact: Name | None = Field(None, description="name of the gauge; optional if there is exactly one artefact")
+    value: PositiveLength | None = Field(None, description="the radius certified; default: as drawn")
+    standard_uncertainty: PositiveLength = Field(description="of the radius, the same wherever the gauge stands")
+
+
+CalibrationSettings = Annotated[DistancesSettings | CoordinatesSettings | RadiusSettings, Field(discriminator="kind")]
 
 
 class PriorSettings(Settings):
@@ -288,13 +297,13 @@ class ExperimentSettings(Settings):
         "standard_uncertainty: …} where it is estimated; optional in 2-D",
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
-        description="name → artefact: grid, square, balls, two_spheres or sphere"
+        description="name → artefact: grid, square, balls, two_spheres, sphere or bryan_gauge"
     )
     positions: Annotated[tuple[PositionSettings, ...], Field(min_length=1)] = Field(
         description="where the artefacts are put and what is read there"
     )
     calibration: tuple[CalibrationSettings, ...] = Field(
-        (), description="what is known of the artefacts: distances, coordinates; may be empty"
+        (), description="what is known of the artefacts: distances, coordinates, radius; may be empty"
     )
     priors: Annotated[tuple[PriorSettings, ...], Field(min_length=1)] | None = Field(
         None, description="what is known beforehand of machine errors and poses"

@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, T
 
 from ..quantities import Length, PositiveLength
 from ..settings import Settings, listing
+from .directions import DIRECTIONS, DirectionsSettings, directions
 
 MOST_BALLS = 40_000
 COINCIDENT = 1e-9
@@ -236,12 +237,29 @@ class SphereSettings(ArtefactSettings):
         return BallLayout(("1",), _frozen([(0.0, 0.0, 0.0)]))
 
 
+class BryanGaugeSettings(ArtefactSettings):
+    """A ball that is carried around a fixed ball, which is not read, at the end of a bar."""
+
+    kind: Literal["bryan_gauge"] = Field(description="a ball on a bar that pivots about a fixed ball")
+    role: Literal["length_standard"] = Field("length_standard", description="a Bryan gauge only carries its radius")
+    radius: PositiveLength = Field(description="distance of the two balls, as drawn")
+    directions: DirectionsSettings = Field(  # type: ignore[valid-type,unused-ignore]
+        description=f"of the bar in the places where its ball is read, named 1, 2, …: {DIRECTIONS}"
+    )
+
+    def layout(self) -> BallLayout:
+        """Return the places where the ball is read, about the pivot."""
+        places = self.radius * directions(self.directions)
+        return BallLayout(tuple(str(i + 1) for i in range(len(places))), _frozen(places))
+
+
 ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
     "grid": GridSettings,
     "square": SquareSettings,
     "balls": BallsSettings,
     "two_spheres": TwoSpheresSettings,
     "sphere": SphereSettings,
+    "bryan_gauge": BryanGaugeSettings,
 }
 
 if TYPE_CHECKING:

@@ -70,8 +70,8 @@ class Reference:
     """What all replicates share.
 
     The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
-    the model at the first and the second ends of the length standards' lengths, with `end_noise` (2, d, m) and
-    `end_difference` (m, d), their difference at the reference; `points` is the model at the evaluation points.
+    the model at the first and the second ends of the length standards' lengths, so far as they are read, with
+    `end_noise` (d, ends) and `end_difference` (m, d), their difference at the reference; `points` is the model at the evaluation points.
     `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of priors about the truth. `start` is the estimate
     from readings without noise.
     """
@@ -84,7 +84,7 @@ class Reference:
     noise: Array
     groups: tuple[Group, ...]
     ends: tuple[LocalModel, LocalModel] | None
-    end_noise: Array
+    end_noise: tuple[Array, Array]
     end_difference: Array
     points: LocalModel
     prior_residual: Array
@@ -146,11 +146,15 @@ def reference(design: Design, truth: Truth) -> Reference:
         at += len(chosen)
     order = np.concatenate([np.arange(0), *_groups(observed)])
     given = observed.lengths
-    both = np.stack([given.first, given.second])
+    read = ~given.to_pivot
+    both = given.first, given.second[read]
     ends = (local(exact[both[0]], p[both[0]]), local(exact[both[1]], p[both[1]])) if len(given) else None
-    corrected = exact[both] + np.stack(
-        [observed.model.error(exact[k], start.a, p[k]) for k in both] if len(given) else [exact[k] for k in both]
-    )
+    difference, end_noise = np.zeros((len(given), observed.dimension)), []
+    for sign, end, of_end in ((1.0, both[0], np.arange(len(given))), (-1.0, both[1], np.flatnonzero(read))):
+        if len(end):
+            difference[of_end] += sign * (exact[end] + observed.model.error(exact[end], start.a, p[end]))
+        end_noise.append((1.0 / reading_weights(observed, readings.select(end))).T)
+    difference[~read] -= start.origins[readings.position[given.first[~read]]]
     evaluated = probe_offsets(observed, start)
     return Reference(
         observed,
@@ -161,8 +165,8 @@ def reference(design: Design, truth: Truth) -> Reference:
         np.ascontiguousarray((1.0 / weight)[order].T),
         tuple(groups),
         ends,
-        np.stack([(1.0 / reading_weights(observed, readings.select(k))).T for k in both]),
-        corrected[0] - corrected[1],
+        (end_noise[0], end_noise[1]),
+        difference,
         local(observed.points, np.broadcast_to(evaluated[observed.point_probe], observed.points.shape)),
         *prior_rows(observed, solution.factor.layout, start),
         exact,
@@ -181,7 +185,11 @@ def _observed(design: Design) -> Design:
     return replace(
         design,
         readings=single,
-        lengths=replace(lengths, first=first[lengths.first], second=first[lengths.second]),
+        lengths=replace(
+            lengths,
+            first=first[lengths.first],
+            second=np.where(lengths.to_pivot, -1, first[lengths.second]),
+        ),
     )
 
 

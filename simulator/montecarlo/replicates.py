@@ -18,6 +18,7 @@ import numpy as np
 from ..design import Integers, Lengths
 from ..estimation.covariance import _solve_balls
 from ..estimation.elimination import Factor
+from ..estimation.observations import length_values
 from ..estimation.parameters import SharedLayout
 from ..estimation.whitening import whitening
 from ..machines.protocol import Array
@@ -102,11 +103,11 @@ def _drawn_lengths(given: Lengths, generator: np.random.Generator) -> Array:
 
 def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
     """Noise of the readings that lengths are formed of; a reading that serves several is drawn once."""
-    both = np.stack([shared.design.lengths.first, shared.design.lengths.second])
-    read, place = np.unique(both, return_inverse=True)
-    drawn = generator.standard_normal((BATCH, shared.end_noise.shape[1], len(read)))
-    place = place.reshape(both.shape)
-    return drawn[:, :, place[0]] * shared.end_noise[0], drawn[:, :, place[1]] * shared.end_noise[1]
+    given = shared.design.lengths
+    read, place = np.unique(np.concatenate([given.first, given.second[~given.to_pivot]]), return_inverse=True)
+    drawn = generator.standard_normal((BATCH, shared.design.dimension, len(read)))
+    first, second = np.split(place.ravel(), [len(given)])
+    return drawn[:, :, first] * shared.end_noise[0], drawn[:, :, second] * shared.end_noise[1]
 
 
 @single_threaded
@@ -314,24 +315,44 @@ def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squ
         return
     first, second = shared.ends
     design, ends = shared.design, drawn.ends
-    probes = [None if design.free_offsets is None else design.readings.probe[k] for k in (given.first, given.second)]
+    layout, pivoted = shared.factor.layout, given.to_pivot
+    read = slice(None) if not pivoted.any() else np.flatnonzero(~pivoted)
+    pivot = design.readings.position[given.first[pivoted]]
+    at_ends = given.first, given.second[read]
+    probes = [None if design.free_offsets is None else design.readings.probe[k] for k in at_ends]
     offsets = [_offsets(at, probe) for probe in probes]
-    difference = shared.end_difference.T + (
-        ends[0] + first.change(ends[0], step, offsets[0]) - ends[1] - second.change(ends[1], step, offsets[1])
-    )
+    difference = shared.end_difference.T + (ends[0] + first.change(ends[0], step, offsets[0]))
+    difference[:, :, read] -= ends[1] + second.change(ends[1], step, offsets[1])
+    difference[:, :, pivoted] -= at.origins[:, pivot].swapaxes(1, 2)
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected, given.direction.T, unit)
     length = (unit * difference).sum(axis=1)
-    scatter = ((given.direction.T**2) * (shared.end_noise**2).sum(axis=0)).sum(axis=0) * given.with_repeatability
+    noise = shared.end_noise[0] ** 2
+    noise[:, read] += shared.end_noise[1] ** 2
+    scatter = ((given.direction.T**2) * noise).sum(axis=0) * given.with_repeatability
     white = whitening(np.sqrt(scatter), given.uncertainty, given.certificate)
-    residual = white.whitened((length - given.value - drawn.lengths).T)
+    expected = length_values(design, shared.start) + drawn.lengths
+    is_free = given.free is not None and len(design.length_names) > 0
+    if given.free is not None and is_free:
+        changed = at.shared[:, layout.lengths][:, given.free]
+        expected = expected + np.where(given.free >= 0, changed, 0.0)
+    residual = white.whitened((length - expected).T)
     squares += (residual**2).sum(axis=0)
     pull = unit * white.pulled(residual).T[:, None]
-    layout = shared.factor.layout
-    for sign, end, moved, probe, moved_probe in zip((1.0, -1.0), shared.ends, ends, probes, offsets, strict=True):
-        by_shared[:, layout.model] += sign * end.gather(moved, step, pull, moved_probe)
+    pulls = pull, pull[:, :, read]
+    for sign, end, moved, probe, moved_probe, own in zip(
+        (1.0, -1.0), shared.ends, ends, probes, offsets, pulls, strict=True
+    ):
+        by_shared[:, layout.model] += sign * end.gather(moved, step, own, moved_probe)
         if probe is not None:
-            _add_by_offset(by_shared, layout, probe, sign * end.gather_offsets(step, pull))
+            _add_by_offset(by_shared, layout, probe, sign * end.gather_offsets(step, own))
+    for k in np.unique(pivot):
+        columns = layout.pose_columns[k, : design.dimension]
+        by_shared[:, columns] -= pull[:, :, np.flatnonzero(pivoted)[pivot == k]].sum(axis=2)
+    if given.free is not None and is_free:
+        tight = white.pulled(residual).T
+        for number in range(len(design.length_names)):
+            by_shared[:, layout.lengths.start + number] -= tight[:, given.free == number].sum(axis=1)
 
 
 def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
