@@ -106,7 +106,8 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: 9}", [
         "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
     ("error_model: {kind: kinematic}",
-     "error_model: {kind: kinematic}\ntrue_machine: {kind: random, position: 1 um, error_model: {kind: metric, scale: x}}", [
+     "error_model: {kind: kinematic}\n"
+     "true_machine: {kind: random, position: 1 um, error_model: {kind: metric, scale: x}}", [
          "6:81: true_machine.error_model.scale: has no meaning in 3 dimensions; choose from: each, none"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: {kind: random}", [
         "6:15: true_machine: without sizes it is a machine without errors; "
@@ -166,7 +167,8 @@ ARTEFACTS = [
         "9:73: artefacts.bar.axes: a length standard's balls are not estimated; remove its axes"]),
     ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
     ("kind: grid, ", "", [
-        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere']),
+        '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere, '
+        "bryan_gauge"]),
     ("balls: [3, 3]", "balls: [3]", [
         "8:30: artefacts.plate.balls: has 1 entry; 2 are needed (number of columns, number of rows)"]),
     ("balls: [3, 3]", "balls: [3, 1]", [
@@ -191,9 +193,11 @@ ARTEFACTS = [
         "8:30: artefacts.plate.file: none.csv: there is no such file; check the name and the folder"]),
     ("positions:", "  idle: {kind: two_spheres, length: 500 mm}\npositions:", [
         "10:3: artefacts.idle: is never placed; add a position of it, or remove it"]),
-    ("  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.2 um}\n", "", [
-        "9:3: artefacts.bar: is a length standard without calibrated distances; "
-        "add a calibration of kind: distances"]),
+    ("positions:", "  frame: {kind: square, balls: 2, size: 500 mm, role: length_standard}\npositions:", [
+        "10:3: artefacts.frame: is a length standard without calibrated distances; "
+        "add a calibration of kind: distances",
+        "10:3: artefacts.frame: is never placed; add a position of it, or remove it",
+    ]),
 ]  # fmt: skip
 POSITIONS = [
     ("artefact: plate, plane", "artefact: plat, plane", [
