@@ -80,6 +80,18 @@ def ball_pairs(experiment: Experiment, design: Design, name: str | None = None) 
     return np.concatenate(found)
 
 
+def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
+    """Refuse what estimators of distances alone cannot follow.
+
+    :raises ExperimentError: a Bryan gauge, or a length standard without a certificate.
+    """
+    gauges = design.is_gauge is not None and bool(design.is_gauge.any())
+    if gauges or design.length_names:
+        what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({design.length_names[0]})"
+        text = f"estimators of distances alone cannot follow {what}; use the full estimator, or length-equations"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+
+
 def fit_rival(
     experiment: Experiment,
     observed: ObservedReadings,
@@ -93,6 +105,7 @@ def fit_rival(
     Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of t, t^2, ...
     """
     design = observed.design
+    _refuse_unknown_lengths(experiment, design)
     chosen = ball_pairs(experiment, design, pair_set)
     solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
@@ -128,6 +141,7 @@ def compare_estimators(
     corrected with the probe of the file's evaluation. `progress` is told the number of data sets done.
     """
     design = lay_out(experiment)
+    _refuse_unknown_lengths(experiment, design)
     chosen = ball_pairs(experiment, design, pair_set)
     corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
     on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))

@@ -6,16 +6,18 @@ what: error functions with their size and shape, the deformation of the artefact
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simulator.design import Design
+from simulator.design import Design, Integers
 from simulator.estimation.covariance import Covariance, Spectrum
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array, HasLines
 from simulator.quantities import LengthFunction
+
+from .bar_directions import reasons
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01
@@ -62,6 +64,14 @@ class PositionPart:
 
 
 @dataclass(frozen=True)
+class LengthPart:
+    """The change of an unknown length, in metres."""
+
+    name: str
+    change: float
+
+
+@dataclass(frozen=True)
 class Direction:
     """A change of parameters that observations do not show, or show too weakly.
 
@@ -75,6 +85,7 @@ class Direction:
     positions: tuple[PositionPart, ...]
     standard_deviation: float = float("inf")
     probes: tuple[PositionPart, ...] = ()
+    lengths: tuple[LengthPart, ...] = ()
 
     def __str__(self) -> str:
         return in_words(self)
@@ -85,7 +96,7 @@ class Verdict:
     """Whether a design determines its parameters.
 
     `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`; `gap` is the ratio
-    across the border between determined and undetermined.
+    across the border between determined and undetermined. `reasons` tell what bars and gauges lack.
     """
 
     parameters: int
@@ -96,6 +107,7 @@ class Verdict:
     gap: float
     null: tuple[Direction, ...]
     weak: tuple[Direction, ...]
+    reasons: tuple[str, ...] = ()
 
     @property
     def as_expected(self) -> bool:
@@ -112,6 +124,8 @@ def verdict(
     target: LengthFunction | None = None,
 ) -> Verdict:
     """Judge a design from its spectrum; `spread` supplies how the balls follow the undetermined directions."""
+    columns, effect = _weak_columns(design, layout, found, target)
+    open_ = np.concatenate([spread.shared_null, found.root[:, columns]], axis=1)
     return Verdict(
         design.parameter_count,
         design.observations,
@@ -120,7 +134,8 @@ def verdict(
         found.values,
         found.gap,
         null_directions(design, layout, spread),
-        weak_directions(design, layout, found, target),
+        _weak_directions(design, layout, found, columns, effect),
+        reasons(design, layout, open_),
     )
 
 
@@ -143,8 +158,15 @@ def weak_directions(
     design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
 ) -> tuple[Direction, ...]:
     """Determined directions whose standard deviation spoils the error map, weakest first."""
+    return _weak_directions(design, layout, found, *_weak_columns(design, layout, found, target))
+
+
+def _weak_columns(
+    design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
+) -> tuple[Integers, Array]:
+    """Columns of the root that are weak, weakest first, and what one standard deviation along each of all adds."""
     if not len(design.points) or found.rank == 0:
-        return ()
+        return np.zeros(0, np.int64), np.zeros(0)
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
     change = without_rigid_motion(design.points, jacobian @ found.root[layout.model])
@@ -153,12 +175,18 @@ def weak_directions(
     limit = WEAK * float(design.repeatability.max())
     if target is not None:
         limit = float(target.at(0.5 * float(np.linalg.norm(design.upper - design.lower))))
+    return np.flatnonzero(effect > limit)[::-1], effect
+
+
+def _weak_directions(
+    design: Design, layout: SharedLayout, found: Spectrum, columns: Integers, effect: Array
+) -> tuple[Direction, ...]:
     directions = []
-    for column in np.flatnonzero(effect > limit)[::-1]:
+    for column in columns:
         root = found.root[:, column]
         description = _describe(design, layout, root, np.zeros_like(design.balls))
         size = float(effect[column])
-        directions.append(Direction(description.functions, (), description.positions, size, description.probes))
+        directions.append(replace(description, artefacts=(), standard_deviation=size))
     return tuple(directions)
 
 
@@ -207,7 +235,12 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
         if np.abs(values).max() > NEGLIGIBLE * largest:
             probes.append(PositionPart(design.probe_names[k], float(np.linalg.norm(values)), 0.0))
-    return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes))
+    lengths = tuple(
+        LengthPart(name, float(change))
+        for name, change in zip(design.length_names, shared[layout.lengths], strict=True)
+        if abs(change) > NEGLIGIBLE * largest
+    )
+    return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes), lengths=lengths)
 
 
 def _single_axis(vector: Array, word: str) -> str:
@@ -317,6 +350,8 @@ def in_words(direction: Direction) -> str:
         parts.append("moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else ""))
     if direction.probes:
         parts.append("offsets of probes: " + ", ".join(_position_words(part) for part in direction.probes[:6]))
+    if direction.lengths:
+        parts.append(", ".join(f"{part.name} ({length(part.change)})" for part in direction.lengths))
     if np.isinf(direction.standard_deviation):
         end = "change together without changing any observation" if len(parts) > 1 else "changes no observation"
     else:

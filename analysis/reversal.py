@@ -106,7 +106,7 @@ def fit_reversal(
     """
     _refuse_others(experiment, observed, scale)
     settings: MetricSettings = experiment.error_model
-    scale = settings.scale if scale is None else scale
+    scale = settings.plane_scale if scale is None else scale
     experiment = replace(experiment, error_model=settings.model_copy(update={"scale": scale}))
     corners = (tuple(map(float, experiment.machine.volume.lower)), tuple(map(float, experiment.machine.volume.upper)))
     design = replace(observed.design, model=build_error_model(experiment.error_model, *corners))
@@ -164,7 +164,7 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
     if not isinstance(experiment.error_model, MetricSettings):
         kind = experiment.error_model.kind
         say(("error_model", "kind"), f'the reversal is about a machine of kind "metric", not "{kind}"; write metric')
-    elif scale not in (None, experiment.error_model.scale) and experiment.priors:
+    elif scale not in (None, experiment.error_model.plane_scale) and experiment.priors:
         say(("priors",), f"priors are about the file's error model; write scale: {scale} there instead of --scale")
     if len(experiment.artefacts) != 1:
         names = listing(experiment.artefacts)

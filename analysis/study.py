@@ -12,15 +12,17 @@ from simulator.estimation.covariance import Covariance, Spectrum, covariance, sp
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import GaussNewtonSettings, Solution, gauss_newton
 from simulator.estimation.initial import initial_state
-from simulator.estimation.observations import reading_blocks, reading_weights
+from simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
 from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
 from simulator.experiment.model import Experiment
 from simulator.geometry.motions import vector_from_rotation
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array, Unit
+from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.readings import ObservedReadings
 from simulator.threads import single_threaded
 
+from .adjustments import Adjustment, adjustments
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
 from .uncertainty import Quantity, uncertainties
@@ -52,7 +54,10 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class Residual:
-    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties."""
+    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties.
+
+    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the certificate's.
+    """
 
     position: str
     ball: str
@@ -67,7 +72,7 @@ class Fit:
     """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
 
     `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
-    freedom, or 1 where the file says that they are given.
+    freedom, or 1 where the file says that they are given. `adjustments` are those of a three-dimensional metric.
     """
 
     label: str
@@ -82,6 +87,7 @@ class Fit:
     estimates: tuple[ParameterEstimate, ...]
     largest: tuple[Residual, ...]
     plates: tuple[PlateCoordinates, ...] = ()
+    adjustments: tuple[Adjustment, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -170,6 +176,7 @@ def fit(
         _estimates(design, layout, solution, spread, scale, monomials),
         _largest(design, solution, observed.x),
         plate_coordinates(experiment, design, solution.state, spread, scale),
+        _adjustments(design, layout, solution, spread, scale),
     )
 
 
@@ -181,23 +188,45 @@ def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Rea
     return readings, standardised / reading_weights(design, readings), standardised
 
 
+def _adjustments(
+    design: Design, layout: SharedLayout, solution: Solution, spread: Covariance, sigma: float
+) -> tuple[Adjustment, ...]:
+    if not isinstance(design.model, SpatialMetricModel):
+        return ()
+    return adjustments(solution.state.a, sigma * spread.shared[layout.model], spread.shared_null[layout.model])
+
+
 def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
-    """The largest residuals of readings, largest first."""
-    readings, value, standardised = reading_residuals(design, solution, x)
+    """The largest residuals of readings and of lengths, largest first."""
+    chosen = design.plate_readings
+    _, apart, residual = reading_residuals(design, solution, x)
+    off, uncertainty = length_deviations(design, solution.state, x)
+    standardised = np.concatenate([residual.ravel(), off / uncertainty])
+    value = np.concatenate([apart.ravel(), off])
     found = []
-    for place in np.argsort(-np.abs(standardised), axis=None, kind="stable")[:LARGEST].tolist():
+    for place in np.argsort(-np.abs(standardised), kind="stable")[:LARGEST].tolist():
         i, axis = divmod(place, design.dimension)
+        k = place - residual.size
+        reading = int(chosen[i] if k < 0 else design.lengths.first[k])
+        ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
+        if k >= 0:
+            second = design.lengths.second[k]
+            ball, words = (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
         found.append(
             Residual(
-                design.position_names[readings.position[i]],
-                design.ball_label(readings.ball[i]),
-                design.probe_names[readings.probe[i]],
-                "xyz"[axis],
-                float(value[i, axis]),
-                float(standardised[i, axis]),
+                design.position_names[design.readings.position[reading]],
+                ball,
+                design.probe_names[design.readings.probe[reading]],
+                words,
+                float(value[place]),
+                float(standardised[place]),
             )
         )
     return tuple(found)
+
+
+def _ball(design: Design, reading: int) -> str:
+    return design.ball_names[design.readings.ball[reading]]
 
 
 def _estimates(

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from .adjustments import ARCSECOND, Adjustment
 from .plates import PlateCoordinates
 from .rank import Verdict
 from .study import Fit, Plan
@@ -121,6 +122,7 @@ def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
             lines.append(f"{title} {k}: {direction}")
         if len(directions) > 20:
             lines.append(f"{title}: {len(directions) - 20} directions more")
+    lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
 
 
@@ -160,6 +162,8 @@ def fit_lines(fit: Fit) -> list[str]:
         )
     lines += aligned(rows, [False, True, True, False])
     lines.append("(origins of positions and co-ordinates of balls are among the estimates of --json)")
+    if fit.adjustments:
+        lines += ["", *adjustment_lines(fit.adjustments)]
     for plate in fit.plates:
         lines += ["", *plate_table(plate, named=len(fit.plates) > 1)]
     return lines
@@ -175,6 +179,33 @@ def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_B
         rows.append([name, x, y, *(number(1e6 * u, 3) for u in uncertainties)])
     lines += aligned(rows[: most + 1], [False, True, True, True, True])
     return lines + ([f"({len(rows) - 1 - most} balls more in --json)"] if len(rows) - 1 > most else [])
+
+
+def adjustment_lines(found: Sequence[Adjustment]) -> list[str]:
+    """Adjustments as a table of text."""
+    rows = [["adjustment", "is off by", "standard uncertainty", "unit", "what to do"]]
+    for one in found:
+        shown = ARCSECOND if one.unit == "rad" else 1e-6
+        value, u = (number(v / shown) for v in (one.value, one.standard_uncertainty))
+        rows.append([one.what, value, u, "arcsec" if one.unit == "rad" else "um/m", one.words])
+    return [
+        *aligned(rows, [False, True, True, False, False]),
+        "(a scale is off by what readings lack of the true length; an angle by what it exceeds 90 deg)",
+    ]
+
+
+def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
+    """Adjustments as plain data; what is open is None."""
+    return {
+        one.name: {
+            "what": one.what,
+            "value": _finite(one.value),
+            "standard_uncertainty": _finite(one.standard_uncertainty),
+            "unit": one.unit,
+            "words": one.words,
+        }
+        for one in found
+    }
 
 
 def residual_table(fit: Fit, count: int = 3) -> list[str]:
@@ -235,6 +266,7 @@ def fit_data(fit: Fit) -> dict[str, Any]:
             for e in fit.estimates
         },
         **({"plates": {plate.artefact: plate_data(plate) for plate in fit.plates}} if fit.plates else {}),
+        **({"adjustments": adjustment_data(fit.adjustments)} if fit.adjustments else {}),
     }
 
 
@@ -285,6 +317,7 @@ def _verdict_data(judged: Verdict) -> dict[str, Any]:
         "singular_values": [float(v) for v in judged.singular_values],
         "gap": _finite(judged.gap),
         "undetermined": [str(direction) for direction in judged.null],
+        "reasons": list(judged.reasons),
         "weakly_determined": [
             {"text": str(direction), "standard_deviation": direction.standard_deviation} for direction in judged.weak
         ],

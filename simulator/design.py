@@ -151,8 +151,8 @@ class Design:
     turn an artefact of collinear balls about its own axis.
     Balls and positions of length standards stand in the same lists; `is_plate` (artefacts,) tells which
     artefacts are plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose pivots are:
-    the origins of their positions. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none is.
-    `length_names` and `drawn_lengths` (in metres) are those of length standards without certificates, which are
+    the origins of their positions. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none
+    is. `length_names` and `drawn_lengths` (in metres) are those of length standards without certificates, which are
     parameters.
     """
 
@@ -219,7 +219,7 @@ class Design:
 
     @property
     def parameter_count(self) -> int:
-        """Number of free parameters: balls, poses less what is held, the error model's, probe offsets, unknown lengths."""
+        """Number of free parameters: balls, poses less what is held, machine errors, probe offsets, unknown lengths."""
         poses = int((~self.held[self.posed_positions]).sum())
         offsets = 0 if self.free_offsets is None else int(self.free_offsets.sum())
         lengths = len(self.length_names)

@@ -59,8 +59,8 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
 
     Of all artefacts that differ so from their certificate, the nearest to the drawing; where there are more certified
     items than can vary independently, as nearly as a real artefact can. For a length standard, each length moves the
-    second of its balls along the line between the two; for a Bryan gauge it moves the places of its ball. Lengths without
-    certificates are as drawn.
+    second of its balls along the line between the two; for a Bryan gauge it moves the places of its ball. Lengths
+    without certificates are as drawn.
     """
     balls = design.balls.copy()
     tied = distance_rows(design, nominal_state(design))

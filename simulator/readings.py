@@ -203,8 +203,8 @@ def _combine_standards(
 ) -> ObservedReadings:
     """Take the mean of what a length standard's repeats read, and let its lengths point to it.
 
-    A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of its own, since its ball
-    need not be where it was before.
+    A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of its own, since its
+    ball need not be where it was before.
     """
     on_plate = design.is_plate[design.ball_artefact[readings.ball]]
     groups: dict[tuple[int, int, int], list[int]] = {}

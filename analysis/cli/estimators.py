@@ -67,10 +67,24 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
     return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings, draw)
 
 
+def _of_length_equations(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
+    from ..length_fits import fit_lengths, length_fit_data, length_fit_lines
+
+    found = fit_lengths(experiment, observed, options.estimator)
+    complaint, deficiency = "", found.solution.deficiency
+    if not found.solution.converged:
+        complaint = "the estimate has not converged; look for wrong units, balls or positions among the readings"
+    elif deficiency != (experiment.expected_rank_deficiency or 0):
+        complaint = f"rank deficiency {deficiency} where the file expects {experiment.expected_rank_deficiency or 0}"
+    return Outcome(length_fit_lines(found), length_fit_data(found), complaint, found.remarks)
+
+
 ESTIMATORS: dict[str, Estimator] = {
     "distances": _of_distances,
     "cresto": _of_distances,
     "kruth": _of_distances,
     "reversal": _reversal,
+    "length-equations": _of_length_equations,
+    "sphere-then-metric": _of_length_equations,
 }
 """By name; `full` is not among them."""

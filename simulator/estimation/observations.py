@@ -141,22 +141,22 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
     `x` (readings, d) holds the scale readings of all readings, or is None for an error-free machine; the
     length between corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
     """
-    residual, unit, ends, white = _length_residuals(design, state, x)
+    residual, found, white = _length_residuals(design, state, x)
     rows = np.zeros((len(residual), len(state.a)))
-    for end in ends:
+    for end in found.ends:
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
-        rows[end.rows] += end.sign * np.einsum("md,mdn->mn", unit[end.rows], by_model)
+        rows[end.rows] += end.sign * np.einsum("md,mdn->mn", found.unit[end.rows], by_model)
     return residual, white.whitened(rows)
 
 
 def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> tuple[Array, Array]:
     """The same residuals (m,), with the derivative (m, s) by all shared parameters."""
     given = design.lengths
-    residual, unit, ends, white = _length_residuals(design, state, x)
+    residual, found, white = _length_residuals(design, state, x)
     # What is held goes to the extra column.
     rows = np.zeros((len(given), len(layout) + 1))
-    for end in ends:
-        along = unit[end.rows]
+    for end in found.ends:
+        along = found.unit[end.rows]
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
         rows[end.rows, layout.model] += end.sign * np.einsum("md,mdn->mn", along, by_model)
         if design.free_offsets is not None:
@@ -165,7 +165,7 @@ def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Ar
             np.add.at(rows, (end.rows[:, None], columns), end.sign * np.einsum("md,mdj->mj", along, by_offset))
     pivoted = np.flatnonzero(given.to_pivot)
     columns = layout.pose_columns[design.readings.position[given.first[pivoted]], : design.dimension]
-    np.add.at(rows, (pivoted[:, None], columns), -unit[pivoted])
+    np.add.at(rows, (pivoted[:, None], columns), -found.unit[pivoted])
     if given.free is not None:
         free = np.flatnonzero(given.free >= 0)
         rows[free, layout.lengths.start + given.free[free]] -= 1.0
@@ -183,10 +183,17 @@ class _End:
     probe: Integers
 
 
-def _length_residuals(
-    design: Design, state: State, x: Array | None
-) -> tuple[Array, Array, tuple[_End, _End], Whitening]:
-    """Residuals (m,), directions (m, d), the ends that are read, and the whitening of lengths."""
+@dataclass(frozen=True)
+class _Measured:
+    """Lengths between corrected points (m,), their directions (m, d), the ends that are read, and the scatter (m,)."""
+
+    length: Array
+    unit: Array
+    ends: tuple[_End, _End]
+    scatter: Array
+
+
+def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measured:
     given = design.lengths
     difference, noise = np.zeros((2, len(given), design.dimension))
     ends = []
@@ -207,8 +214,22 @@ def _length_residuals(
     length = np.einsum("md,md->m", unit, difference)
     # Along the nominal direction, so that weights stay what they are while parameters change.
     scatter = np.einsum("md,md->m", given.direction**2, noise) * given.with_repeatability
-    white = whitening(np.sqrt(scatter), given.uncertainty, given.certificate)
-    return white.whitened(length - length_values(design, state)), unit, (ends[0], ends[1]), white
+    return _Measured(length, unit, (ends[0], ends[1]), np.sqrt(scatter))
+
+
+def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Array, _Measured, Whitening]:
+    """Whitened residuals (m,) of lengths, what they are formed of, and the whitening."""
+    found = _measured_lengths(design, state, x)
+    white = whitening(found.scatter, design.lengths.uncertainty, design.lengths.certificate)
+    return white.whitened(found.length - length_values(design, state)), found, white
+
+
+def length_deviations(design: Design, state: State, x: Array) -> tuple[Array, Array]:
+    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself, in metres."""
+    if not len(design.lengths):
+        return np.zeros(0), np.ones(0)
+    found = _measured_lengths(design, state, x)
+    return found.length - length_values(design, state), np.hypot(found.scatter, design.lengths.uncertainty)
 
 
 def length_values(design: Design, state: State) -> Array:

@@ -27,7 +27,7 @@ def pose_parameter_names(dimension: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class SharedLayout:
-    """Columns of the shared parameters: free ones of every pose, the error model's, free probe offsets, unknown lengths.
+    """Columns of the shared parameters: the free ones of poses, machine errors, free probe offsets, unknown lengths.
 
     `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or belongs to a
     length standard, and `offset_columns` (l, d) the same for probe offsets; `lengths` are the columns of unknown

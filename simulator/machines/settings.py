@@ -21,7 +21,7 @@ from .custom import custom_model
 from .description import MachineDescription, fitted_volumetric, true_volumetric
 from .empirical import FrameError, empirical_model
 from .kinematic import kinematic_model_of
-from .metric import MetricModel
+from .metric import MetricModel, Scale
 from .protocol import ErrorModel, TrueMachine
 from .spatial_metric import SpatialMetricModel
 from .terms import Radial, quadratic, sums, tensor
@@ -255,6 +255,11 @@ class MetricSettings(Settings):
         "(default). In three dimensions each (default), for a scale error of every axis, or none.",
     )
 
+    @property
+    def plane_scale(self) -> Scale:
+        """Which axis takes the scale difference in two dimensions."""
+        return "none" if self.scale is None or self.scale == "each" else self.scale
+
 
 class PythonSettings(Settings):
     """A user's own error model, made by a Python function that is called with the volume's corners and the options."""
@@ -318,8 +323,7 @@ def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> Err
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
     if len(lower) == 3:
         return SpatialMetricModel(settings.scale != "none", lower, upper)
-    scale = "none" if settings.scale is None or settings.scale == "each" else settings.scale
-    return MetricModel(scale, max(b - a for a, b in zip(lower, upper, strict=True)))
+    return MetricModel(settings.plane_scale, max(b - a for a, b in zip(lower, upper, strict=True)))
 
 
 def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:

@@ -24,8 +24,8 @@ class SpatialMetricModel:
 
     A reading x is corrected to `lower` + M (x - `lower`) + p with the columns (1 + s_i) u_i of M. A scale error s
     is positive where readings are too short. Squareness errors are turns about the positive axis C, B or A (ISO 230-1)
-    that the guideway has suffered: the angle between X and Y is 90 degrees + C0Y, that between X and Z 90 degrees - B0Z,
-    that between Y and Z 90 degrees + A0Z, exactly.
+    that the guideway has suffered: the angle between X and Y is 90 degrees + C0Y, that between X and Z 90 degrees less
+    B0Z, that between Y and Z 90 degrees + A0Z, exactly.
     """
 
     with_scales: bool

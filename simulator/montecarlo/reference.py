@@ -71,8 +71,9 @@ class Reference:
 
     The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
     the model at the first and the second ends of the length standards' lengths, so far as they are read, with
-    `end_noise` (d, ends) and `end_difference` (m, d), their difference at the reference; `points` is the model at the evaluation points.
-    `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of priors about the truth. `start` is the estimate
+    `end_noise` (d, ends) and `end_difference` (m, d), their difference at the reference; `points` is the model at the
+    evaluation points. `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of priors about the truth.
+    `start` is the estimate
     from readings without noise.
     """
 

@@ -1,0 +1,81 @@
+"""What a mechanic would change on a machine of straight axes: scales, and the directions of guideways.
+
+Readings that are too short have a positive scale error. A squareness error is the turn that a guideway has suffered
+about the positive axis in its name, so that the adjustment turns it back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulator.machines.protocol import Array, Unit
+
+ARCSECOND = np.pi / (180.0 * 3600.0)
+
+# Name, axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess over 90 degrees.
+_SQUARENESS = (
+    ("C0Y", "X and Y", "Y", "X", -1, 1),
+    ("B0Z", "X and Z", "Z", "X", 1, -1),
+    ("A0Z", "Y and Z", "Z", "Y", -1, 1),
+)
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """An error with its standard uncertainty, both NaN where it is open, and what to do about it in words.
+
+    `what` is the scale of an axis, or two axes whose angle differs from 90 degrees by `value`; `unit` is 1 or rad.
+    """
+
+    name: str
+    what: str
+    value: float
+    standard_uncertainty: float
+    unit: Unit
+    words: str
+
+
+def adjustments(values: Array, spread: Array, null: Array | None = None) -> tuple[Adjustment, ...]:
+    """From scale errors of X, Y and Z and C0Y, B0Z and A0Z (6,), or the latter alone (3,).
+
+    `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where scales are open and
+    their differences are not, those of Y and Z against X are told as well.
+    """
+    null = np.zeros((len(values), 0)) if null is None else null
+    rows, found = np.eye(len(values)), []
+    size = np.abs(null).max(initial=0.0)
+
+    def told(row: Array) -> tuple[float, float]:
+        is_open = null.shape[1] > 0 and float(np.abs(row @ null).max()) > 1e-7 * size
+        return (np.nan, np.nan) if is_open else (float(row @ values), float(np.linalg.norm(row @ spread)))
+
+    if len(values) == 6:
+        for row, axis in zip(rows[:3], "XYZ", strict=True):
+            value, u = told(row)
+            found.append(Adjustment(f"scale {axis.lower()}", f"scale of {axis}", value, u, "1", _scale(axis, value)))
+        if any(np.isnan(one.value) for one in found):
+            for k, axis in ((1, "Y"), (2, "Z")):
+                value, u = told(rows[k] - rows[0])
+                name = f"scale {axis.lower()} - scale x"
+                words = _scale(axis, value, " against X")
+                found.append(Adjustment(name, f"scale of {axis} against X", value, u, "1", words))
+    for row, (name, axes, guideway, other, sign, excess) in zip(rows[-3:], _SQUARENESS, strict=True):
+        value, u = told(row)
+        words = _turn(guideway, other, sign * value)
+        found.append(Adjustment(name, f"angle of {axes}", excess * value, u, "rad", words))
+    return tuple(found)
+
+
+def _scale(axis: str, value: float, against: str = "") -> str:
+    if np.isnan(value):
+        return "cannot be told"
+    return f"let {axis} read {1e6 * abs(value):.3g} um per m {'more' if value > 0 else 'less'}{against}"
+
+
+def _turn(guideway: str, other: str, lean: float) -> str:
+    if np.isnan(lean):
+        return "cannot be told"
+    angle = f"{abs(lean) / ARCSECOND:.3g} arcsec ({1e6 * abs(lean):.3g} um per m)"
+    return f"turn the {guideway} guideway by {angle} towards {'-' if lean > 0 else '+'}{other}"

@@ -1,0 +1,198 @@
+"""Why bars and gauges leave a machine's scales or squareness open: directions that are missing, lengths not known.
+
+A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S u: a sum of the six
+products of its direction cosines. From a Bryan gauge comes the same less what a shift of its pivot would do. What is
+open of the six is told as what bars have in common.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from simulator.design import Design
+from simulator.estimation.parameters import SharedLayout
+from simulator.geometry.motions import without_rigid_motion
+from simulator.machines.protocol import Array
+
+# Singular values below this fraction of the largest: what readings tell of a direction through their own scatter only.
+MISSING = 1e-3
+AXES = "xyz"
+
+
+def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
+    """What bars and gauges lack, given what changes of the shared parameters (s, k) are open."""
+    if not len(design.lengths) or not open_.shape[1] or not len(design.points):
+        return ()
+    strains = _open_strains(design, layout, open_)
+    if not strains.shape[1]:
+        return ()
+    found = []
+    unknown = design.lengths.free is not None and bool((design.lengths.free >= 0).all())
+    overall = _unit_strain(np.eye(design.dimension))
+    if unknown and _is_among(overall, strains):
+        names = " and ".join(design.length_names)
+        found.append(
+            f"no length is known ({names}): the overall scale of the machine stays open until one is calibrated"
+        )
+        strains = _less(strains, overall)
+    missing = _what_is_missing(design, strains)
+    return (*found, missing) if missing else tuple(found)
+
+
+def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
+    """Strains (products, k), orthonormal columns, that some open change of the machine's errors amounts to."""
+    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
+    fields = without_rigid_motion(design.points, jacobian @ open_[layout.model])
+    basis = np.stack([design.points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))], 2)
+    wanted = without_rigid_motion(design.points, basis - basis.mean(axis=0))
+    flat = fields.reshape(-1, fields.shape[2])
+    flat = flat[:, (flat**2).sum(axis=0) > 0.0]
+    if not flat.shape[1]:
+        return np.zeros((_size(design.dimension), 0))
+    u, values, _ = np.linalg.svd(flat / np.sqrt((flat**2).sum(axis=0)), full_matrices=False)
+    spanned = u[:, values > MISSING * values[0]]
+    strain = wanted.reshape(len(flat), -1)
+    left = strain - spanned @ (spanned.T @ strain)
+    return _null_space(left, float(np.linalg.norm(strain, 2)))
+
+
+def _what_is_missing(design: Design, strains: Array) -> str:
+    """The common property of all directions that leaves the open strains open; empty where another reason must do."""
+    given, d = design.lengths, design.dimension
+    position = design.readings.position[given.first]
+    directions = given.direction.copy()
+    for k in np.unique(position[given.to_pivot]):
+        mine = given.to_pivot & (position == k)
+        directions[mine] -= directions[mine].mean(axis=0)
+    normals = _null_space(directions)
+    normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]
+    what = "every place of the ball" if given.to_pivot.all() else "every bar"
+    if given.to_pivot.any() and not given.to_pivot.all():
+        what = "every bar, and every place of a gauge's ball,"
+    if d == 3 and normals.shape[1] == 1:
+        plane = _plane(normals[:, 0])
+        lies = "lies in a plane parallel to" if given.to_pivot.all() else "lies parallel to"
+        return f"{what} {lies} {plane}: nothing tells {_told(strains, d)}"
+    if d - normals.shape[1] == 1:
+        along = np.linalg.svd(directions)[2][0]
+        return f"{what} lies along {_axis(along)}: nothing tells {_told(strains, d)}"
+    if given.to_pivot.any() or not strains.shape[1]:
+        return ""
+    products = np.array([_products(u) for u in given.direction])
+    different = len(np.unique(np.round(products, 6), axis=0))
+    if different < _size(d):
+        few = f"the bars have only {different} different directions of the {_size(d)} needed"
+        return f"{few}: nothing tells {_told(strains, d)}"
+    if strains.shape[1] == 1:
+        return f"every bar {_quadric(_matrix(strains[:, 0], d))}: nothing tells {_told(strains, d)}"
+    return ""
+
+
+def _quadric(form: Array) -> str:
+    """Words for directions u with u' `form` u = 0."""
+    values, vectors = np.linalg.eigh(form)
+    size = np.abs(values).max()
+    small = np.abs(values) < MISSING * size
+    if small.sum() == 1 and len(values) == 3:
+        high, low = np.argmax(values), np.argmin(values)
+        parts = [np.sqrt(values[high]) * vectors[:, high], np.sqrt(-values[low]) * vectors[:, low]]
+        planes = [_plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1])]
+        return f"lies parallel to {planes[0]} or {planes[1]}"
+    for i in range(len(values)):
+        others = np.delete(values, i)
+        if len(values) == 3 and abs(others[0] - others[1]) < MISSING * size:
+            angle = np.degrees(np.arctan(np.sqrt(-values[i] / others[0])))
+            return f"is at {angle:.3g} deg to {_axis(vectors[:, i])}"
+    return "lies on one cone"
+
+
+def _told(strains: Array, d: int) -> str:
+    """Scales and squareness that are open by themselves, in words; others as mixtures of them."""
+    pairs = list(combinations_with_replacement(range(d), 2))
+    pure = [pair for pair, unit in zip(pairs, np.eye(len(pairs)), strict=True) if _is_among(unit, strains)]
+    scales = [AXES[i].upper() for i, j in pure if i == j]
+    square = [(AXES[i].upper(), AXES[j].upper()) for i, j in pure if i < j]
+    words = []
+    if len(scales) == 1 and square and all(scales[0] in pair for pair in square):
+        others = [a if b == scales[0] else b for a, b in square]
+        words.append(f"the scale of {scales[0]} nor its squareness to {' and '.join(others)}")
+    else:
+        if scales:
+            words.append(f"the {'scales' if len(scales) > 1 else 'scale'} of {_list(scales)}")
+        if square:
+            words.append(f"the squareness of {_list([f'{b} to {a}' for a, b in square])}")
+    if len(pure) < strains.shape[1]:
+        touched = np.abs(strains).max(axis=1) > MISSING
+        for pair in pure:
+            touched[pairs.index(pair)] = False
+        names = [
+            f"the scale of {AXES[i].upper()}" if i == j else f"the squareness of {AXES[j].upper()} to {AXES[i].upper()}"
+            for (i, j), one in zip(pairs, touched, strict=True)
+            if one
+        ]
+        more = strains.shape[1] - len(pure)
+        words.append(f"{'a combination' if more == 1 else f'{more} combinations'} of {_list(names)}")
+    return " nor ".join(words)
+
+
+def _list(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _axis(vector: Array) -> str:
+    k = int(np.abs(vector).argmax())
+    if abs(vector[k]) > 1.0 - MISSING**2:
+        return AXES[k]
+    return f"({', '.join(f'{v:.3g}' for v in np.sign(vector[k]) * vector)})"
+
+
+def _plane(normal: Array) -> str:
+    axis = _axis(normal)
+    return f"the {AXES.replace(axis, '')} plane" if len(axis) == 1 else f"the plane across {axis}"
+
+
+def _size(d: int) -> int:
+    return d * (d + 1) // 2
+
+
+def _matrix(strain: Array, d: int) -> Array:
+    """Symmetric matrix (d, d) of a strain: the coefficients of u_i u_j, i <= j, in u' S u."""
+    found = np.zeros((d, d))
+    for value, (i, j) in zip(strain, combinations_with_replacement(range(d), 2), strict=True):
+        found[i, j] += 0.5 * value
+        found[j, i] += 0.5 * value
+    return found
+
+
+def _products(direction: Array) -> Array:
+    """Products of direction cosines, so that u' S u is their product with a strain."""
+    return np.array([direction[i] * direction[j] for i, j in combinations_with_replacement(range(len(direction)), 2)])
+
+
+def _unit_strain(form: Array) -> Array:
+    """The strain of a symmetric matrix, of length one."""
+    pairs = combinations_with_replacement(range(len(form)), 2)
+    strain = np.array([form[i, j] if i == j else 2.0 * form[i, j] for i, j in pairs])
+    return np.asarray(strain / np.linalg.norm(strain))
+
+
+def _is_among(strain: Array, span: Array) -> bool:
+    """Whether a strain of length one is a mixture of orthonormal ones."""
+    return bool(np.linalg.norm(strain - span @ (span.T @ strain)) < 10 * MISSING)
+
+
+def _less(span: Array, direction: Array) -> Array:
+    """Orthonormal columns that span what of `span` is orthogonal to a direction in it."""
+    coefficients = span.T @ direction
+    return np.asarray(span @ _null_space(coefficients[None]))
+
+
+def _null_space(rows: Array, size: float | None = None) -> Array:
+    """Orthonormal columns that the rows leave all but alone."""
+    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    _, values, directions = np.linalg.svd(triangle)
+    largest = values.max(initial=0.0) if size is None else size
+    return np.asarray(directions[int((values > MISSING * largest).sum()) :].T)

@@ -1,0 +1,109 @@
+"""The length equations of US 4,437,151 at work: a fit of readings of bars and gauges, without weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from simulator.estimation.length_equations import LengthEstimator, LengthSolution, NotAMetricError, length_estimate
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Experiment
+from simulator.readings import ObservedReadings
+
+from .adjustments import Adjustment, adjustments
+from .tables import adjustment_data, adjustment_lines, aligned, number
+
+FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
+
+
+@dataclass(frozen=True)
+class LengthFit:
+    """Length equations solved for an experiment's readings; `pivots` are the names of the gauges' positions.
+
+    `remarks` tell what should be known beside the figures.
+    """
+
+    label: str
+    title: str
+    solution: LengthSolution
+    adjustments: tuple[Adjustment, ...]
+    pivots: tuple[tuple[str, tuple[float, float, float]], ...]
+    lengths: tuple[tuple[str, float], ...]
+    remarks: tuple[str, ...]
+
+
+def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: LengthEstimator) -> LengthFit:
+    """Solve the length equations of an experiment's readings.
+
+    :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
+    """
+    design = observed.design
+    if design.dimension != 3 or not len(design.lengths):
+        what = "machine.volume" if design.dimension != 3 else "artefacts"
+        has = "has two dimensions" if design.dimension != 3 else "has no ball bar or Bryan gauge whose lengths are read"
+        text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+    try:
+        solution = length_estimate(design, observed.x, estimator)
+    except NotAMetricError as error:
+        text = f"{error}; look for wrong units, balls or positions among the readings, or read more directions"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
+    remarks = []
+    if len(design.plate_readings):
+        remarks.append(f"{estimator} takes no notice of plates, calibrated co-ordinates and priors")
+    if design.lengths.free is not None and (design.lengths.free >= 0).all():
+        remarks.append("no length is known: scales are told against one another, and the overall scale stays open")
+    if estimator == "sphere-then-metric" and len(design.gauge_positions):
+        remarks.append(
+            "the pivot is the centre of a sphere, as if the machine were right: the errors that it takes up are "
+            "missing; see length-equations, or the full estimator"
+        )
+    if not np.isfinite(solution.scatter):
+        remarks.append("there are no more equations than unknowns, and hence no uncertainties")
+    return LengthFit(
+        experiment.label,
+        experiment.title,
+        solution,
+        adjustments(solution.parameters, solution.spread, solution.null),
+        tuple((design.position_names[k], tuple(solution.centres[k].tolist())) for k in design.gauge_positions),
+        tuple(zip(design.length_names, solution.lengths.tolist(), strict=True)),
+        tuple(remarks),
+    )
+
+
+def length_fit_lines(fit: LengthFit) -> list[str]:
+    """Solved length equations as lines of text."""
+    found = fit.solution
+    rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
+    status = "converged" if found.converged else "not converged"
+    lines = [
+        f"{fit.label}: {fit.title}",
+        f"estimator {found.estimator}: {found.equations} equations, all of the same weight; {rank}",
+        f"{status} after {found.iterations} iterations",
+        "",
+    ]
+    rows = [["factor of the metric", *FACTORS], ["1e-6", *(number(1e6 * value) for value in found.factors)]]
+    lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(fit.adjustments)]
+    where = [f"{name} ({', '.join(f'{1e3 * c:.4f}' for c in centre)}) mm" for name, centre in fit.pivots]
+    lines += [f"pivots: {'; '.join(where)}"] if where else []
+    return lines + [f"{name}: {1e3 * value:.5f} mm" for name, value in fit.lengths]
+
+
+def length_fit_data(fit: LengthFit) -> dict[str, Any]:
+    """Solved length equations as plain data in metres and radians."""
+    found = fit.solution
+    return {
+        "experiment": fit.label,
+        "title": fit.title,
+        "estimator": found.estimator,
+        "status": "converged" if found.converged else "not converged",
+        "equations": found.equations,
+        "rank_deficiency": found.deficiency,
+        "factors": dict(zip(FACTORS, found.factors.tolist(), strict=True)),
+        "adjustments": adjustment_data(fit.adjustments),
+        "pivots": {name: list(centre) for name, centre in fit.pivots},
+        "lengths": dict(fit.lengths),
+        "remarks": list(fit.remarks),
+    }

@@ -1,0 +1,249 @@
+"""The length equations of US 4,437,151 (Hurt and Foss): a machine's metric from bars and gauges, without weights.
+
+With D the difference of two readings a known length d apart, and G = 1 + E the metric tensor of the machine's axes,
+
+    d^2 = D' G D = (1 + e1) Dx^2 + 2 e2 Dx Dy + 2 e3 Dx Dz + (1 + e4) Dy^2 + 2 e5 Dy Dz + (1 + e6) Dz^2,
+
+equations (100) and (110), are solved for e1 to e6 by least squares, all with the same weight. Of a Bryan gauge one
+end is the pivot c, which is not read, and d its radius r. Two ways to the centre:
+
+sphere-then-metric
+    the patent's: first c, and r where it is not known, from the equations of a sphere (108), |x - c|^2 = r^2, as if
+    the machine were right; then E with c and r held.
+length-equations
+    E, c, and r where it is not known, from equations (110) together. They are linear in E alone; Gauss-Newton does it.
+
+For ball bars, which have no centre, both are the same, and linear. An orthogonal factorisation stands for the patent's
+normal equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from ..design import Design
+from ..machines.protocol import Array
+from ..machines.spatial_metric import parameters_of_metric
+from ..threads import single_threaded
+from .covariance import EXACT, MICROMETRE
+from .initial import initial_state
+
+LengthEstimator = Literal["length-equations", "sphere-then-metric"]
+LENGTH_ESTIMATORS: tuple[str, ...] = get_args(LengthEstimator)
+
+# Places of e1 to e6 in the metric tensor.
+PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+ITERATIONS = 30
+SMALLEST_STEP = 1e-13
+
+
+class NotAMetricError(ValueError):
+    """The length equations give some differences of readings no length: the readings are not those of the design."""
+
+
+@dataclass(frozen=True)
+class LengthSolution:
+    """What the length equations give.
+
+    `factors` (6,) are e1 to e6, `parameters` (6,) the scale errors of X, Y and Z and the squareness errors C0Y, B0Z and
+    A0Z that they amount to, `spread` (6, r) a square root of the covariance of the latter as the scatter about the
+    equations has it, the same for all, NaN without redundancy. `deficiency` and `null` (6, deficiency) tell what of the
+    parameters the equations for everything together leave open. `centres` (positions, 3) has NaN where there is no
+    gauge; `lengths` are those that were unknown. `scatter` is the root of the sum of squares over the degrees of
+    freedom, in square metres.
+    """
+
+    estimator: LengthEstimator
+    factors: Array
+    parameters: Array
+    spread: Array
+    null: Array
+    deficiency: int
+    centres: Array
+    lengths: Array
+    scatter: float
+    equations: int
+    iterations: int
+    converged: bool
+
+
+@single_threaded
+def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "length-equations") -> LengthSolution:
+    """Solve the length equations of a three-dimensional design for scale readings x (readings, 3).
+
+    Where no length is known, scale errors are relative to their mean.
+
+    :raises NotAMetricError: equations whose solution is no metric.
+    """
+    equations = _equations(design, x)
+    unknowns = _start(design, x, equations)
+    count = len(unknowns.values)
+    if estimator == "sphere-then-metric":
+        sphere = unknowns
+        centre_and_radius = np.arange(6, count)
+        if len(centre_and_radius):
+            pivoted = _Equations(
+                *(
+                    part[equations.pivot >= 0]
+                    for part in (equations.place, equations.pivot, equations.known, equations.free)
+                )
+            )
+            sphere, _, _, _ = _solved(pivoted, unknowns, centre_and_radius)
+        found, rank_root, iterations, converged = _solved(equations, sphere, np.arange(6))
+    else:
+        found, rank_root, iterations, converged = _solved(equations, unknowns, np.arange(count))
+    residual, _ = _rows(equations, found)
+    _, everything = _rows(equations, found)
+    null = _null(everything * found.scale) * found.scale[:, None]
+    used = rank_root.shape[1]
+    freedom = len(residual) - used
+    scatter = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
+    factors = found.values[:6]
+    metric = _tensor(factors)
+    if equations.all_free:
+        # The scale of the whole is anybody's.
+        try:
+            mean = float(parameters_of_metric(metric)[:3].mean())
+        except ValueError as error:
+            raise NotAMetricError(str(error)) from None
+        metric = metric / (1.0 + mean) ** 2
+        factors = np.array([metric[i, j] - (i == j) for i, j in PLACES])
+    try:
+        parameters = parameters_of_metric(metric)
+    except ValueError as error:
+        raise NotAMetricError(str(error)) from None
+    by_factor = _by_factor()
+    spread = scatter * by_factor @ rank_root[:6] if freedom > 0 else np.full((6, 1), np.nan)
+    return LengthSolution(
+        estimator,
+        factors,
+        parameters,
+        spread,
+        by_factor @ null[:6],
+        null.shape[1],
+        _centres(design, found),
+        found.values[6 + 3 * len(found.pivots) :],
+        scatter,
+        len(residual),
+        iterations,
+        converged,
+    )
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """Rows: the difference of both ends or, of a gauge, the place read (m, 3); pivot, or -1, and length of each.
+
+    `known` (m,) are lengths in metres, `free` (m,) numbers of unknown ones, -1 where the length is known.
+    """
+
+    place: Array
+    pivot: np.ndarray
+    known: Array
+    free: np.ndarray
+
+    @property
+    def all_free(self) -> bool:
+        return bool((self.free >= 0).all())
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """e1 to e6, centres of `pivots` (positions), unknown lengths: values and scales (n,)."""
+
+    values: Array
+    scale: Array
+    pivots: np.ndarray
+
+
+def _equations(design: Design, x: Array) -> _Equations:
+    given = design.lengths
+    seen = x + design.probes[design.readings.probe]
+    place = seen[given.first]
+    place[~given.to_pivot] -= seen[given.second[~given.to_pivot]]
+    position = design.readings.position[given.first]
+    number = np.full(len(design.position_names), -1)
+    number[design.gauge_positions] = np.arange(len(design.gauge_positions))
+    free = np.full(len(given), -1) if given.free is None else given.free
+    return _Equations(place, np.where(given.to_pivot, number[position], -1), given.value, free)
+
+
+def _start(design: Design, x: Array, equations: _Equations) -> _Unknowns:
+    """The centres and lengths that a sphere through the readings has, on a machine without errors."""
+    state = initial_state(design, x)
+    lengths = design.drawn_lengths if state.lengths is None else state.lengths
+    pivots = design.gauge_positions
+    values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), lengths])
+    return _Unknowns(values, np.full(len(values), MICROMETRE), pivots)
+
+
+def _tensor(factors: Array) -> Array:
+    metric = np.eye(3)
+    for value, (i, j) in zip(factors, PLACES, strict=True):
+        metric[i, j] += value
+        metric[j, i] = metric[i, j]
+    return metric
+
+
+def _rows(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
+    """D' G D - d^2 (m,) and its derivative by all unknowns (m, n)."""
+    metric, k = _tensor(at.values[:6]), len(at.pivots)
+    centres, lengths = at.values[6 : 6 + 3 * k].reshape(k, 3), at.values[6 + 3 * k :]
+    pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
+    difference = equations.place.copy()
+    difference[pivoted] -= centres[equations.pivot[pivoted]]
+    length = equations.known.copy()
+    length[free] = lengths[equations.free[free]]
+    pulled = difference @ metric
+    rows = np.zeros((len(length), len(at.values)))
+    for column, (i, j) in enumerate(PLACES):
+        rows[:, column] = (1.0 if i == j else 2.0) * difference[:, i] * difference[:, j]
+    for axis in range(3):
+        rows[pivoted, 6 + 3 * equations.pivot[pivoted] + axis] = -2.0 * pulled[pivoted, axis]
+    rows[free, 6 + 3 * k + equations.free[free]] = -2.0 * length[free]
+    return (pulled * difference).sum(axis=1) - length**2, rows
+
+
+def _solved(equations: _Equations, start: _Unknowns, columns: np.ndarray) -> tuple[_Unknowns, Array, int, bool]:
+    """Least squares over some of the unknowns: where it ends, a square root (n, rank) of (J'J)^+, iterations."""
+    at, previous = start, np.inf
+    for iteration in range(1, ITERATIONS + 1):
+        residual, rows = _rows(equations, at)
+        scale = at.scale[columns]
+        u, values, vh = np.linalg.svd(rows[:, columns] * scale, full_matrices=False)
+        rank = int((values > EXACT * values.max(initial=0.0)).sum())
+        root = np.zeros((len(at.values), rank))
+        root[columns] = scale[:, None] * vh[:rank].T / values[:rank]
+        step = -root @ (u[:, :rank].T @ residual)
+        at = _Unknowns(at.values + step, at.scale, at.pivots)
+        size = float(np.abs(step).max(initial=0.0))
+        if not np.isfinite(size):
+            break
+        if size < SMALLEST_STEP or (size > 0.5 * previous and size < 1e-9):
+            return at, root, iteration, True
+        previous = size
+    return at, root, iteration, False
+
+
+def _null(rows: Array) -> Array:
+    """Orthonormal columns that the rows leave open."""
+    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    _, values, vh = np.linalg.svd(triangle)
+    return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
+
+
+def _by_factor() -> Array:
+    """Derivative (6, 6) of the scale and squareness errors by e1 to e6 at a machine without errors."""
+    derivative = np.zeros((6, 6))
+    for row, (column, value) in enumerate(((0, 0.5), (3, 0.5), (5, 0.5), (1, -1.0), (2, 1.0), (4, -1.0))):
+        derivative[row, column] = value
+    return derivative
+
+
+def _centres(design: Design, found: _Unknowns) -> Array:
+    centres = np.full(design.origins.shape, np.nan)
+    centres[found.pivots] = found.values[6 : 6 + 3 * len(found.pivots)].reshape(-1, 3)
+    return centres
