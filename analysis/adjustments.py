@@ -55,9 +55,10 @@ def adjustments(values: Array, spread: Array, null: Array | None = None) -> tupl
         for row, axis in zip(rows[:3], "XYZ", strict=True):
             value, u = told(row)
             found.append(Adjustment(f"scale {axis.lower()}", f"scale of {axis}", value, u, "1", _scale(axis, value)))
-        if any(np.isnan(one.value) for one in found):
-            for k, axis in ((1, "Y"), (2, "Z")):
-                value, u = told(rows[k] - rows[0])
+        alone = [not np.isnan(one.value) for one in found]
+        for k, axis in ((1, "Y"), (2, "Z")):
+            value, u = told(rows[k] - rows[0])
+            if not np.isnan(value) and not (alone[0] and alone[k]):
                 name = f"scale {axis.lower()} - scale x"
                 words = _scale(axis, value, " against X")
                 found.append(Adjustment(name, f"scale of {axis} against X", value, u, "1", words))

@@ -68,13 +68,19 @@ class Spectrum:
 
 
 @single_threaded
-def spectrum(factor: Factor, exact: float = EXACT, drawn_open: int = 0) -> Spectrum:
+def spectrum(factor: Factor, exact: float = EXACT, drawn_open: int = 0, held: Array | None = None) -> Spectrum:
     """Singular value decomposition of the shared parameters' factor.
 
-    The smallest `drawn_open` values count as zero if they are at least small, below `NEARLY` of the largest.
+    The smallest `drawn_open` values count as zero if they are at least small, below `NEARLY` of the largest. What
+    observations tell of the directions `held` (s, k), null directions of another spectrum, is left out, so that these
+    are null directions here, too.
     """
     scale = factor.layout.scale * MICROMETRE
-    _, values, rows = np.linalg.svd(factor.root * scale)
+    root = factor.root * scale
+    if held is not None:
+        open_ = held / scale[:, None]
+        root = root - (root @ open_) @ open_.T
+    _, values, rows = np.linalg.svd(root)
     largest = values.max(initial=0.0)
     nearly = min(drawn_open, int((values <= NEARLY * largest).sum()))
     deficiency = max(int((values <= exact * largest).sum()), nearly)

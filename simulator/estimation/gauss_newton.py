@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..design import Design, State, probe_offsets, unknown_lengths
+from ..design import Design, State, nominal_state, probe_offsets, unknown_lengths
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
@@ -56,11 +56,17 @@ class Solution:
 
 
 @single_threaded
-def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSettings | None = None) -> Solution:
+def gauss_newton(
+    design: Design,
+    x: Array,
+    start: State,
+    settings: GaussNewtonSettings | None = None,
+    held: Array | None = None,
+) -> Solution:
     """Minimise S^2 over balls, poses and machine errors, from `start`.
 
-    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not moved in.
-    A failure to converge is a status, not an exception.
+    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not moved in, nor those
+    `held` (s, k): see `open_as_drawn`. A failure to converge is a status, not an exception.
     """
     settings = settings or GaussNewtonSettings()
     layout = shared_layout(design)
@@ -76,7 +82,7 @@ def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSe
             found = no_spectrum(layout)
             status = "diverged"
             break
-        found = spectrum(factor, drawn_open=settings.drawn_open)
+        found = spectrum(factor, drawn_open=settings.drawn_open, held=held)
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found)
@@ -90,6 +96,16 @@ def gauss_newton(design: Design, x: Array, start: State, settings: GaussNewtonSe
             status = "converged"
         previous = size
     return Solution(state, factor, found, tuple(record), status)
+
+
+def open_as_drawn(design: Design) -> Array | None:
+    """Shared directions (s, k) that readings without errors would leave open; None where there are none.
+
+    With errors and noise the same readings seem to tell a little of them. To follow that leads far astray: where no
+    length is known, S^2 is least when all lengths are zero.
+    """
+    found = spectrum(eliminate(design, shared_layout(design), nominal_state(design)))
+    return found.null if found.deficiency else None
 
 
 def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:

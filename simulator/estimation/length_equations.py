@@ -79,53 +79,43 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
     :raises NotAMetricError: equations whose solution is no metric.
     """
     equations = _equations(design, x)
-    unknowns = _start(design, x, equations)
-    count = len(unknowns.values)
+    at = _start(design, x)
+    held = _open_directions(equations, at)
+    everything, metric_only = np.arange(len(at.values)), np.arange(6)
     if estimator == "sphere-then-metric":
-        sphere = unknowns
-        centre_and_radius = np.arange(6, count)
-        if len(centre_and_radius):
-            pivoted = _Equations(
-                *(
-                    part[equations.pivot >= 0]
-                    for part in (equations.place, equations.pivot, equations.known, equations.free)
-                )
-            )
-            sphere, _, _, _ = _solved(pivoted, unknowns, centre_and_radius)
-        found, rank_root, iterations, converged = _solved(equations, sphere, np.arange(6))
+        pivoted = equations.select(equations.pivot >= 0)
+        if len(pivoted.known):
+            at, _, _, _ = _solved(pivoted, at, everything[6:])
+        found, root, iterations, converged = _solved(equations, at, metric_only)
     else:
-        found, rank_root, iterations, converged = _solved(equations, unknowns, np.arange(count))
+        found, root, iterations, converged = _solved(equations, at, everything, held)
     residual, _ = _rows(equations, found)
-    _, everything = _rows(equations, found)
-    null = _null(everything * found.scale) * found.scale[:, None]
-    used = rank_root.shape[1]
+    used = root.shape[1]
     freedom = len(residual) - used
     scatter = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
     factors = found.values[:6]
-    metric = _tensor(factors)
-    if equations.all_free:
-        # The scale of the whole is anybody's.
-        try:
-            mean = float(parameters_of_metric(metric)[:3].mean())
-        except ValueError as error:
-            raise NotAMetricError(str(error)) from None
-        metric = metric / (1.0 + mean) ** 2
-        factors = np.array([metric[i, j] - (i == j) for i, j in PLACES])
+    lengths = found.values[6 + 3 * len(found.pivots) :]
     try:
-        parameters = parameters_of_metric(metric)
+        parameters = parameters_of_metric(_tensor(factors))
+        if equations.all_free:
+            # The scale of the whole is anybody's.
+            size = 1.0 + float(parameters[:3].mean())
+            lengths = lengths / size
+            factors = _factors(_tensor(factors) / size**2)
+            parameters = parameters_of_metric(_tensor(factors))
     except ValueError as error:
         raise NotAMetricError(str(error)) from None
     by_factor = _by_factor()
-    spread = scatter * by_factor @ rank_root[:6] if freedom > 0 else np.full((6, 1), np.nan)
+    spread = scatter * by_factor @ root[:6] if freedom > 0 else np.full((6, 1), np.nan)
     return LengthSolution(
         estimator,
         factors,
         parameters,
         spread,
-        by_factor @ null[:6],
-        null.shape[1],
+        by_factor @ held[:6],
+        held.shape[1],
         _centres(design, found),
-        found.values[6 + 3 * len(found.pivots) :],
+        lengths,
         scatter,
         len(residual),
         iterations,
@@ -145,6 +135,9 @@ class _Equations:
     known: Array
     free: np.ndarray
 
+    def select(self, chosen: np.ndarray) -> _Equations:
+        return _Equations(self.place[chosen], self.pivot[chosen], self.known[chosen], self.free[chosen])
+
     @property
     def all_free(self) -> bool:
         return bool((self.free >= 0).all())
@@ -152,10 +145,9 @@ class _Equations:
 
 @dataclass(frozen=True)
 class _Unknowns:
-    """e1 to e6, centres of `pivots` (positions), unknown lengths: values and scales (n,)."""
+    """e1 to e6, centres of `pivots` (positions), unknown lengths: values (n,)."""
 
     values: Array
-    scale: Array
     pivots: np.ndarray
 
 
@@ -171,13 +163,13 @@ def _equations(design: Design, x: Array) -> _Equations:
     return _Equations(place, np.where(given.to_pivot, number[position], -1), given.value, free)
 
 
-def _start(design: Design, x: Array, equations: _Equations) -> _Unknowns:
+def _start(design: Design, x: Array) -> _Unknowns:
     """The centres and lengths that a sphere through the readings has, on a machine without errors."""
     state = initial_state(design, x)
     lengths = design.drawn_lengths if state.lengths is None else state.lengths
     pivots = design.gauge_positions
     values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), lengths])
-    return _Unknowns(values, np.full(len(values), MICROMETRE), pivots)
+    return _Unknowns(values, pivots)
 
 
 def _tensor(factors: Array) -> Array:
@@ -188,37 +180,66 @@ def _tensor(factors: Array) -> Array:
     return metric
 
 
+def _factors(metric: Array) -> Array:
+    return np.array([metric[i, j] - (i == j) for i, j in PLACES])
+
+
+def _differences(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
+    """D (m, 3) and the lengths (m,) to be compared with."""
+    pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
+    k = len(at.pivots)
+    difference, length = equations.place.copy(), equations.known.copy()
+    difference[pivoted] -= at.values[6 : 6 + 3 * k].reshape(k, 3)[equations.pivot[pivoted]]
+    length[free] = at.values[6 + 3 * k :][equations.free[free]]
+    return difference, length
+
+
 def _rows(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
     """D' G D - d^2 (m,) and its derivative by all unknowns (m, n)."""
-    metric, k = _tensor(at.values[:6]), len(at.pivots)
-    centres, lengths = at.values[6 : 6 + 3 * k].reshape(k, 3), at.values[6 + 3 * k :]
+    difference, length = _differences(equations, at)
+    pulled = difference @ _tensor(at.values[:6])
+    return (pulled * difference).sum(axis=1) - length**2, _derivative(equations, at, difference, pulled, length)
+
+
+def _derivative(equations: _Equations, at: _Unknowns, difference: Array, pulled: Array, length: Array) -> Array:
     pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
-    difference = equations.place.copy()
-    difference[pivoted] -= centres[equations.pivot[pivoted]]
-    length = equations.known.copy()
-    length[free] = lengths[equations.free[free]]
-    pulled = difference @ metric
     rows = np.zeros((len(length), len(at.values)))
     for column, (i, j) in enumerate(PLACES):
         rows[:, column] = (1.0 if i == j else 2.0) * difference[:, i] * difference[:, j]
     for axis in range(3):
         rows[pivoted, 6 + 3 * equations.pivot[pivoted] + axis] = -2.0 * pulled[pivoted, axis]
-    rows[free, 6 + 3 * k + equations.free[free]] = -2.0 * length[free]
-    return (pulled * difference).sum(axis=1) - length**2, rows
+    rows[free, 6 + 3 * len(at.pivots) + equations.free[free]] = -2.0 * length[free]
+    return rows
 
 
-def _solved(equations: _Equations, start: _Unknowns, columns: np.ndarray) -> tuple[_Unknowns, Array, int, bool]:
+def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
+    """Orthonormal directions (n, k), in micrometres and parts per million, that the equations leave open.
+
+    They are those of a machine without errors that reads without noise in the same directions. What else equations seem
+    to tell of them leads astray: where no length is known, all of them hold if all lengths are zero.
+    """
+    difference, length = _differences(equations, at)
+    exact = difference * (length / np.sqrt((difference**2).sum(axis=1)))[:, None]
+    _, values, vh = np.linalg.svd(_derivative(equations, at, exact, exact, length) * MICROMETRE)
+    return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
+
+
+def _solved(
+    equations: _Equations, start: _Unknowns, columns: np.ndarray, held: Array | None = None
+) -> tuple[_Unknowns, Array, int, bool]:
     """Least squares over some of the unknowns: where it ends, a square root (n, rank) of (J'J)^+, iterations."""
     at, previous = start, np.inf
     for iteration in range(1, ITERATIONS + 1):
         residual, rows = _rows(equations, at)
-        scale = at.scale[columns]
-        u, values, vh = np.linalg.svd(rows[:, columns] * scale, full_matrices=False)
+        used = rows[:, columns] * MICROMETRE
+        if held is not None:
+            used = used - (used @ held) @ held.T
+        u, values, vh = np.linalg.svd(used, full_matrices=False)
         rank = int((values > EXACT * values.max(initial=0.0)).sum())
         root = np.zeros((len(at.values), rank))
-        root[columns] = scale[:, None] * vh[:rank].T / values[:rank]
+        root[columns] = MICROMETRE * vh[:rank].T / values[:rank]
         step = -root @ (u[:, :rank].T @ residual)
-        at = _Unknowns(at.values + step, at.scale, at.pivots)
+        at = _Unknowns(at.values + step, at.pivots)
         size = float(np.abs(step).max(initial=0.0))
         if not np.isfinite(size):
             break
@@ -226,13 +247,6 @@ def _solved(equations: _Equations, start: _Unknowns, columns: np.ndarray) -> tup
             return at, root, iteration, True
         previous = size
     return at, root, iteration, False
-
-
-def _null(rows: Array) -> Array:
-    """Orthonormal columns that the rows leave open."""
-    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
-    _, values, vh = np.linalg.svd(triangle)
-    return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
 
 
 def _by_factor() -> Array:

@@ -196,6 +196,8 @@ class _Measured:
 def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measured:
     given = design.lengths
     difference, noise = np.zeros((2, len(given), design.dimension))
+    pivoted = np.flatnonzero(given.to_pivot)
+    pivot = state.origins[design.readings.position[given.first[pivoted]]]
     ends = []
     for sign, chosen, rows in (
         (1.0, given.first, np.arange(len(given))),
@@ -203,12 +205,18 @@ def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measure
     ):
         readings = design.readings.select(chosen[rows])
         p = probe_offsets(design, state)[readings.probe]
-        points = expected_readings(design, state, readings) if x is None else x[chosen[rows]]
+        if x is not None:
+            points = x[chosen[rows]]
+        else:
+            points = expected_readings(design, state, readings)
+            if sign > 0:
+                # Where the ball of a gauge was, which need not be where it was to be.
+                reach = length_values(design, state)[pivoted, None] * given.direction[pivoted]
+                points[pivoted] = pivot + reach - p[pivoted]
         difference[rows] += sign * (points + (p if x is None else design.model.error(points, state.a, p)))
         noise[rows] += reading_weights(design, readings) ** -2
         ends.append(_End(sign, rows, points, p, readings.probe))
-    pivoted = np.flatnonzero(given.to_pivot)
-    difference[pivoted] -= state.origins[design.readings.position[given.first[pivoted]]]
+    difference[pivoted] -= pivot
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected[:, None], given.direction, unit)
     length = np.einsum("md,md->m", unit, difference)
