@@ -99,11 +99,14 @@ def gauss_newton(
 
 
 def open_as_drawn(design: Design) -> Array | None:
-    """Shared directions (s, k) that readings without errors would leave open; None where there are none.
+    """Shared directions (s, k) that bars and gauges read without errors would leave open; None where there are none.
 
     With errors and noise the same readings seem to tell a little of them. To follow that leads far astray: where no
-    length is known, S^2 is least when all lengths are zero.
+    length is known, S^2 is least when all lengths are zero. Of plates alone such directions are followed, as in NPL
+    Report CISE 15/98, section 5.4, where the iteration wanders along them without leaving the neighbourhood.
     """
+    if not len(design.lengths):
+        return None
     found = spectrum(eliminate(design, shared_layout(design), nominal_state(design)))
     return found.null if found.deficiency else None
 

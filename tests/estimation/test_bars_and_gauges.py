@@ -1,0 +1,248 @@
+"""Ball bars and Bryan gauges against closed forms, differences, and a fit that shares no code with ours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.optimize import least_squares
+
+from analysis.study import fit, plan
+from simulator.design import Design, State, nominal_state
+from simulator.estimation.gauss_newton import moved
+from simulator.estimation.observations import length_shared_rows
+from simulator.estimation.parameters import shared_layout
+from simulator.estimation.spheres import fit_sphere
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+from simulator.generate import exact_readings, on_true_machine, true_artefacts
+from simulator.layout import lay_out
+from simulator.machines.truth import true_machine
+from simulator.readings import read_readings, write_readings
+from tests.reference.derivatives import assert_derivative, central_difference
+
+FOLDER = Path("designs/hurt_foss")
+
+
+def changed(tmp_path: Path, file: str, **sections: object) -> Experiment:
+    """A shipped design without its variants, some sections replaced."""
+    content = yaml.safe_load((FOLDER / f"{file}.yaml").read_text(encoding="utf-8"))
+    del content["variants"], content["expected_rank_deficiency"]
+    path = tmp_path / f"{file}.yaml"
+    path.write_text(yaml.safe_dump(content | sections), encoding="utf-8")
+    (experiment,) = load(path)
+    return experiment
+
+
+def shipped(file: str, variant: str) -> Experiment:
+    return {one.name: one for one in load(FOLDER / f"{file}.yaml")}[variant]
+
+
+def truth_of(experiment: Experiment, design: Design) -> tuple[Design, State]:
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    return on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+
+
+BOTH = {
+    "artefacts": {
+        "bar": {"kind": "two_spheres", "length": "400 mm", "role": "length_standard"},
+        "gauge": {"kind": "bryan_gauge", "radius": "300 mm", "directions": {"random": 12, "lowest": "10 deg"}},
+        "short": {"kind": "bryan_gauge", "radius": "200 mm", "directions": {"random": 6, "seed": 2}},
+    },
+    "probes": {"magnet": ["0 mm", "0 mm", "0 mm"], "other": {"offset": ["0 mm", "0 mm", "-50 mm"], "unknown": True}},
+    "positions": [
+        {"name": "bar", "artefact": "bar", "pose": {"origin": ["100 mm", "100 mm", "100 mm"]}, "probes": ["magnet"]},
+        *(
+            {"name": name, "artefact": gauge, "pose": {"origin": [x, "400 mm", "150 mm"]}, "probes": [probe]}
+            for name, gauge, x, probe in (
+                ("left", "gauge", "350 mm", "magnet"),
+                ("right", "gauge", "650 mm", "other"),
+                ("middle", "short", "500 mm", "magnet"),
+            )
+        ),
+    ],
+    "calibration": [{"kind": "radius", "artefact": "gauge", "standard_uncertainty": "2 um", "value": "300.1 mm"}],
+}
+
+
+def test_rows_are_derivatives(tmp_path: Path) -> None:
+    """By machine errors, pivots, probe offsets and unknown lengths together, certificates shared."""
+    experiment = changed(tmp_path, "bryan-gauge", **BOTH)
+    design = lay_out(experiment)
+    layout = shared_layout(design)
+    assert design.length_names == ("bar: length", "short: radius")
+    assert [p.name for p in layout.parameters[layout.poses]] == [
+        f"{name}: origin {axis}" for name in ("left", "right", "middle") for axis in "xyz"
+    ]
+    on_truth, truth = truth_of(experiment, design)
+    _, x = exact_readings(on_truth, truth)
+    generator = np.random.default_rng(1)
+
+    def residual(step: np.ndarray) -> np.ndarray:
+        still = np.zeros_like(design.balls)
+        arguments = (step, still, layout.model, layout.offset_columns, layout.lengths)
+        return length_shared_rows(design, layout, moved(design, state, layout.pose_columns, *arguments), x)[0]
+
+    state = replace(nominal_state(design), a=1e-4 * generator.standard_normal(6))
+    expected = central_difference(residual, np.zeros(len(layout)), 1e-6)
+    assert_derivative(length_shared_rows(design, layout, state, x)[1], expected, 1e-6)
+
+
+def test_one_bar_along_one_axis_has_the_uncertainty_of_the_closed_form(tmp_path: Path) -> None:
+    places = [{"name": str(k), "pose": {"origin": ["250 mm", f"{100 * k} mm", "300 mm"]}} for k in range(1, 6)]
+    found = plan(changed(tmp_path, "bar-bell", positions=places))
+    assert found.verdict.deficiency == 5
+    # The mean of five lengths whose ends have 1 um each, on a certificate with 0.5 um.
+    assert found.quantities["U3 ratios"].maximum == pytest.approx(np.sqrt(2e-12 / 5 + 0.25e-12) / 0.5, rel=1e-9)
+
+
+def directions(parameters: np.ndarray) -> np.ndarray:
+    """Axes of a machine with scale errors and angles, written down anew: columns are what a unit of reading moves."""
+    sx, sy, sz, c, b, a = parameters
+    y = np.array([np.cos(np.pi / 2 + c), np.sin(np.pi / 2 + c), 0.0])
+    z0 = np.cos(np.pi / 2 - b)
+    z1 = (np.cos(np.pi / 2 + a) - y[0] * z0) / y[1]
+    z = np.array([z0, z1, np.sqrt(1.0 - z0**2 - z1**2)])
+    return np.column_stack([(1 + sx) * np.array([1.0, 0.0, 0.0]), (1 + sy) * y, (1 + sz) * z])
+
+
+@pytest.mark.parametrize("variant", ["length known", "radius known", "two pivots"])
+def test_the_fit_is_the_one_of_scipy(variant: str, tmp_path: Path) -> None:
+    """Values and uncertainties; the certificate as an observation of one unknown length."""
+    file = "bar-bell" if variant == "length known" else "bryan-gauge"
+    experiment = shipped(file, variant)
+    design = lay_out(experiment)
+    path = tmp_path / "readings.csv"
+    on_truth, truth = truth_of(experiment, design)
+    generator = np.random.default_rng(5)
+    readings, x = exact_readings(on_truth, replace(truth, balls=true_artefacts(design, generator)))
+    x = x + 1e-6 * generator.standard_normal(x.shape)
+    with path.open("w", encoding="utf-8") as stream:
+        write_readings(stream, design, readings, x)
+    found = fit(experiment, read_readings(path, lay_out(experiment)), "given")
+    drawn = 0.5 if file == "bar-bell" else 0.3
+    pivots = len(design.gauge_positions)
+    # The ends of a bar move independently; the pivot stands still.
+    noise = 1e-6 * (np.sqrt(2.0) if file == "bar-bell" else 1.0)
+
+    def residual(unknown: np.ndarray) -> np.ndarray:
+        unknown = 1e-6 * unknown
+        axes, radius = directions(unknown[:6]), drawn + unknown[6]
+        if file == "bar-bell":
+            lengths = [np.linalg.norm(axes @ (x[2 * k] - x[2 * k + 1])) for k in range(12)]
+        else:
+            centres = design.origins + unknown[7:].reshape(pivots, 3)
+            lengths = [np.linalg.norm(axes @ p - centres[k]) for k, p in zip(readings.position, x, strict=True)]
+        return np.append((np.array(lengths) - radius) / noise, unknown[6] / 0.5e-6)
+
+    theirs = least_squares(
+        residual, np.zeros(7 + 3 * pivots), "3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
+    spread = np.sqrt(np.diag(np.linalg.inv(theirs.jac.T @ theirs.jac)))
+    ours = {e.name: e for e in found.estimates}
+    for k, name in enumerate(("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")):
+        assert ours[name].value == pytest.approx(1e-6 * theirs.x[k], abs=1e-4 * 1e-6 * spread[k])
+        assert ours[name].standard_uncertainty == pytest.approx(1e-6 * spread[k], rel=1e-4)
+    assert found.solution.factor.sum_of_squares == pytest.approx(2.0 * theirs.cost, rel=1e-6)
+
+
+def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
+    observed = FOLDER / "bryan-gauge-readings.csv"
+    unknown = shipped("bryan-gauge", "radius unknown")
+    badly = changed(
+        tmp_path, "bryan-gauge", calibration=[{"kind": "radius", "standard_uncertainty": "20 um"}], seed=151
+    )
+    found = [fit(one, read_readings(observed, lay_out(one)), "given") for one in (unknown, badly)]
+    assert [one.verdict.deficiency for one in found] == [1, 0]
+    left = {one.name: one for one in found[0].adjustments}
+    assert np.isnan(left["scale x"].value) and left["scale x"].words == "cannot be told"
+    right = {e.name: e for e in found[1].estimates}
+    assert right["scale x"].standard_uncertainty == pytest.approx(20e-6 / 0.3, rel=1e-2)
+    for name in ("C0Y", "B0Z", "A0Z"):
+        excess = -1.0 if name == "B0Z" else 1.0
+        assert excess * left[name].value == pytest.approx(right[name].value, abs=1e-9)
+        assert left[name].standard_uncertainty == pytest.approx(right[name].standard_uncertainty, rel=1e-4)
+    difference = right["scale y"].value - right["scale x"].value
+    assert left["scale y - scale x"].value == pytest.approx(difference, abs=1e-9)
+
+
+def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
+    """Readings of other directions than drawn, of a pivot that stands elsewhere, fit just as well."""
+    drawn = changed(tmp_path, "bryan-gauge")
+    really = changed(
+        tmp_path,
+        "bryan-gauge",
+        artefacts={"gauge": {"kind": "bryan_gauge", "radius": "300 mm", "directions": {"random": 60, "seed": 4}}},
+        positions=[{"name": "pivot", "pose": {"origin": ["480 mm", "430 mm", "120 mm"]}}],
+    )
+    design = lay_out(really)
+    on_truth, truth = truth_of(really, design)
+    readings, x = exact_readings(on_truth, truth)
+    with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
+        write_readings(stream, design, readings, x)
+    found = fit(drawn, read_readings(tmp_path / "r.csv", lay_out(drawn)), "given")
+    values = {e.name: e.value for e in found.estimates}
+    np.testing.assert_allclose([values[p.name] for p in design.model.parameters], truth.a, rtol=0, atol=1e-10)
+    assert [values[f"pivot: origin {axis}"] for axis in "xyz"] == pytest.approx([0.48, 0.43, 0.12], abs=1e-10)
+    uncertainty = {e.name: e.standard_uncertainty for e in found.estimates}
+    planned = plan(really).quantities["U3"]
+    assert max(uncertainty[p.name] for p in design.model.parameters) == pytest.approx(planned.maximum, rel=1e-3)
+
+
+def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
+    once, twice = (
+        changed(
+            tmp_path,
+            "bryan-gauge",
+            positions=[{"name": "pivot", "pose": {"origin": ["500 mm", "400 mm", "100 mm"]}, "repeats": k}],
+        )
+        for k in (1, 2)
+    )
+    known = plan(twice).quantities["U3 angles"].maximum
+    assert known == pytest.approx(plan(once).quantities["U3 angles"].maximum / np.sqrt(2.0), rel=1e-9)
+    design = lay_out(twice)
+    readings, x = exact_readings(*truth_of(twice, design))
+    # The second time the ball stands 20 mm to the side of the first on the same sphere.
+    centre = design.origins[0]
+    aside = x[1::2] + 0.02 * np.cross(x[1::2] - centre, [0.0, 0.0, 1.0])
+    x[1::2] = centre + 0.3 * (aside - centre) / np.linalg.norm(aside - centre, axis=1)[:, None]
+    with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
+        write_readings(stream, design, readings, x)
+    observed = read_readings(tmp_path / "r.csv", design)
+    assert len(observed.design.lengths) == 120 and len(np.unique(observed.design.lengths.first)) == 120
+
+
+def test_a_bar_whose_ends_are_plate_balls_turns_about_itself_for_nobody(tmp_path: Path) -> None:
+    """As a plate, too, the two balls say nothing of the turn about their line, and it is no parameter."""
+    as_plate = changed(
+        tmp_path, "bar-bell", artefacts={"bar": {"kind": "two_spheres", "length": "500 mm"}}, calibration=[
+            {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.5 um"}
+        ]
+    )  # fmt: skip
+    found, alone = plan(as_plate), plan(shipped("bar-bell", "length known"))
+    assert found.verdict.deficiency == 0
+    for symbol in ("U3 ratios", "U3 angles"):
+        assert found.quantities[symbol].maximum == pytest.approx(alone.quantities[symbol].maximum, rel=1e-6)
+
+
+def test_a_sphere_through_points(tmp_path: Path) -> None:
+    generator = np.random.default_rng(3)
+    directions = generator.standard_normal((20, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    centre, radius = fit_sphere([1.0, 2.0, 3.0] + 0.25 * directions, np.zeros(3))
+    np.testing.assert_allclose(centre, [1.0, 2.0, 3.0], rtol=0, atol=1e-14)
+    assert radius == pytest.approx(0.25, abs=1e-14)
+    flat = np.array([1.0, 2.0, 3.0]) + 0.25 * np.column_stack([np.cos(range(9)), np.sin(range(9)), np.zeros(9)])
+    # Points on a circle leave the height of the centre as it is.
+    np.testing.assert_allclose(fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14)
+
+
+def test_true_gauges_have_the_certified_radius(tmp_path: Path) -> None:
+    design = lay_out(changed(tmp_path, "bryan-gauge", **BOTH))
+    drawn = np.linalg.norm(true_artefacts(design, np.random.default_rng(1)), axis=1)
+    of_gauge = design.ball_artefact == 1
+    assert len(set(drawn[of_gauge].round(12))) == 1 and 1e-7 < abs(drawn[of_gauge][0] - 0.3001) < 1e-5
+    np.testing.assert_allclose(drawn[design.ball_artefact == 2], 0.2, rtol=1e-12)
