@@ -79,7 +79,8 @@ def _what_is_missing(design: Design, strains: Array) -> str:
     if d - normals.shape[1] == 1:
         along = np.linalg.svd(directions)[2][0]
         return f"{what} lies along {_axis(along)}: nothing tells {_told(strains, d)}"
-    if given.to_pivot.any() or not strains.shape[1]:
+    # What else bars would have to do, plates may do, and pivots must not undo.
+    if given.to_pivot.any() or design.is_plate.any() or not strains.shape[1]:
         return ""
     products = np.array([_products(u) for u in given.direction])
     different = len(np.unique(np.round(products, 6), axis=0))
@@ -87,7 +88,10 @@ def _what_is_missing(design: Design, strains: Array) -> str:
         few = f"the bars have only {different} different directions of the {_size(d)} needed"
         return f"{few}: nothing tells {_told(strains, d)}"
     if strains.shape[1] == 1:
-        return f"every bar {_quadric(_matrix(strains[:, 0], d))}: nothing tells {_told(strains, d)}"
+        # With an unknown length the form need not be zero, only the same.
+        form = _matrix(strains[:, 0], d)
+        form -= np.einsum("mi,ij,mj->m", given.direction, form, given.direction).mean() * np.eye(d)
+        return f"every bar {_quadric(form)}: nothing tells {_told(strains, d)}"
     return ""
 
 
@@ -146,7 +150,9 @@ def _axis(vector: Array) -> str:
     k = int(np.abs(vector).argmax())
     if abs(vector[k]) > 1.0 - MISSING**2:
         return AXES[k]
-    return f"({', '.join(f'{v:.3g}' for v in np.sign(vector[k]) * vector)})"
+    told = np.where(np.abs(vector) > MISSING, vector, 0.0)
+    told *= np.sign(told[np.flatnonzero(told)[0]])
+    return f"({', '.join(f'{v + 0.0:.3g}' for v in told)})"
 
 
 def _plane(normal: Array) -> str:

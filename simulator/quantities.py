@@ -275,7 +275,9 @@ def parse_length_function(value: object) -> LengthFunction:
         return LengthFunction(constant)
     match = CONSTANT_AND_SLOPE.fullmatch(value)
     if match is None and "ppm" in value:
-        raise QuantityError(f'"{shorten(value)}": write for example "{LENGTH_FUNCTION_EXAMPLE}" for 0.5 um + 1 ppm')
+        raise QuantityError(
+            f'"{shorten(value)}" is no such length; write for example "{LENGTH_FUNCTION_EXAMPLE}" for 0.5 um + 1 ppm'
+        )
     if match is None:
         raise QuantityError(
             f'"{shorten(value)}" is not a length that grows with L; write for example "{LENGTH_FUNCTION_EXAMPLE}"'

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..estimation.parameters import AXIS_NAMES, pose_parameter_names
+from ..geometry.artefacts import BryanGaugeSettings
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
@@ -65,9 +66,14 @@ def _known(model: ErrorModel, positions: dict[int, Position], references: Refere
         known.setdefault(name, ((name, None, None, -1, row, unit, 0.0),))
     of_no_error = np.zeros(len(own))
     for position in positions.values():
-        if references.artefacts[position.artefact].role != "plate":
+        artefact = references.artefacts[position.artefact]
+        words = pose_parameter_names(model.dimension)
+        if isinstance(artefact, BryanGaugeSettings):
+            # A pivot has a place and no turn.
+            words = words[: model.dimension]
+        elif artefact.role != "plate":
             continue
-        for k, word in enumerate(pose_parameter_names(model.dimension)):
+        for k, word in enumerate(words):
             name = f"{position.name}: {word}"
             unit, nominal = ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
             known[name] = ((name, position.name, None, k, of_no_error, unit, nominal),)

@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.artefacts import MOST_BALLS, ArtefactSettings, BallLayout, BallsSettings, coincident_balls
+from ..geometry.artefacts import (
+    MOST_BALLS,
+    ArtefactSettings,
+    BallLayout,
+    BallsSettings,
+    BryanGaugeSettings,
+    coincident_balls,
+)
 from ..quantities import format_length
 from ..settings import hint, listing, shorten
 from .messages import ExperimentError, Steps
@@ -142,10 +149,11 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
             text = f"there are {balls} balls up to here; at most {MOST_BALLS_OF_ALL} of all artefacts are possible"
             problems.add(steps, text)
             break
+        where = (*steps, "directions" if isinstance(listed, BryanGaugeSettings) else "coordinates")
         twins = coincident_balls(layout)
         for i, j in twins[:3]:
             text = f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct one of them'
-            problems.add((*steps, "coordinates"), text)
+            problems.add(where, text)
         if dimension == 2 and np.any(layout.coordinates[:, 2]):
             high = int(np.flatnonzero(layout.coordinates[:, 2])[0])
             text = (
@@ -153,7 +161,7 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
                 f"{format_length(layout.coordinates[high, 2])}, "
                 "but the experiment is two-dimensional; give two co-ordinates, or machine.volume a z axis"
             )
-            problems.add((*steps, "coordinates"), text)
+            problems.add(where, text)
         elif not twins:
             artefacts[name], layouts[name] = listed, layout
         if listed.axes is not None:

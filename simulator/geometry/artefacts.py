@@ -241,11 +241,19 @@ class BryanGaugeSettings(ArtefactSettings):
     """A ball that is carried around a fixed ball, which is not read, at the end of a bar."""
 
     kind: Literal["bryan_gauge"] = Field(description="a ball on a bar that pivots about a fixed ball")
-    role: Literal["length_standard"] = Field("length_standard", description="a Bryan gauge only carries its radius")
+    role: Literal["plate", "length_standard"] = Field(
+        "length_standard", description="length_standard: a Bryan gauge only carries its radius"
+    )
     radius: PositiveLength = Field(description="distance of the two balls, as drawn")
     directions: DirectionsSettings = Field(  # type: ignore[valid-type,unused-ignore]
         description=f"of the bar in the places where its ball is read, named 1, 2, …: {DIRECTIONS}"
     )
+
+    @model_validator(mode="after")
+    def _no_plate(self) -> Self:
+        if self.role == "plate":
+            raise ValueError("a Bryan gauge only carries its radius and is no plate; remove its role")
+        return self
 
     def layout(self) -> BallLayout:
         """Return the places where the ball is read, about the pivot."""

@@ -43,6 +43,9 @@ class GeneratedDirectionsSettings(Settings):
             kind = "a grid" if self.random is None else "random directions"
             raise ValueError(f'"{misplaced[0]}" has no meaning with {kind}; remove it')
         lowest, highest = self._zone()
+        count = (self.azimuths or 0) * len(self.elevations or ())
+        if count > MOST_DIRECTIONS:
+            raise ValueError(f"{count} directions are too many; at most {MOST_DIRECTIONS} are possible")
         if any(abs(angle) > UPRIGHT for angle in (*(self.elevations or ()), lowest, highest)):
             raise ValueError("an elevation is outside -90 deg to 90 deg; give one of that range")
         if self.random is not None and lowest >= highest:

@@ -13,7 +13,8 @@ from tests.robustness.worker import complaint
 SEED = 1
 FILES = Path(__file__).parent / "files"
 QUICKSTART = Path("designs/quickstart.yaml")
-QUICK = [QUICKSTART, *sorted(Path("designs/hocken_borchardt").glob("*.yaml")), *sorted(FILES.glob("*.yaml"))]
+SMALL = [*Path("designs/hocken_borchardt").glob("*.yaml"), *Path("designs/hurt_foss").glob("*.yaml")]
+QUICK = [QUICKSTART, *sorted(SMALL), *sorted(FILES.glob("*.yaml"))]
 # Those that are planned in no time are tried more often.
 EXPERIMENTS = [*sorted(Path("designs/npl").glob("*.yaml")), *5 * QUICK]
 

@@ -1,0 +1,161 @@
+"""What `check` says of bars and gauges that leave scales or squareness open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from analysis.study import check, plan
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+
+FOLDER = Path("designs/hurt_foss")
+NO_LENGTH = "no length is known (bar: length): the overall scale of the machine stays open until one is calibrated"
+SHIPPED = {
+    ("bar-bell", "length known"): (),
+    ("bar-bell", "length unknown"): (NO_LENGTH,),
+    ("bar-bell", "flat"): (
+        "every bar lies parallel to the xy plane: nothing tells the scale of Z nor its squareness to X and Y",
+    ),
+    ("bar-bell", "one axis"): (
+        "every bar lies along x: nothing tells the scales of Y and Z nor the squareness of Y to X, Z to X and Z to Y",
+    ),
+    ("bar-bell", "axes only"): (
+        "the bars have only 3 different directions of the 6 needed: nothing tells the squareness of Y to X, Z to X and "
+        "Z to Y",
+    ),
+    ("bryan-gauge", "radius known"): (),
+    ("bryan-gauge", "radius unknown"): (NO_LENGTH.replace("bar: length", "gauge: radius"),),
+    ("bryan-gauge", "two pivots"): (),
+    ("bryan-gauge", "one height"): (
+        "every place of the ball lies in a plane parallel to the xy plane: nothing tells the scale of Z nor its squareness "
+        "to X and Y nor a combination of the scale of X and the scale of Y",
+    ),
+    ("bryan-gauge", "one plane"): (
+        "every place of the ball lies in a plane parallel to the xz plane: nothing tells the scale of Y nor its squareness "
+        "to X and Z",
+    ),
+}
+
+
+def test_all_shipped_designs_are_told_of() -> None:
+    files = sorted(FOLDER.glob("*.yaml"))
+    assert {(path.stem, one.name) for path in files for one in load(path)} == set(SHIPPED)
+
+
+@pytest.mark.parametrize(("file", "variant"), SHIPPED)
+def test_shipped_designs(file: str, variant: str) -> None:
+    experiment = {one.name: one for one in load(FOLDER / f"{file}.yaml")}[variant]
+    verdict = check(experiment).verdict
+    assert verdict.reasons == SHIPPED[file, variant]
+    assert experiment.expected_rank_deficiency == verdict.deficiency
+
+
+def with_bars(tmp_path: Path, directions: list[tuple[float, float]], **sections: object) -> Experiment:
+    """The shipped machine with bars at azimuths and elevations in degrees."""
+    content = yaml.safe_load((FOLDER / "bar-bell.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    content["machine"]["volume"] = {axis: ["-1 m", "1 m"] for axis in "xyz"}
+    content["positions"] = [
+        {
+            "name": str(k),
+            "pose": {"origin": ["0 m", "0 m", "0 m"], "rotation": ["0 deg", f"{-up} deg", f"{round_} deg"]},
+        }
+        for k, (round_, up) in enumerate(directions)
+    ]
+    path = tmp_path / "bars.yaml"
+    path.write_text(yaml.safe_dump(content | sections), encoding="utf-8")
+    (experiment,) = load(path)
+    return experiment
+
+
+def reason(tmp_path: Path, directions: list[tuple[float, float]], **sections: object) -> str:
+    verdict = check(with_bars(tmp_path, directions, **sections)).verdict
+    assert verdict.deficiency and len(verdict.reasons) == 1
+    return verdict.reasons[0]
+
+
+def test_bars_on_a_cone(tmp_path: Path) -> None:
+    """At the same angle to an axis: then the squares of direction cosines are not independent."""
+    told = reason(tmp_path, [(20.0 * k, 30.0) for k in range(12)])
+    assert told == (
+        "every bar is at 60 deg to z: nothing tells a combination of the scale of X, the scale of Y and the scale of Z"
+    )
+
+
+def test_bars_in_two_planes(tmp_path: Path) -> None:
+    told = reason(tmp_path, [(90.0 * side, up) for side in (0, 1) for up in (0, 30, 60, 90, 120, 150)])
+    assert told in {
+        f"every bar lies parallel to the {one} plane or the {other} plane: nothing tells the squareness of Y to X"
+        for one, other in (("xz", "yz"), ("yz", "xz"))
+    }
+
+
+def test_bars_in_an_oblique_plane(tmp_path: Path) -> None:
+    told = reason(tmp_path, [(45.0, up) for up in (0, 30, 60, 90, 120, 150)])
+    assert told.startswith(
+        "every bar lies parallel to the plane across (0.707, -0.707, 0): nothing tells 3 combinations"
+    )
+
+
+def test_a_common_angle_without_a_known_length_leaves_two_open(tmp_path: Path) -> None:
+    verdict = check(with_bars(tmp_path, [(20.0 * k, 30.0) for k in range(12)], calibration=[])).verdict
+    assert verdict.deficiency == 2 and verdict.reasons[0] == NO_LENGTH
+    assert verdict.reasons[1].startswith("every bar is at 60 deg to z")
+
+
+def test_other_models_are_told_the_same(tmp_path: Path) -> None:
+    """Of the many errors that bars in a plane leave to a kinematic machine, the reason for scales and squareness."""
+    directions = [(30.0 * k, 0.0) for k in range(6)]
+    model = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}
+    assert (
+        reason(tmp_path, directions, error_model=model, target_accuracy="1 m", expected_rank_deficiency=3)
+        == (SHIPPED["bar-bell", "flat"][0])
+    )
+
+
+def test_nothing_is_said_where_plates_tell_what_bars_do_not(tmp_path: Path) -> None:
+    """A plate with calibrated co-ordinates upright in the volume beside bars in the xy plane."""
+    content = {
+        "artefacts": {
+            "bar": {"kind": "two_spheres", "length": "500 mm", "role": "length_standard"},
+            "plate": {"kind": "grid", "balls": [3, 3], "size": ["400 mm", "400 mm"]},
+        },
+        "positions": [
+            *({"name": f"bar {k}", "artefact": "bar", "pose": {"origin": 3 * ["0 m"]}} for k in range(2)),
+            *(
+                {
+                    "name": f"{plane} plane",
+                    "artefact": "plate",
+                    "plane": plane,
+                    "level": "100 mm",
+                    "corner": {axis: "0 mm" for axis in "xyz" if axis != plane},
+                }
+                for plane in "xyz"
+            ),
+        ],
+        "calibration": [
+            {"kind": "distances", "artefact": "bar", "pairs": "all", "standard_uncertainty": "1 um"},
+            {"kind": "coordinates", "artefact": "plate", "standard_uncertainty": "1 um"},
+        ],
+    }
+    verdict = check(with_bars(tmp_path, [], **content)).verdict
+    assert verdict.deficiency == 0 and verdict.reasons == ()
+    content["calibration"] = content["calibration"][:1]
+    verdict = check(with_bars(tmp_path, [], **content)).verdict
+    assert verdict.deficiency == 0 and verdict.reasons == ()
+
+
+def test_the_overall_scale_with_an_unknown_length_is_what_the_plan_leaves_open() -> None:
+    unknown = {one.name: one for one in load(FOLDER / "bryan-gauge.yaml")}["radius unknown"]
+    found = plan(unknown)
+    (direction,) = found.verdict.null
+    assert [part.name for part in direction.functions] == ["scale x", "scale y", "scale z"]
+    np.testing.assert_allclose([part.peak for part in direction.functions], direction.functions[0].peak, rtol=1e-9)
+    (radius,) = direction.lengths
+    assert radius.name == "gauge: radius"
+    assert radius.change / 0.3 == pytest.approx(direction.functions[0].peak, rel=1e-9)
+    assert found.quantities["U3 ratios"].undetermined == 3 and found.quantities["U3 angles"].undetermined == 0

@@ -1,0 +1,248 @@
+"""Ball bars and Bryan gauges as a user of the command line meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.sweeps.fingerprint import fingerprint
+from simulator.experiment.load import load
+
+FOLDER = Path("designs/hurt_foss")
+BARS, GAUGE = str(FOLDER / "bar-bell.yaml"), str(FOLDER / "bryan-gauge.yaml")
+KNOWN = [GAUGE, str(FOLDER / "bryan-gauge-readings.csv"), "--variant", "radius known"]
+UNKNOWN = [*KNOWN[:3], "radius unknown"]
+BAR_READINGS = [BARS, str(FOLDER / "bar-bell-readings.csv"), "--variant", "length known"]
+
+
+def json_of(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> Any:
+    assert main([*arguments, "--json"]) == status
+    return json.loads(capsys.readouterr().out)
+
+
+def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", BARS, GAUGE]) == 0
+    out = capsys.readouterr().out
+    assert "reason: every bar lies parallel to the xy plane: nothing tells the scale of Z nor its squareness" in out
+    assert "reason: no length is known (gauge: radius): the overall scale of the machine stays open" in out
+    assert "gauge: radius (0.3 um): change together without changing any observation" in out
+    (flat,) = [one for one in json_of(capsys, "check", BARS) if one["experiment"] == "bar-bell[flat]"]
+    assert flat["reasons"][0].startswith("every bar lies parallel to the xy plane")
+
+
+def test_the_two_fits_of_bars_are_one(capsys: pytest.CaptureFixture[str]) -> None:
+    full = json_of(capsys, "fit", *BAR_READINGS)
+    one, other = (
+        json_of(capsys, "fit", *BAR_READINGS, "--estimator", name)
+        for name in ("length-equations", "sphere-then-metric")
+    )
+    assert one["adjustments"] == other["adjustments"] and one["rank_deficiency"] == 0
+    for name, adjustment in one["adjustments"].items():
+        # The same to the second order of the errors: squares of lengths, and lengths.
+        assert adjustment["value"] == pytest.approx(full["adjustments"][name]["value"], abs=2e-8)
+        assert adjustment["words"] == full["adjustments"][name]["words"]
+    excess = {"C0Y": 1, "B0Z": -1, "A0Z": 1}
+    for name in ("scale x", "scale y", "scale z", *excess):
+        estimate = full["estimates"][name]
+        assert full["adjustments"][name]["value"] == excess.get(name, 1) * estimate["value"]
+        assert full["adjustments"][name]["standard_uncertainty"] == pytest.approx(estimate["standard_uncertainty"])
+
+
+def test_what_to_do_is_told_with_its_direction(capsys: pytest.CaptureFixture[str]) -> None:
+    """True errors: X reads 20 ppm too little, Y leans to -X by 60 urad, Z to -X by 40 and to -Y by 80."""
+    assert main(["fit", *KNOWN, "--estimator", "length-equations"]) == 0
+    out = capsys.readouterr().out
+    for words in ("let X read 2", "let Y read 2", "um per m less", "towards +X", "towards +Y", "pivots: pivot (500.0"):
+        assert words in out
+    assert "towards -" not in out and max(map(len, out.splitlines())) <= 140
+    assert main(["fit", *KNOWN]) == 0
+    out = capsys.readouterr().out
+    assert "let X read 2" in out and "pivot" in out and "radius" in out.split("largest residuals")[1]
+
+
+def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fit", *KNOWN, "--estimator", "sphere-then-metric", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert "warning: the pivot is the centre of a sphere, as if the machine were right" in err
+    two = json.loads(out)["adjustments"]
+    joint = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")["adjustments"]
+    assert abs(two["A0Z"]["value"]) < 0.4 * abs(joint["A0Z"]["value"])
+    assert two["C0Y"]["value"] == pytest.approx(joint["C0Y"]["value"], abs=1e-9)
+
+
+@pytest.mark.parametrize("estimator", ["full", "length-equations", "sphere-then-metric"])
+def test_an_unknown_radius_leaves_ratios_of_scales(estimator: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = json_of(capsys, "fit", *UNKNOWN, "--estimator", estimator)
+    assert found["rank_deficiency"] == 1
+    assert [name for name, one in found["adjustments"].items() if one["value"] is None] == [
+        f"scale {axis}" for axis in "xyz"
+    ]
+    known = json_of(capsys, "fit", *KNOWN, "--estimator", estimator)["adjustments"]
+    ratio = found["adjustments"]["scale y - scale x"]["value"]
+    assert ratio == pytest.approx(known["scale y"]["value"] - known["scale x"]["value"], abs=2e-8)
+
+
+def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (
+        Path(GAUGE)
+        .read_text(encoding="utf-8")
+        .split("variants:")[0]
+        .replace("  - {kind: radius", "  # - {kind: radius")
+    )
+    (tmp_path / "g.yaml").write_text(text.replace("calibration:", "calibration: []"), encoding="utf-8")
+    arguments = ["fit", str(tmp_path / "g.yaml"), KNOWN[1]]
+    for estimator in ("full", "length-equations"):
+        assert main([*arguments, "--estimator", estimator]) == 1
+        assert "rank deficiency 1 where the file expects 0" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["fit", *KNOWN, "--estimator", "kruth"], ["compare", GAUGE]])
+def test_estimators_of_distances_refuse_gauges(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(command) == 3
+    out, err = capsys.readouterr()
+    assert (
+        not out and "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use the full" in err
+    )
+    assert main(["fit", *BAR_READINGS[:3], "length unknown", "--estimator", "distances"]) == 3
+    assert "cannot follow an unknown length (bar: length)" in capsys.readouterr().err
+
+
+def test_length_equations_refuse_plates_alone_and_planes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    readings = str(tmp_path / "r.csv")
+    assert main(["simulate", "designs/quickstart.yaml", "-o", readings]) == 0
+    assert main(["fit", "designs/quickstart.yaml", readings, "--estimator", "length-equations"]) == 3
+    assert "has no ball bar or Bryan gauge whose lengths are read" in capsys.readouterr().err
+    plane = ["designs/hocken_borchardt/dummy.yaml", "designs/hocken_borchardt/dummy-readings.csv"]
+    assert main(["fit", *plane, "--variant", "with scale", "--estimator", "length-equations"]) == 3
+    assert "has two dimensions" in capsys.readouterr().err
+
+
+def test_readings_of_two_balls_exchanged_are_no_metric_or_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A gauge's reading that is wrong by 30 mm stands first among the largest residuals."""
+    lines = Path(KNOWN[1]).read_text(encoding="utf-8").splitlines()
+    position, ball, probe, x, y, z = lines[17].split(",")
+    lines[17] = ",".join([position, ball, probe, str(float(x) + 30.0), y, z])
+    (tmp_path / "r.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert main(["fit", GAUGE, str(tmp_path / "r.csv"), "--variant", "radius known"]) == 0
+    out, err = capsys.readouterr()
+    assert "warning: S^2 is" in err
+    first = out.split("largest residuals")[1].splitlines()[1].split()
+    assert first[:4] == ["pivot", "17", "magnet", "radius"]
+
+
+def test_simulate_run_trials_and_fit_go_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    readings = str(tmp_path / "r.csv")
+    assert main(["simulate", GAUGE, "--variant", "two pivots", "-o", readings]) == 0
+    assert main(["fit", GAUGE, readings, "--variant", "two pivots", "--sigma", "given"]) == 0
+    capsys.readouterr()
+    found = json_of(capsys, "run", GAUGE, "--variant", "two pivots", "--trials", "256", "--workers", "1")
+    assert found["quantities"]["U2 lengths"]["count"] == 6
+    trials = found["monte_carlo"]["quantities"]
+    for symbol in ("U2", "U3", "U4", "U6"):
+        spread = trials[symbol]["spread_ratio"]
+        assert abs(spread["value"] - 1.0) < 4.0 * spread["standard_error"]
+
+
+def test_trials_of_an_unknown_radius_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", GAUGE, "--variant", "radius unknown", "--trials", "10", "--workers", "1"]) == 0
+    assert "the design is rank deficient by 1" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("radius: 300 mm", "radius: 301 mm"),
+        ("azimuths: 12", "azimuths: 13"),
+        ("65 deg", "66 deg"),
+        ("standard_uncertainty: 0.5 um", "standard_uncertainty: 0.6 um"),
+        ("standard_uncertainty: 0.5 um", "value: 300.001 mm, standard_uncertainty: 0.5 um"),
+        ("{kind: metric}", "{kind: metric, scale: none}"),
+    ],
+)
+def test_fingerprints_tell_gauges_apart(tmp_path: Path, old: str, new: str) -> None:
+    text = Path(GAUGE).read_text(encoding="utf-8").split("variants:")[0].split("true_machine:")
+    text = text[0] + "probes:" + text[1].partition("probes:")[2]
+    assert old in text
+    for name, content in (("a.yaml", text), ("b.yaml", text.replace(old, new))):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    one, other = (fingerprint(load(tmp_path / name)[0]) for name in ("a.yaml", "b.yaml"))
+    assert one != other
+
+
+def test_all_mistakes_of_a_gauge_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(
+        """\
+title: bad
+machine: {volume: [1 m, 800 mm, 600 mm], repeatability: 1 um}
+error_model: {kind: metric}
+probes: {magnet: [0 mm, 0 mm, 0 mm]}
+artefacts:
+  unit: {kind: bryan_gauge, radius: 300, directions: {azimuths: 12}}
+  role: {kind: bryan_gauge, radius: 300 mm, role: plate, directions: {random: 10}}
+  both: {kind: bryan_gauge, radius: 300 mm, directions: {random: 10, azimuths: 3}}
+  one: {kind: bryan_gauge, radius: 300 mm, directions: [[0 deg, 0 deg], [10 deg]]}
+  same: {kind: bryan_gauge, radius: 300 mm, directions: [[0 deg, 0 deg], [360 deg, 0 deg]]}
+  high: {kind: bryan_gauge, radius: 300 mm, directions: {azimuths: 4, elevations: [0 deg, 100 deg]}}
+  many: {kind: bryan_gauge, radius: 300 mm, directions: {azimuths: 360, elevations: [1 deg, 2 deg, 3 deg, 4 deg, 5 deg,
+    6 deg, 7 deg, 8 deg, 9 deg, 10 deg, 11 deg, 12 deg, 13 deg, 14 deg]}}
+  zone: {kind: bryan_gauge, radius: 300 mm, directions: {random: 4, lowest: 40 deg, highest: 20 deg}}
+  over: {kind: bryan_gauge, radius: 500 mm, directions: {azimuths: 4, elevations: [0 deg, 90 deg]}}
+  bar: {kind: two_spheres, length: 300 mm, role: length_standard}
+positions:
+  - {name: a, artefact: over, pose: {origin: [500 mm, 400 mm, 100 mm]}}
+  - {name: b, artefact: bar, pose: {origin: [500 mm, 400 mm, 100 mm]}}
+calibration:
+  - {kind: distances, artefact: over, pairs: all, standard_uncertainty: 1 um}
+  - {kind: radius, artefact: bar, standard_uncertainty: 1 um}
+  - {kind: radius, artefact: over, standard_uncertainty: 1 um, value: 600 mm}
+  - {kind: radius, artefact: over, standard_uncertainty: 1 um}
+  - {kind: radius, artefact: over, standard_uncertainty: 1 um}
+  - {kind: radius, artefact: over}
+priors:
+  - {parameter: "a: rotation z", standard_uncertainty: 1 urad}
+""",
+        encoding="utf-8",
+    )
+    assert main(["check", str(path)]) == 3
+    told = [line.removeprefix(f"{path}:") for line in capsys.readouterr().err.splitlines()]
+    told = [line for line in told if "is never placed" not in line]
+    assert [line.split(" (")[0] for line in told] == [
+        '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm"',
+        "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random; write {random: 60, lowest: "
+        "20 deg}",
+        "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its role",
+        '8:57: artefacts.both.directions: "azimuths" has no meaning with random directions; remove it',
+        "9:73: artefacts.one.directions[1]: has 1 entry; 2 are needed",
+        '10:57: artefacts.same.directions: balls "1" and "2" are at the same place; correct one of them',
+        "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give one of that range",
+        "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible",
+        "14:57: artefacts.zone.directions: the least elevation must be below the largest; exchange or correct them",
+        '18:5: positions[0]: ball "2" is at y = 900 mm, 100 mm above the measuring volume, and 1 more ball; move the '
+        "artefact, or read fewer balls",
+        '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind: radius',
+        '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is none; use kind: distances',
+        "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing; correct the one or the "
+        "other",
+        '25:5: calibration[4]: the radius of "over" stands in calibration[3] already; remove one of the two',
+        '26:5: calibration[5].standard_uncertainty: missing; add "standard_uncertainty"',
+        '28:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a: origin z"?',
+    ]
+
+
+def test_a_pivot_may_be_known_beforehand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path(GAUGE).read_text(encoding="utf-8").split("variants:")[0]
+    known = 'priors: [{parameter: "pivot: origin z", standard_uncertainty: 0.1 um}]\n'
+    (tmp_path / "g.yaml").write_text(text + known, encoding="utf-8")
+    found = json_of(capsys, "run", str(tmp_path / "g.yaml"))["quantities"]
+    free = json_of(capsys, "run", GAUGE, "--variant", "radius known")["quantities"]
+    # With the height of the pivot the scale of Z and its squareness are far better known.
+    assert found["U3 ratios"]["maximum"] < 0.5 * free["U3 ratios"]["maximum"]
+    assert np.isclose(found["U2 lengths"]["count"], 3)
