@@ -72,7 +72,7 @@ def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFix
     two = json.loads(out)["adjustments"]
     joint = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")["adjustments"]
     assert abs(two["A0Z"]["value"]) < 0.4 * abs(joint["A0Z"]["value"])
-    assert two["C0Y"]["value"] == pytest.approx(joint["C0Y"]["value"], abs=1e-9)
+    assert two["C0Y"]["value"] == pytest.approx(joint["C0Y"]["value"], abs=1e-8)
 
 
 @pytest.mark.parametrize("estimator", ["full", "length-equations", "sphere-then-metric"])
