@@ -164,6 +164,8 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
     if not isinstance(experiment.error_model, MetricSettings):
         kind = experiment.error_model.kind
         say(("error_model", "kind"), f'the reversal is about a machine of kind "metric", not "{kind}"; write metric')
+    elif experiment.dimension != 2:
+        say(("machine", "volume"), "the reversal is about two dimensions, not three; leave z out")
     elif scale not in (None, experiment.error_model.plane_scale) and experiment.priors:
         say(("priors",), f"priors are about the file's error model; write scale: {scale} there instead of --scale")
     if len(experiment.artefacts) != 1:

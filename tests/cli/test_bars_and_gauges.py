@@ -117,6 +117,8 @@ def test_length_equations_refuse_plates_alone_and_planes(tmp_path: Path, capsys:
     assert main(["simulate", "designs/quickstart.yaml", "-o", readings]) == 0
     assert main(["fit", "designs/quickstart.yaml", readings, "--estimator", "length-equations"]) == 3
     assert "has no ball bar or Bryan gauge whose lengths are read" in capsys.readouterr().err
+    assert main(["fit", *BAR_READINGS, "--estimator", "reversal"]) == 3
+    assert "the reversal is about two dimensions, not three" in capsys.readouterr().err
     plane = ["designs/hocken_borchardt/dummy.yaml", "designs/hocken_borchardt/dummy-readings.csv"]
     assert main(["fit", *plane, "--variant", "with scale", "--estimator", "length-equations"]) == 3
     assert "has two dimensions" in capsys.readouterr().err
