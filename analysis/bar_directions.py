@@ -79,19 +79,20 @@ def _what_is_missing(design: Design, strains: Array) -> str:
     if d - normals.shape[1] == 1:
         along = np.linalg.svd(directions)[2][0]
         return f"{what} lies along {_axis(along)}: nothing tells {_told(strains, d)}"
-    # What else bars would have to do, plates may do, and pivots must not undo.
-    if given.to_pivot.any() or design.is_plate.any() or not strains.shape[1]:
+    # What else bars would have to do, plates may do.
+    if design.is_plate.any() or not strains.shape[1]:
         return ""
-    products = np.array([_products(u) for u in given.direction])
-    different = len(np.unique(np.round(products, 6), axis=0))
-    if different < _size(d):
+    different = len(np.unique(np.round([_products(u) for u in given.direction], 6), axis=0))
+    if different < _size(d) and not given.to_pivot.any():
         few = f"the bars have only {different} different directions of the {_size(d)} needed"
         return f"{few}: nothing tells {_told(strains, d)}"
     if strains.shape[1] == 1:
         # With an unknown length the form need not be zero, only the same.
         form = _matrix(strains[:, 0], d)
-        form -= np.einsum("mi,ij,mj->m", given.direction, form, given.direction).mean() * np.eye(d)
-        return f"every bar {_quadric(form)}: nothing tells {_told(strains, d)}"
+        values = np.einsum("mi,ij,mj->m", given.direction, form, given.direction)
+        if np.ptp(values) < MISSING:
+            who = "every direction of the bar" if given.to_pivot.any() else "every bar"
+            return f"{who} {_quadric(form - values.mean() * np.eye(d))}: nothing tells {_told(strains, d)}"
     return ""
 
 

@@ -94,6 +94,17 @@ def test_bars_in_two_planes(tmp_path: Path) -> None:
     }
 
 
+def test_a_gauge_in_two_planes(tmp_path: Path) -> None:
+    """Four azimuths are as two planes: the squareness of X and Y is never asked for."""
+    content = yaml.safe_load((FOLDER / "bryan-gauge.yaml").read_text(encoding="utf-8"))
+    del content["variants"]
+    content["artefacts"]["gauge"]["directions"]["azimuths"] = 4
+    (tmp_path / "gauge.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    (told,) = check(load(tmp_path / "gauge.yaml")[0]).verdict.reasons
+    assert told.startswith("every direction of the bar lies parallel to the ")
+    assert told.endswith(": nothing tells the squareness of Y to X")
+
+
 def test_bars_in_an_oblique_plane(tmp_path: Path) -> None:
     told = reason(tmp_path, [(45.0, up) for up in (0, 30, 60, 90, 120, 150)])
     assert told.startswith(
