@@ -9,7 +9,7 @@ end is the pivot c, which is not read, and d its radius r. Two ways to the centr
 
 sphere-then-metric
     the patent's: first c, and r where it is not known, from the equations of a sphere (108), |x - c|^2 = r^2, as if
-    the machine were right; then E with c and r held.
+    the machine were right; then E with c and r held, and the lengths of bars beside where they are not known.
 length-equations
     E, c, and r where it is not known, from equations (110) together. They are linear in E alone; Gauss-Newton does it.
 
@@ -81,12 +81,15 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
     equations = _equations(design, x)
     at = _start(design, x)
     held = _open_directions(equations, at)
-    everything, metric_only = np.arange(len(at.values)), np.arange(6)
-    if estimator == "sphere-then-metric":
-        pivoted = equations.select(equations.pivot >= 0)
-        if len(pivoted.known):
-            at, _, _, _ = _solved(pivoted, at, everything[6:])
-        found, root, iterations, converged = _solved(equations, at, metric_only)
+    everything = np.arange(len(at.values))
+    pivoted = equations.pivot >= 0
+    if estimator == "sphere-then-metric" and pivoted.any():
+        of_spheres = np.unique(equations.free[pivoted])
+        at, _, _, _ = _solved(equations.select(pivoted), at, everything[6:])
+        # Lengths of bars belong to the second step.
+        bars = np.setdiff1d(np.arange(len(design.length_names)), of_spheres)
+        second = np.concatenate([everything[:6], 6 + 3 * len(at.pivots) + bars])
+        found, root, iterations, converged = _solved(equations, at, second)
     else:
         found, root, iterations, converged = _solved(equations, at, everything, held)
     residual, _ = _rows(equations, found)

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from analysis.study import fit, plan
 from simulator.design import Design, State, nominal_state
 from simulator.estimation.gauss_newton import moved
+from simulator.estimation.length_equations import length_estimate
 from simulator.estimation.observations import length_shared_rows
 from simulator.estimation.parameters import shared_layout
 from simulator.estimation.spheres import fit_sphere
@@ -238,6 +239,21 @@ def test_a_sphere_through_points(tmp_path: Path) -> None:
     flat = np.array([1.0, 2.0, 3.0]) + 0.25 * np.column_stack([np.cos(range(9)), np.sin(range(9)), np.zeros(9)])
     # Points on a circle leave the height of the centre as it is.
     np.testing.assert_allclose(fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14)
+
+
+def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path) -> None:
+    design = lay_out(changed(tmp_path, "bryan-gauge", **BOTH))
+    on_truth, truth = truth_of(changed(tmp_path, "bryan-gauge", **BOTH), design)
+    _, x = exact_readings(on_truth, truth)
+    found = length_estimate(design, x, "sphere-then-metric")
+    metric = np.eye(3)
+    metric[np.triu_indices(3)] += found.factors
+    metric = np.triu(metric) + np.triu(metric, 1).T
+    seen = x + design.probes[design.readings.probe]
+    bar = seen[design.lengths.first[0]] - seen[design.lengths.second[0]]
+    # Nothing else depends on it, so that its own equation holds.
+    assert found.lengths[0] ** 2 == pytest.approx(bar @ metric @ bar, rel=1e-14)
+    assert abs(found.lengths[0] - np.linalg.norm(bar)) > 1e-6
 
 
 def test_true_gauges_have_the_certified_radius(tmp_path: Path) -> None:
