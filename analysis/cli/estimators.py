@@ -76,7 +76,10 @@ def _of_length_equations(options: Namespace, experiment: Experiment, observed: O
         complaint = "the estimate has not converged; look for wrong units, balls or positions among the readings"
     elif deficiency != (experiment.expected_rank_deficiency or 0):
         complaint = f"rank deficiency {deficiency} where the file expects {experiment.expected_rank_deficiency or 0}"
-    return Outcome(length_fit_lines(found), length_fit_data(found), complaint, found.remarks)
+    remarks = found.remarks
+    if options.sigma is not None:
+        remarks += ("--sigma has no effect: uncertainties come from the scatter about the equations",)
+    return Outcome(length_fit_lines(found), length_fit_data(found), complaint, remarks)
 
 
 ESTIMATORS: dict[str, Estimator] = {

@@ -41,7 +41,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         choices=("full", *ESTIMATORS),
         default="full",
         help="full (default); distances, cresto or kruth, which use distances alone and estimate the machine's "
-        "parameters only; reversal, of a plate in two dimensions and two positions a quarter turn apart",
+        "parameters only; reversal, of a plate in two dimensions and two positions a quarter turn apart; "
+        "length-equations or sphere-then-metric, of ball bars and Bryan gauges",
     )
     add_pairs(parser)
     parser.add_argument(
