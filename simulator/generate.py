@@ -109,6 +109,20 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     return balls
 
 
+def true_lengths(design: Design, truth: State) -> Array:
+    """Lengths (m,) of the design's standards as they truly are; the same wherever one certificate's is read."""
+    given = design.lengths
+    if not len(given):
+        return given.value
+    there = locations(design, truth, design.readings)
+    pivot = truth.origins[design.readings.position[given.first]]
+    between = there[given.first] - np.where(given.to_pivot[:, None], pivot, there[np.maximum(given.second, 0)])
+    along = np.abs(np.einsum("md,md->m", given.direction, between))
+    length = np.where(given.projected, along, np.sqrt((between**2).sum(axis=1)))
+    _, first = np.unique(given.certificate, return_index=True)
+    return np.asarray(length[first][given.certificate])
+
+
 def true_priors(design: Design, model: ErrorModel, truth: State) -> Priors:
     """The design's priors with the values of the truth, whose error model is `model`.
 
@@ -127,7 +141,7 @@ def true_priors(design: Design, model: ErrorModel, truth: State) -> Priors:
 def noisy_certificate(
     design: Design, truth: State, generator: np.random.Generator, model: ErrorModel | None = None
 ) -> Design:
-    """The design with calibration values, and priors, drawn about those of the truth.
+    """The design with calibration values, of length standards as well, and priors, drawn about those of the truth.
 
     `model` is the error model of the true machine where it is not the design's.
     """
@@ -147,6 +161,6 @@ def noisy_certificate(
         design,
         distances=replace(distances, value=drawn(true_distance, distances.uncertainty)),
         coordinates=replace(coordinates, value=drawn(true_coordinate, coordinates.uncertainty)),
-        lengths=replace(lengths, value=lengths.value + lengths.uncertainty * error),
+        lengths=replace(lengths, value=true_lengths(design, truth) + lengths.uncertainty * error),
         priors=replace(priors, value=drawn(priors.value, priors.uncertainty)),
     )

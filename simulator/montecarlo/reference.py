@@ -18,7 +18,7 @@ from ..estimation.observations import (
     reading_weights,
 )
 from ..estimation.parameters import shared_layout
-from ..generate import scale_readings, true_priors
+from ..generate import scale_readings, true_lengths, true_priors
 from ..machines.protocol import Array, ErrorModel
 from ..threads import single_threaded
 from .expansion import Direct, LocalModel, expand
@@ -119,7 +119,11 @@ def reference(design: Design, truth: Truth) -> Reference:
     p = probe_offsets(observed, truth.state)[readings.probe]
     turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
     exact = scale_readings(truth.model, turned + truth.state.origins[readings.position], truth.state.a, p)
-    observed = replace(observed, priors=true_priors(observed, truth.model, truth.state))
+    observed = replace(
+        observed,
+        priors=true_priors(observed, truth.model, truth.state),
+        lengths=replace(observed.lengths, value=true_lengths(observed, truth.state)),
+    )
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
     if solution.status != "converged":
         raise TooWildError(f"the estimate from its readings without noise has {solution.status}")

@@ -68,6 +68,21 @@ def test_a_certificate_has_one_error(tmp_path: Path) -> None:
     assert len(set(drawn.tolist())) == 1 and drawn[0] != 0.4
 
 
+@pytest.mark.parametrize("file", ["bar-bell", "bryan-gauge"])
+def test_a_certificate_that_differs_from_the_drawing_is_no_bias(tmp_path: Path, file: str) -> None:
+    text = Path(f"designs/hurt_foss/{file}.yaml").read_text(encoding="utf-8").split("variants:")[0]
+    text = text.replace("pairs: all,", 'pairs: all, values: [{balls: ["1", "2"], distance: 500.05 mm}],')
+    text = text.replace("kind: radius,", "kind: radius, value: 300.05 mm,")
+    (tmp_path / "e.yaml").write_text(text, encoding="utf-8")
+    (experiment,) = load(tmp_path / "e.yaml")
+    assert "00.05 mm" in text
+    done = trials(experiment, 256)
+    assert done.outcome is not None
+    for one in done.outcome.comparisons.values():
+        assert one.bias.value < 5.0 * one.bias.error
+        assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error
+
+
 @pytest.mark.parametrize("repeatability", ["included", "ignored"])
 def test_replicates_scatter_as_foretold(tmp_path: Path, repeatability: str) -> None:
     done = trials(with_bar(tmp_path, 4, "2 um", repeatability), 1024)
