@@ -49,11 +49,10 @@ def standard_lengths(
     rows: list[_Row] = []
     names: list[str] = []
     drawn: list[float] = []
-    read = {
-        (int(k), int(p), int(b)): i
-        for i, (b, k, p) in enumerate(zip(readings.ball, readings.position, readings.probe, strict=True))
-    }
-
+    read: dict[tuple[int, int, int], int] = {}
+    standards = [k for k, one in enumerate(experiment.artefacts.values()) if one.role == "length_standard"]
+    for i in np.flatnonzero(np.isin(position_artefact[readings.position], standards)).tolist():
+        read[int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])] = i
     anew = count()
 
     def between(number: int, kinds: list[tuple[_Row, Array]]) -> Iterator[_Row]:

@@ -251,7 +251,8 @@ def _with_radii(
     # Of the same gauge all are alike.
     of_gauge = design.ball_artefact[design.readings.ball[given.first[planned]]]
     own = design.ball_artefact[readings.ball[carried]]
-    like = planned[[int(np.flatnonzero(of_gauge == gauge)[0]) for gauge in own]]
+    gauges, first = np.unique(of_gauge, return_index=True)
+    like = planned[first[np.searchsorted(gauges, own)]]
     seen = x[carried] + design.probes[readings.probe[carried]]
     direction = np.empty_like(seen)
     for k in np.unique(readings.position[carried]):

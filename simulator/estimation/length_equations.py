@@ -223,7 +223,8 @@ def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
     """
     difference, length = _differences(equations, at)
     exact = difference * (length / np.sqrt((difference**2).sum(axis=1)))[:, None]
-    _, values, vh = np.linalg.svd(_derivative(equations, at, exact, exact, length) * MICROMETRE)
+    rows = _derivative(equations, at, exact, exact, length) * MICROMETRE
+    _, values, vh = np.linalg.svd(np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows)
     return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
 
 
