@@ -15,6 +15,12 @@ from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python
 
 Schema = AnyMapping[str, Any]
 
+# Kinds by other names that they have, in lower case without what is no letter.
+OTHER_NAMES = {
+    **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),
+    **dict.fromkeys(("bryangauge", "bryan"), "bryan_gauge"),
+}
+
 # Type of error → what was expected instead.
 EXPECTED = {
     "int_type": "a whole number",
@@ -139,8 +145,9 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         if tag is None:
             return Explanation((*steps, "kind"), f'missing; add "kind", one of: {listing(kinds)}')
         if isinstance(tag, Scalar) and tag.value is not None:
-            text = f'unknown kind "{shorten(str(tag.value))}"; {hint(str(tag.value), kinds)}'
-            return Explanation((*steps, "kind"), text)
+            known = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
+            meant = f'write "{known}"' if known in kinds else hint(str(tag.value), kinds)
+            return Explanation((*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}')
         return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
     if kind == "literal_error":
         return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))

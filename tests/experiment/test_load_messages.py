@@ -166,6 +166,7 @@ ARTEFACTS = [
     ("role: length_standard", 'role: length_standard, axes: {origin: "1", x: "2"}', [
         "9:73: artefacts.bar.axes: a length standard's balls are not estimated; remove its axes"]),
     ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
+    ("kind: two_spheres", "kind: ball bar", ['9:15: artefacts.bar.kind: unknown kind "ball bar"; write "two_spheres"']),
     ("kind: grid, ", "", [
         '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere, '
         "bryan_gauge"]),
