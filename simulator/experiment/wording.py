@@ -145,8 +145,8 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         if tag is None:
             return Explanation((*steps, "kind"), f'missing; add "kind", one of: {listing(kinds)}')
         if isinstance(tag, Scalar) and tag.value is not None:
-            known = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
-            meant = f'write "{known}"' if known in kinds else hint(str(tag.value), kinds)
+            other = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
+            meant = f'write "{other}"' if other in kinds else hint(str(tag.value), kinds)
             return Explanation((*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}')
         return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
     if kind == "literal_error":
