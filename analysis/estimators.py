@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from simulator.design import Design, Integers, State
-from simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
-from simulator.estimation.initial import initial_state
+from simulator.estimation.gauss_newton import GaussNewtonSettings, estimate
 from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
@@ -186,7 +185,7 @@ def _both_estimates(
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     readings, x = noisy_readings(on_truth, truth, generator)
     drawn = replace(drawn, readings=readings)
-    full = gauss_newton(drawn, x, initial_state(drawn, x), ENOUGH)
+    full = estimate(drawn, x, ENOUGH)
     rival = rival_estimate(drawn, x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
     if full.status != "converged" or rival.status != "converged":
         return None

@@ -10,8 +10,7 @@ import numpy as np
 from simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import GaussNewtonSettings, Solution, gauss_newton, open_as_drawn
-from simulator.estimation.initial import initial_state
+from simulator.estimation.gauss_newton import Solution, estimate
 from simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
 from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
 from simulator.experiment.model import Experiment
@@ -147,15 +146,9 @@ def fit(
     """
     design = observed.design
     layout = shared_layout(design)
-    held = open_as_drawn(design)
-    solution = gauss_newton(design, observed.x, initial_state(design, observed.x), held=held)
+    solution = estimate(design, observed.x)
     if solution.status != "converged":
         judged = check(experiment, design).verdict
-        if judged.deficiency:
-            # A pose that is not quite as drawn makes what is open look determined, with steps of metres.
-            settings = GaussNewtonSettings(drawn_open=judged.deficiency)
-            solution = gauss_newton(design, observed.x, initial_state(design, observed.x), settings, held)
-    if solution.status != "converged":
         return Fit(experiment.label, experiment.title, design, solution, judged, 1.0, False, 0, {}, (), ())
     spread = covariance(design, solution.factor, solution.spectrum)
     judged = verdict(

@@ -20,9 +20,6 @@ from .parameters import SharedLayout
 # and the weakest determined direction of a usable design is many orders of magnitude above.
 EXACT = 1e-10
 
-# What a design leaves open as drawn, readings determine by about as much as poses are off, in radians.
-NEARLY = 1e-4
-
 # The size of change that a singular value is quoted for.
 MICROMETRE = 1e-6
 
@@ -68,12 +65,11 @@ class Spectrum:
 
 
 @single_threaded
-def spectrum(factor: Factor, exact: float = EXACT, drawn_open: int = 0, held: Array | None = None) -> Spectrum:
+def spectrum(factor: Factor, exact: float = EXACT, held: Array | None = None) -> Spectrum:
     """Singular value decomposition of the shared parameters' factor.
 
-    The smallest `drawn_open` values count as zero if they are at least small, below `NEARLY` of the largest. What
-    observations tell of the directions `held` (s, k), null directions of another spectrum, is left out, so that these
-    are null directions here, too.
+    What observations tell of the directions `held` (s, k), null directions of another spectrum, is left out, so that
+    these are null directions here, too.
     """
     scale = factor.layout.scale * MICROMETRE
     root = factor.root * scale
@@ -81,9 +77,7 @@ def spectrum(factor: Factor, exact: float = EXACT, drawn_open: int = 0, held: Ar
         open_ = held / scale[:, None]
         root = root - (root @ open_) @ open_.T
     _, values, rows = np.linalg.svd(root)
-    largest = values.max(initial=0.0)
-    nearly = min(drawn_open, int((values <= NEARLY * largest).sum()))
-    deficiency = max(int((values <= exact * largest).sum()), nearly)
+    deficiency = int((values <= exact * values.max(initial=0.0)).sum())
     return Spectrum(values, scale[:, None] * rows.T, scale, deficiency)
 
 

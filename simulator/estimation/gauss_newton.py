@@ -13,6 +13,7 @@ from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
 from .covariance import Spectrum, _solve_balls, no_spectrum, spectrum
 from .elimination import Factor, eliminate
+from .initial import initial_state
 from .parameters import shared_layout
 
 Status = Literal["converged", "not converged", "diverged"]
@@ -23,14 +24,11 @@ class GaussNewtonSettings:
     """When to stop.
 
     An iteration is the last when the step, each parameter scaled to its effect in the volume, is below
-    `smallest_step` metres, or when it no longer shrinks because rounding is all that is left. So many directions as
-    `drawn_open` are those that the design leaves open as drawn; they stay so where readings tell of them only by what
-    poses are off their nominal values.
+    `smallest_step` metres, or when it no longer shrinks because rounding is all that is left.
     """
 
     iterations: int = 20
     smallest_step: float = 1e-13
-    drawn_open: int = 0
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def gauss_newton(
             found = no_spectrum(layout)
             status = "diverged"
             break
-        found = spectrum(factor, drawn_open=settings.drawn_open, held=held)
+        found = spectrum(factor, held=held)
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found)
@@ -98,15 +96,29 @@ def gauss_newton(
     return Solution(state, factor, found, tuple(record), status)
 
 
-def open_as_drawn(design: Design) -> Array | None:
-    """Shared directions (s, k) that bars and gauges read without errors would leave open; None where there are none.
+def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = None) -> Solution:
+    """The estimate from scale readings `x` (readings, d) and starting values of their own.
 
-    With errors and noise the same readings seem to tell a little of them. To follow that leads far astray: where no
-    length is known, S^2 is least when all lengths are zero. Of plates alone such directions are followed, as in NPL
-    Report CISE 15/98, section 5.4, where the iteration wanders along them without leaving the neighbourhood.
+    What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as in NPL Report CISE
+    15/98, section 5.4, where the iteration wanders along it without leaving the neighbourhood, and held only if that
+    fails: poses a little off their nominal ones then call for steps of metres.
     """
-    if not len(design.lengths):
-        return None
+    start = initial_state(design, x)
+    held = open_as_drawn(design) if len(design.lengths) else None
+    solution = gauss_newton(design, x, start, settings, held)
+    if solution.status != "converged" and not len(design.lengths):
+        held = open_as_drawn(design)
+        if held is not None:
+            return gauss_newton(design, x, start, settings, held)
+    return solution
+
+
+def open_as_drawn(design: Design) -> Array | None:
+    """Shared directions (s, k) that readings without errors in the nominal poses would leave open; None without any.
+
+    With errors, noise and poses that are not quite as drawn the same readings seem to tell a little of them. To follow
+    that may lead far astray: where no length is known, S^2 is least when all lengths are zero.
+    """
     found = spectrum(eliminate(design, shared_layout(design), nominal_state(design)))
     return found.null if found.deficiency else None
 
