@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from simulator.geometry.artefacts import pairs
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
 from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings
+from simulator.readings import ObservedReadings, observe
 
 from .study import ParameterEstimate
 from .tables import SHOWN, aligned, number
@@ -183,10 +183,9 @@ def _both_estimates(
 ) -> tuple[Array, Array] | None:
     """Parameters by the full and by the rival estimator from one data set; None where one did not converge."""
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
-    readings, x = noisy_readings(on_truth, truth, generator)
-    drawn = replace(drawn, readings=readings)
-    full = estimate(drawn, x, ENOUGH)
-    rival = rival_estimate(drawn, x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
+    observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
+    full = estimate(observed.design, observed.x, ENOUGH)
+    rival = rival_estimate(observed.design, observed.x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
     if full.status != "converged" or rival.status != "converged":
         return None
     return full.state.a, rival.a

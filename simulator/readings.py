@@ -193,6 +193,11 @@ def _compare(design: Design, readings: Readings, lines: list[int]) -> tuple[tupl
     return missing, tuple(f"{name(found[i])} (line {lines[i]})" for i in without(found, planned))
 
 
+def observe(design: Design, readings: Readings, x: Array) -> ObservedReadings:
+    """Readings of a design, one row for each repeat, with scale readings `x` (readings, d), as if a file had them."""
+    return _combine_standards(design, readings, x, (), (), ())
+
+
 def _combine_standards(
     design: Design,
     readings: Readings,
@@ -238,7 +243,7 @@ def _combine_standards(
         of_others = readings.uncertainty
         combined = replace(combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]]))
     observed = replace(design, readings=combined, lengths=lengths)
-    chosen_marks = tuple(marks[i] for i in chosen)
+    chosen_marks = tuple(marks[i] for i in chosen) if marks else ()
     return ObservedReadings(observed, np.concatenate([x[plate], means, x[carried]]), missing, unplanned, chosen_marks)
 
 

@@ -57,3 +57,19 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     square = ["compare", "designs/npl/6.2.2.yaml", "--variant", "n=5 NDEL=5", "--trials", "1", "--pairs", "braced"]
     assert main(square) == 3
     assert '"braced" is not defined for this artefact' in capsys.readouterr().err
+
+
+def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = Path(QUICKSTART).read_text(encoding="utf-8").replace("  - {name: ", "  - {artefact: plate, name: ")
+    bar = "  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n"
+    place = "  - {name: bar, artefact: bar, pose: {origin: [300 mm, 200 mm, 300 mm]}, probes: [down], repeats: 3}\n"
+    known = "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.1 um}\n"
+    text = text.replace("artefacts:\n", f"artefacts:\n{bar}").replace("positions:\n", f"positions:\n{place}")
+    file = tmp_path / "bar.yaml"
+    text = text.replace("  - kind: distances\n", "  - kind: distances\n    artefact: plate\n")
+    file.write_text(text.replace("calibration:\n", f"calibration:\n{known}"), encoding="utf-8")
+    assert main(["compare", str(file), "--trials", "3", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["not_converged"] == [] and max(found["maximum"]["values"]) < 5e-6
