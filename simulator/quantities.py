@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -295,6 +296,23 @@ def parse_length_function(value: object) -> LengthFunction:
     return LengthFunction(constant, float(1 / divisor))
 
 
+def with_quantities(value: Any) -> Any:
+    """The same with every text that is a quantity, in lists and mappings too, replaced by its value in SI units.
+
+    >>> with_quantities({"pitch": "200 mm", "axes": ["x", "2 ppm"], "count": 3})
+    {'pitch': 0.2, 'axes': ['x', 2e-06], 'count': 3}
+    """
+    if isinstance(value, Mapping):
+        return {key: with_quantities(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [with_quantities(part) for part in value]
+    if isinstance(value, str) and re.match(r"\s*[+-.0-9]", value):
+        for kind in UNITS:
+            with suppress(QuantityError):
+                return _parse(value, kind)
+    return value
+
+
 def _parse(value: object, kind: str) -> float:
     units, example = UNITS[kind], EXAMPLES[kind]
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -338,9 +356,13 @@ def _article(kind: str) -> str:
     return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
 
+# What a number without a unit may have been meant in; to name one alone would lead to errors of a thousand times.
+ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m"}
+
+
 def _with_unit(number: str, kind: str) -> str:
-    unit = EXAMPLES[kind].split()[1]
-    return f'write for example "{number} {unit}"'
+    units = [EXAMPLES[kind].split()[1], *([ALTERNATIVES[kind]] if kind in ALTERNATIVES else [])]
+    return "write for example " + " or ".join(f'"{number} {unit}"' for unit in units)
 
 
 def _pattern(kind: str) -> str:

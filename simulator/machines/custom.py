@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..quantities import with_quantities
 from ..settings import hint, listing, shorten
 from .protocol import Array, ErrorModel, Parameter
 
@@ -42,13 +43,14 @@ def custom_model(
 ) -> ErrorModel:
     """The model that the object `name`, module:function or an entry point's name, returns for a volume.
 
-    Modules are looked for where Python finds them and then in `folder`.
+    Modules are looked for where Python finds them and then in `folder`. Options that are quantities, such as "200 mm",
+    arrive in metres, radians, kelvins or as ratios.
 
     :raises CustomModelError: no such object, or what it returns is no error model.
     """
     build = _named(name, folder)
     key = "options" if options else "object"
-    model = _attempt(f"{name} has failed", lambda: build(lower, upper, **options), key)
+    model = _attempt(f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key)
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
     return model
 

@@ -269,7 +269,9 @@ class PythonSettings(Settings):
         description="module:function, the module installed or beside this file, or the name of an installed entry "
         "point of the group ballplate.error_models."
     )
-    options: dict[str, Any] = Field(default={}, description="Keyword arguments of the function.")
+    options: dict[str, Any] = Field(
+        default={}, description="Keyword arguments of the function; quantities arrive in SI units."
+    )
 
     # Where the experiment file is; its modules are looked for there.
     _folder: Path | None = PrivateAttr(default=None)

@@ -217,7 +217,7 @@ priors:
     told = [line.removeprefix(f"{path}:") for line in capsys.readouterr().err.splitlines()]
     told = [line for line in told if "is never placed" not in line]
     assert [line.split(" (")[0] for line in told] == [
-        '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm"',
+        '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"',
         "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random; write {random: 60, lowest: "
         "20 deg}",
         "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its role",

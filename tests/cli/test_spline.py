@@ -152,7 +152,7 @@ def test_drawings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--knots", "10, 20 mm"), '--knots: "10" has no unit; write for example "10 mm"'),
+        (("--knots", "10, 20 mm"), '--knots: "10" has no unit; write for example "10 mm" or "10 um"'),
         (("--start-slope", "3 um"), '--start-slope: "3 um" is not a slope; write for example "2 um/mm", or 0'),
         (("--start-slope", "3 um/s"), '"3 um/s" is not a slope; write for example "2 um/mm", or 0'),
         (("--start-value", "1 urad"), "--start-value:"),

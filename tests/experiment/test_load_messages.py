@@ -128,7 +128,7 @@ SECTIONS = [
 MACHINE = [
     ("z: [0 mm, 1 m]}", "w: [0 mm, 1 m]}", ['3:44: machine.volume.w: unknown key; known: z']),
     ("z: [0 mm, 1 m]}", "z: [0 mm, 1000]}", [
-        '3:54: machine.volume.z[1]: "1000" has no unit; write for example "1000 mm"']),
+        '3:54: machine.volume.z[1]: "1000" has no unit; write for example "1000 mm" or "1000 um"']),
     ("z: [0 mm, 1 m]}", "z: [1 m]}", [
         "3:47: machine.volume.z: has 1 entry; 2 are needed (lower and upper end of the z axis; "
         "omitted in 2-D)"]),
@@ -254,7 +254,7 @@ POSITIONS = [
     ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
         '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',
         '12:16: positions[1].artefact: unknown artefact "baar"; did you mean "bar"?',
-        '12:39: positions[1].level: "0" has no unit; write for example "0 mm"',
+        '12:39: positions[1].level: "0" has no unit; write for example "0 mm" or "0 um"',
     ]),
     ("artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}",
      "artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}, balls: [1]}", [

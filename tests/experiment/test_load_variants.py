@@ -97,7 +97,7 @@ def test_the_base_need_not_be_complete(tmp_path: Path) -> None:
 def test_messages_stand_at_the_line_of_the_variant(tmp_path: Path) -> None:
     text = BASE + "variants:\n  A: {}\n  B:\n    positions[low].level: 5\n    seed: x\n"
     assert refusals(tmp_path, text) == [
-        'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" (in variant B)',
+        'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 um" (in variant B)',
         'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
         "readings; default 1) "
         "(in variant B)",

@@ -113,7 +113,7 @@ probing: 0 um
         "m.yaml:9:15: errors.EZX.file: eyx.csv: the file should have EZX alone",
         "m.yaml:10:8: errors.EAX: nothing is stated; give a polynomial, a file, or the bandwidth of a random error",
         "m.yaml:11:35: errors.EYY.straightness: unknown key",
-        'm.yaml:12:20: squareness.EC0Y: "12" has no unit; write for example "12 arcsec"',
+        'm.yaml:12:20: squareness.EC0Y: "12" has no unit; write for example "12 arcsec" or "12 deg"',
         'm.yaml:12:24: squareness.EB0Y: unknown key; did you mean "EC0Y"?',
         'm.yaml:13:30: temperature.x.deviation: "1.5" has no unit; write for example "1.5 degC"',
         'm.yaml:13:46: temperature.x.expansion: "11 um/m" is a ratio; a thermal expansion is expected',
@@ -162,7 +162,7 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
     ("old", "new", "messages"),
     [
         ("y = 400 mm, z", "y = 400 mm, y", ["eyx.csv:2:9: y is given twice; leave one of them out"]),
-        ("y = 400 mm", "y = 400", ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm"']),
+        ("y = 400 mm", "y = 400", ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm" or "400 um"']),
         ("y = 400 mm", "x = 400 mm", ["eyx.csv:2:9: the line runs along x; leave it out"]),
         ("y = 400 mm", "at the front", ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y']),
         ("y = 400 mm", "y = 4 m", ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"]),

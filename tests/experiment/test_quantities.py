@@ -108,9 +108,9 @@ def test_length_function_at_lengths() -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("750", '"750" has no unit; write for example "750 mm"'),
-        (750, '"750" has no unit; write for example "750 mm"'),
-        (1e-6, '"1e-06" has no unit; write for example "1e-06 mm"'),
+        ("750", '"750" has no unit; write for example "750 mm" or "750 um"'),
+        (750, '"750" has no unit; write for example "750 mm" or "750 um"'),
+        (1e-6, '"1e-06" has no unit; write for example "1e-06 mm" or "1e-06 um"'),
         ("750 mn", '"750 mn" has the unknown unit "mn"; did you mean "m'),
         ("1 MM", '"1 MM" has the unknown unit "MM"; did you mean "mm"?'),
         ("1 parsecs", '"1 parsecs" has the unknown unit "parsecs"; known: m, dm, cm, mm, um, nm, pm, in'),
@@ -145,7 +145,7 @@ def test_messages_of_lengths(value: object, message: str) -> None:
             "1 um + L/0",
             '"1 um + L/0" has a negative part or divides by zero; write for example "0.5 um + L/1000000"',
         ),
-        ("0.5 + L/1000", '"0.5" has no unit; write for example "0.5 mm"'),
+        ("0.5 + L/1000", '"0.5" has no unit; write for example "0.5 mm" or "0.5 um"'),
     ],
 )
 def test_messages_of_length_functions(value: object, message: str) -> None:

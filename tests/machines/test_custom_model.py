@@ -135,6 +135,13 @@ def test_what_is_wrong_with_a_model_is_said(tmp_path: Path, old: str, new: str, 
     assert line.startswith("3:37: error_model.object: ")
 
 
+def test_options_that_are_quantities_arrive_in_si_units(tmp_path: Path) -> None:
+    source = GOOD.replace("scales=True):", "scales=True, pitch=0.0):\n    assert pitch == 0.2, pitch")
+    assert source != GOOD
+    file, _ = written(tmp_path, source, ", options: {pitch: 200 mm}")
+    assert check(load(file)[0]).verdict.deficiency == 0
+
+
 def test_options_that_the_function_does_not_know(tmp_path: Path) -> None:
     file, _ = written(tmp_path, GOOD, ", options: {scale: true}")
     line = refusal(file)
