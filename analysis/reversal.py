@@ -31,9 +31,12 @@ from simulator.threads import single_threaded
 
 from .plates import axes_of_plates
 from .study import Fit, ParameterEstimate, fit
+from .tables import number
 
 # The first-order equations may change a result by this many of its standard uncertainties before a warning is due.
 NOTICEABLE = 0.5
+# With more than this many they are of no use.
+USELESS = 5.0
 
 # Chance that offsets are missed although there are none.
 ERRS = 1e-3
@@ -70,16 +73,41 @@ class ReversalFit:
     without_offsets: float
 
     @property
+    def turn(self) -> float:
+        """The turn in radians that multiple redundancy finds, or the reversal where that finds none."""
+        betas = [one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)]
+        return np.pi / 2.0 + (betas[0] if betas else self.found.exact_beta)
+
+    @property
+    def distortion(self) -> float:
+        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's own axes."""
+        exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
+        return float(np.abs(self.coordinates - exact).max())
+
+    @property
+    def complaint(self) -> str:
+        """Why the results are of no use; empty where they are of some."""
+        return self._neglected() if self.found.bias > USELESS else ""
+
+    def _neglected(self) -> str:
+        """What the first-order equations change by what they neglect."""
+        away = np.degrees(abs(self.turn - np.pi / 2.0))
+        told = f"{away:.4g} degrees" if away >= 1.0 else f"{3600.0 * away:.3g} arcsec"
+        offset = float(np.abs(self.found.offset - self.found.exact_offset).max())
+        shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
+        return (
+            f"the turn is {told} from 90 degrees, too far for equations of the first order: what they neglect changes "
+            f"co-ordinates of balls by up to {_length(self.distortion)}{shift}, and results by up to "
+            f"{number(self.found.bias, 2)} of their standard uncertainties; turn the plate closer to 90 degrees, or "
+            "take the results of multiple redundancy"
+        )
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What a user of the result has to know."""
         told = []
-        if self.found.bias > NOTICEABLE:
-            away = np.degrees(abs(self.found.beta)) * 3600.0
-            told.append(
-                f"the turn is {away:.3g} arcsec from 90 degrees, too far for equations of the first order: what they "
-                f"neglect changes results by up to {self.found.bias:.2g} of their standard uncertainties; turn the "
-                "plate closer to 90 degrees, or take the results of multiple redundancy"
-            )
+        if NOTICEABLE < self.found.bias <= USELESS:
+            told.append(self._neglected())
         if self.without_offsets < ERRS:
             told.append("the residuals are those of an offset between the positions; fit without --no-offsets")
         if self.full.converged and self.full.too_large:
@@ -148,6 +176,10 @@ PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
     ("offset x", "m"),
     ("offset y", "m"),
 )
+
+
+def _length(value: float) -> str:
+    return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} um"
 
 
 def _message(experiment: Experiment, steps: Steps, text: str) -> Message:

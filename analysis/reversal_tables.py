@@ -15,7 +15,7 @@ from .tables import MOST_BALLS, SHOWN, aligned, fit_data, number, to_uncertainty
 def reversal_lines(fit: ReversalFit) -> list[str]:
     """A reversal as lines of text: parameters and co-ordinates, those of multiple redundancy beside them."""
     found, full = fit.found, fit.full
-    turn = number(90.0 + float(np.degrees(found.beta)), 8)
+    turn = number(float(np.degrees(fit.turn)), 8)
     count = "five parameters" if fit.offsets else "three parameters, no offsets"
     scale = "none (fitted, but not applied)" if fit.scale == "none" else fit.scale
     lines = [
@@ -74,6 +74,8 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
         "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
         "degrees_of_freedom": found.degrees_of_freedom,
         "neglected_standard_uncertainties": found.bias if np.isfinite(found.bias) else None,
+        "neglected_coordinates": fit.distortion,
+        "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
         "estimates": {e.name: {"value": e.value, "unit": e.unit} for e in fit.estimates},
         "axes": {"origin": fit.names[fit.axes.origin], "xy"[fit.axes.axis]: fit.names[fit.axes.ball]},
         "balls": _by_ball(fit.names, fit.coordinates),

@@ -52,7 +52,7 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
     from ..reversal_tables import reversal_data, reversal_lines
 
     found = fit_reversal(experiment, observed, options.scale, not options.no_offsets, options.sigma)
-    complaint = ""
+    complaint = found.complaint
     if not found.full.converged:
         complaint = f"the estimate by multiple redundancy has {found.full.solution.status}"
     elif not found.full.verdict.as_expected:

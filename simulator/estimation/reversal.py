@@ -22,6 +22,8 @@ from ..threads import single_threaded
 
 # Balls whose spread across their main line is below this fraction of their length count as on one line.
 ON_A_LINE = 1e-4
+# Of an angle far from 90 degrees a third, at 45 degrees, is left wrong by each step.
+STEPS = 40
 
 
 class UndeterminedError(ValueError):
@@ -36,7 +38,11 @@ class Reversal:
     those of the second predict; `sigma` is their root mean square over `degrees_of_freedom`, NaN without any. The
     error of two readings is in each, so that a single reading scatters by sigma / sqrt(2). `coordinates` (n, 2) are
     the balls along the machine's axes in the first position, up to a shift: the mean of both positions, corrected.
-    `neglected` (n, 2) is what the first-order equations leave out, at the parameters found.
+
+    `neglected` (n, 2) is what the first-order equations leave out, up to a shift. It is taken at the parameters with
+    which nothing is left out; `exact_beta`, `exact_coordinates` (n, 2) and `exact_offset` (2,) are theirs, and
+    `scatter` the standard deviation of a reading about them, which `sigma` overstates where much is neglected.
+    `bias` is the most that neglecting it changes any parameter or co-ordinate by, in standard uncertainties.
     """
 
     alpha: float
@@ -48,22 +54,16 @@ class Reversal:
     residuals: Array
     coordinates: Array
     neglected: Array
+    exact_beta: float
+    exact_coordinates: Array
+    exact_offset: Array
+    scatter: float
+    bias: float
 
     @property
     def single(self) -> float:
         """Standard deviation of a co-ordinate of a single reading."""
         return self.sigma / float(np.sqrt(2.0))
-
-    @property
-    def bias(self) -> float:
-        """Most that the neglected terms change any parameter or co-ordinate by, in its own standard uncertainties.
-
-        That is the root of their sum of squares over the standard deviation s of a reading: a linear function of the
-        readings with the coefficients l has the standard uncertainty s |l|, and changes by no more than |l| |n| where
-        the readings change by n.
-        """
-        neglected = float(np.sqrt((self.neglected**2).sum()))
-        return neglected / self.single if self.sigma > 0.0 else float("inf") if neglected > 0.0 else 0.0
 
 
 def turn_between(first: Array, second: Array) -> float:
@@ -98,13 +98,27 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     # A unit of each column then moves some reading by the plate's size.
     size = np.abs(second).max()
     weights = np.array([size, size, size, 1.0, 1.0])[: rows.shape[1]]
-    found = np.linalg.lstsq(rows / weights, wanted, rcond=None)[0] / weights
-    left = wanted - rows @ found
-    residuals = left.reshape(2, -1).T
-    freedom = len(wanted) - len(found)
-    sigma = float(np.sqrt(left @ left / freedom)) if freedom > 0 else float("nan")
+
+    def solved(neglected: Array) -> tuple[Array, Array, Array, float]:
+        """Parameters, the offset (2,), residuals (n, 2) and sigma with what is neglected (n, 2) taken out."""
+        aim = wanted - neglected.T.ravel()
+        found = np.linalg.lstsq(rows / weights, aim, rcond=None)[0] / weights
+        left = aim - rows @ found
+        sigma = float(np.sqrt(left @ left / freedom)) if freedom > 0 else float("nan")
+        return found, found[3:] if offsets else np.zeros(2), left.reshape(2, -1).T, sigma
+
+    freedom = rows.shape[0] - rows.shape[1]
+    found, offset, residuals, sigma = solved(np.zeros_like(second))
+    exact = found
+    for _ in range(STEPS):
+        before, left_out = exact, _left_out(*exact[:3])
+        exact, exact_offset, exact_residuals, exact_sigma = solved(second @ left_out.T)
+        if np.allclose(weights * exact, weights * before, rtol=0.0, atol=1e-15 * size):
+            break
+    neglected = arms @ left_out.T
+    # Each row of the inverse is how a parameter follows the readings.
+    lengths = np.sqrt((np.linalg.pinv(rows / weights) ** 2).sum(axis=1)) / weights
     alpha, beta, gamma = (float(value) for value in found[:3])
-    offset = found[3:] if offsets else np.zeros(2)
     return Reversal(
         alpha,
         beta,
@@ -114,8 +128,24 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
         freedom,
         residuals,
         _corrected(first - residuals / 2.0 - offset / 2.0, scale, alpha, gamma),
-        arms @ _left_out(alpha, beta, gamma).T,
+        neglected,
+        float(exact[1]),
+        _corrected(first - exact_residuals / 2.0 - exact_offset / 2.0, scale, float(exact[0]), float(exact[2])),
+        exact_offset,
+        exact_sigma / float(np.sqrt(2.0)),
+        _bias(neglected, np.abs(found - exact)[3:] / lengths[3:], exact_sigma),
     )
+
+
+def _bias(neglected: Array, offset: Array, sigma: float) -> float:
+    """Most that neglecting terms (n, 2) changes any parameter or co-ordinate by, in its own standard uncertainties.
+
+    A linear function of the readings with the coefficients l has the standard uncertainty s |l|, s = sigma / sqrt(2),
+    and changes by no more than |l| |n| where the readings change by n: no more than |n| / s for any. A shift of all is
+    no part of n, so that what the offset changes by is told apart; (2,), or (0,) without, for coefficients of length 1.
+    """
+    size = max(float(np.sqrt(2.0 * (neglected**2).sum())), float(offset.max(initial=0.0)))
+    return size / sigma if sigma > 0.0 else float("inf") if size > 0.0 else 0.0
 
 
 def _spread(arms: Array) -> float:

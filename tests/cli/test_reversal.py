@@ -89,17 +89,43 @@ def test_either_sense_and_either_order(tmp_path: Path, capsys: pytest.CaptureFix
         assert abs(estimate["value"] - value) < 3 * estimate["standard_uncertainty"]
 
 
-def test_too_far_from_a_quarter_turn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("angle", "words", "status"), [("90.03", "108 arcsec", 0), ("90.2", "720 arcsec", 1), ("80", "10 degrees", 1)]
+)
+def test_too_far_from_a_quarter_turn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], angle: str, words: str, status: int
+) -> None:
+    """What is neglected is told as it is: the difference from multiple redundancy, which neglects nothing."""
     path, readings = tmp_path / "far.yaml", str(tmp_path / "r.csv")
-    text = Path(ANGLES).read_text().replace("rotation: 90 deg", "rotation: 90.2 deg")
-    path.write_text(text)
+    path.write_text(Path(ANGLES).read_text().replace("rotation: 90 deg", f"rotation: {angle} deg"))
     chosen = ["--variant", "quarter turn"]
     told(capsys, "simulate", str(path), "-o", readings, *chosen)
-    _, err = told(capsys, "fit", str(path), readings, *chosen, *REVERSAL)
-    assert "the turn is 720 arcsec from 90 degrees, too far for equations of the first order" in err
-    estimates = data(capsys, "fit", str(path), readings, *chosen)["estimates"]
+    out, err = told(capsys, "fit", str(path), readings, *chosen, *REVERSAL, "--json", status=status)
+    assert f"the turn is {words} from 90 degrees, too far for equations of the first order" in err
+    assert err.startswith("warning: ") == (status == 0) and err.count("\n") == 1
+    found = json.loads(out)
+    full = found["multiple_redundancy"]
+    balls = full["plates"]["plate"]["balls"]
+    off = [found["balls"][ball][axis]["value"] - balls[ball][axis]["value"] for ball in balls for axis in "xy"]
+    assert found["neglected_coordinates"] == pytest.approx(np.abs(off).max(), rel=0.01)
+    size = 1e6 * found["neglected_coordinates"]
+    unit = f"{size / 1e3:.2g} mm" if size > 1e3 else f"{size:.2g} um"
+    assert f"changes co-ordinates of balls by up to {unit}" in err.replace("0.020 um", "0.02 um")
+    shift = max(
+        abs(found["estimates"][name]["value"] - full["relation"][name]["value"]) for name in ("offset x", "offset y")
+    )
+    assert found["neglected_offset"] == pytest.approx(shift, rel=0.01)
+    # No result is off by more standard uncertainties than told.
+    for name, estimate in found["estimates"].items():
+        beside = full["relation"][name]
+        away = abs(estimate["value"] - beside["value"]) / beside["standard_uncertainty"]
+        assert away < 1.05 * found["neglected_standard_uncertainties"]
     for name, true in (("alpha", 12e-6), ("gamma", 8e-6)):
-        assert abs(estimates[name]["value"] - true) < 3 * estimates[name]["standard_uncertainty"]
+        estimate = full["estimates"][name]
+        assert abs(estimate["value"] - true) < 3 * estimate["standard_uncertainty"]
+    out, _ = told(capsys, "fit", str(path), readings, *chosen, *REVERSAL, status=status)
+    turned = float(out.partition("is turned by ")[2].partition(" ")[0])
+    assert turned == pytest.approx(float(angle), abs=1e-4)
 
 
 def test_positions_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:

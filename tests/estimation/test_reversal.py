@@ -76,6 +76,21 @@ def test_what_is_neglected_is_told(beta: float) -> None:
     assert (noisy[0].bias > 0.5) == (beta > 5e-4)
 
 
+@pytest.mark.parametrize("beta", [1e-3, 0.2, -0.7])
+def test_scatter_is_that_of_the_readings_at_any_angle(beta: float) -> None:
+    """Noise of 1 um is found again where sigma has grown to millimetres, and the plate as it is."""
+    first, second = readings(beta)
+    exact = reverse(first, second, "x")
+    assert exact.exact_beta == pytest.approx(beta, abs=1e-10) and exact.scatter < 1e-12
+    sides, _ = in_plate_axes(exact.exact_coordinates, AXES)
+    # The correction for alpha and gamma leaves their products out.
+    assert sides[1, 0] == pytest.approx(0.3, abs=1e-11)
+    noise = np.random.default_rng(1).normal(0.0, 1e-6, (100, 2, *PLATE.shape))
+    found = [reverse(first + a, second + b, "x") for a, b in noise]
+    assert np.sqrt(np.mean([one.scatter**2 for one in found])) == pytest.approx(1e-6, rel=4 / np.sqrt(2 * 9 * 100))
+    assert min(one.single for one in found) > (1e-3 if abs(beta) > 0.1 else 1e-8)
+
+
 def test_a_single_reading_scatters_by_sigma_over_the_root_of_two() -> None:
     first, second = readings(1e-5)
     noise = np.random.default_rng(1).normal(0.0, 1e-6, (500, 2, *PLATE.shape))
