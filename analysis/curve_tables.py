@@ -11,6 +11,7 @@ import numpy as np
 
 from simulator.splines.constraints import Constraint
 from simulator.splines.pieces import Pieces, Powers, pieces
+from simulator.settings import listing
 from simulator.splines.read import Column
 
 from .curve import Curve
@@ -66,7 +67,12 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
         f"{_number_of(fitted.degrees_of_freedom, 'degree')} of freedom"
     )
     for boundary in curve.boundaries:
-        lines.append(f"features share value and slope at {shown(boundary, x)}")
+        on = [points.names[k] for k in np.flatnonzero(fitted.x == boundary)]
+        both = f"; point {', '.join(on)} there belongs to both" if on else ""
+        lines.append(f"features share value and slope at {shown(boundary, x)}{both}")
+    if len(set(points.features)) > 1 and not curve.boundaries:
+        names = listing(dict.fromkeys(points.features))
+        lines.append(f"one curve over {names}: the column feature makes no boundaries; --boundary does")
     for k in sorted(set(curve.settings.straight)):
         lines.append(f"feature {k} is a straight line")
     for hold in curve.holds:

@@ -8,22 +8,31 @@ import numpy as np
 
 from .space import Array
 
+# With fewer points between a knot and a boundary the curvature, which jumps there, is hardly determined.
+NEXT_TO_BOUNDARY = 3
+
 
 def at_every(x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()) -> tuple[float, ...]:
     """Knots at every r-th of the points x between neighbouring boundaries, as NISTIR 6517, equation (5), has them.
 
-    A knot that no point of its feature lies beyond would have nothing to determine it, and is left out. Points of the
-    same x count as one.
+    A knot that no point of its feature lies beyond would have nothing to determine it, and is left out. So is one with
+    fewer than three points from it to a boundary, the knot's own not counted. Points of the same x count as one, a
+    point on a boundary in both features.
 
     >>> at_every(np.arange(1.0, 9.0), 3, 1.0, 8.0)
     (3.0, 6.0)
+    >>> at_every(np.arange(1.0, 17.0), 3, 1.0, 16.0, [8.0])
+    (3.0, 13.0)
     """
     distinct = np.unique(x)
     found: list[float] = []
     ends = [lower, *boundaries, upper]
     for start, end in zip(ends, ends[1:], strict=False):
         inside = distinct[(distinct >= start) & (distinct <= end)]
-        found += [knot for knot in inside[r - 1 : -1 : r].tolist() if start < knot < end]
+        before = 0 if start == lower else NEXT_TO_BOUNDARY
+        beyond = 1 if end == upper else NEXT_TO_BOUNDARY
+        chosen = range(r - 1, len(inside) - beyond, r)
+        found += [float(inside[k]) for k in chosen if k >= before and start < inside[k] < end]
     return tuple(found)
 
 
