@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from simulator.settings import listing
 from simulator.splines.constraints import Constraint
 from simulator.splines.pieces import Pieces, Powers, pieces
-from simulator.settings import listing
 from simulator.splines.read import Column
 
 from .curve import Curve
