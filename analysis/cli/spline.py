@@ -286,6 +286,8 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
     plain = text.strip().replace("µ", "u").replace("μ", "u")
     if plain in ("0", "-0", "0.0"):
         return 0.0
+    if re.match("[+-]?[0-9]+,[0-9]", plain):
+        raise OptionError(f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"')
     found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
     units: Any = UNITS
     with suppress(QuantityError):

@@ -11,7 +11,7 @@ from ..machines.kinematic import TRANSLATIONS
 from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from .tables import _cells, refuse_columns
+from .tables import _cells, refuse_columns, refuse_separators, wrong_count, wrong_number
 from .yamltree import Mark, read_text
 
 POSITION = "position"
@@ -49,15 +49,14 @@ def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
             break
         cells = _cells(line)
         if cells is None or len(cells) != len(names):
-            text = f"{0 if cells is None else len(cells)} columns instead of {len(names)}; separate them by commas"
-            messages.append(Message(file, number, 1, "", text))
+            messages.append(Message(file, number, 1, "", wrong_count(line, cells, len(names))))
             continue
         row = []
-        for (column, cell), factor in zip(cells, factors, strict=True):
+        for (column, cell), name, factor in zip(cells, names, factors, strict=True):
             try:
                 row.append(metres_or_radians(cell, factor))
             except QuantityError as error:
-                messages.append(Message(file, number, column, "", str(error)))
+                messages.append(Message(file, number, column, "", wrong_number(cell, name) or str(error)))
         rows.append((number, row))
     if messages:
         raise ExperimentError(messages)
@@ -80,6 +79,7 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
     names: list[str] = []
     factors: list[Fraction] = []
     refuse_columns(mark, header, EXAMPLE)
+    refuse_separators(mark, header, EXAMPLE)
     for column, cell in _cells(header) or []:
         place = Mark(mark.file, mark.line, column)
         name, _, unit = cell.rpartition("_")

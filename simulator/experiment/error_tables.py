@@ -48,6 +48,7 @@ def parse_line(text: str) -> dict[str, float]:
     >>> parse_line("y = 600 mm, z = 0.2 m")
     {'y': 0.6, 'z': 0.2}
     """
+    _refuse_decimal_comma(text)
     found: dict[str, float] = {}
     for part in text.split(","):
         name, equals, value = (one.strip() for one in part.partition("="))
@@ -62,6 +63,12 @@ def parse_line(text: str) -> dict[str, float]:
     if len(found) > 2:
         raise LineError("a line needs an axis along which it runs; leave that one out")
     return found
+
+
+def _refuse_decimal_comma(text: str) -> None:
+    comma = re.search("[0-9]+,[0-9]+", text)
+    if comma is not None:
+        raise LineError(f'"{comma[0]}" has a decimal comma; write {comma[0].replace(",", ".")}')
 
 
 def read_error_table(path: Path, name: str) -> ErrorTable:
@@ -132,6 +139,7 @@ def parse_point(text: str) -> Three:
     """
     parts = text.strip().strip("[]").split(",")
     if len(parts) != 3:
+        _refuse_decimal_comma(text)
         raise LineError(f"has {len(parts)} co-ordinates; give three, such as 0 mm, 0 mm, -100 mm")
     try:
         x, y, z = (parse_length(part.strip()) for part in parts)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 
 from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians
@@ -64,7 +65,7 @@ def read_table(
             break
         cells = _cells(line)
         if cells is None or len(cells) != len(places):
-            messages.append(mark.message("", _wrong_count(line, cells, len(places))))
+            messages.append(mark.message("", wrong_count(line, cells, len(places))))
             continue
         by_name = {name: cells[i] for i, name in enumerate(places)}
         row_lengths = []
@@ -73,7 +74,7 @@ def read_table(
             try:
                 row_lengths.append(metres_or_radians(cell, factors.get(name, Fraction(1))))
             except QuantityError as error:
-                messages.append(Mark(file, number, column).message("", _wrong_number(cell, name) or str(error)))
+                messages.append(Mark(file, number, column).message("", wrong_number(cell, name) or str(error)))
                 row_lengths.append(float("nan"))
         for name in texts:
             if not by_name[name][1]:
@@ -99,6 +100,15 @@ def refuse_columns(mark: Mark, header: str, example: str) -> None:
         raise ExperimentError([mark.message("", text)])
 
 
+def refuse_separators(mark: Mark, header: str, example: str) -> None:
+    """Refuse a first line whose columns are separated by semicolons or tabs.
+
+    :raises ExperimentError: they are.
+    """
+    if "," not in header and re.search("[;\t]", header):
+        raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])
+
+
 def column_names(path: Path) -> tuple[str, ...]:
     """Names of a table's columns without their units; none where the file has no line.
 
@@ -110,23 +120,27 @@ def column_names(path: Path) -> tuple[str, ...]:
     return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
 
 
-def _wrong_number(cell: str, name: str) -> str:
+def wrong_number(cell: str, name: str) -> str:
     """Say what is wrong with a cell that is nearly a number, or nothing."""
     if not cell:
         return f"no {name}; write a number, or remove the line"
-    if re.fullmatch(r"[+-]?[0-9]+,[0-9]+", cell):
+    if re.fullmatch(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?", cell):
         return f'"{cell}" has a decimal comma; write {cell.replace(",", ".")}'
-    return ""
+    return f'"{shorten(cell)}" is no number; separate the columns by commas' if re.search("[;\t]", cell) else ""
 
 
-def _wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -> str:
+def wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -> str:
     """Say what is wrong with a line that does not have as many cells as there are columns."""
     if cells is None:
         return "a quotation mark too many; write one line per row, its columns separated by commas"
     what = f"{len(cells)} columns instead of {expected}"
-    digits = [bool(re.fullmatch(r"[+-]?[0-9]+", text)) for _, text in cells]
-    if len(cells) > expected and any(a and b for a, b in zip(digits, digits[1:], strict=False)):
-        return f"{what}; if a comma is meant as the decimal point, write a point, as in 500.0003"
+    halves = [
+        f"{one}.{other}"
+        for (_, one), (_, other) in pairwise(cells)
+        if re.fullmatch(r"[+-]?[0-9]+", one) and re.fullmatch(r"[0-9]+", other)
+    ]
+    if len(cells) > expected and halves:
+        return f"{what}; if a comma is meant as the decimal point, write a point, as in {shorten(halves[-1])}"
     if len(cells) == 1 and re.search("[;\t]", line):
         return f"{what}; separate them by commas"
     return f"{what}; write one line per row, its columns separated by commas"
@@ -145,10 +159,8 @@ def _columns(
     names: list[str] = []
     factors: dict[str, Fraction] = {}
     refuse_columns(mark, header, example)
-    cells = _cells(header) or []
-    if len(cells) == 1 and re.search("[;\t]", header):
-        raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])
-    for column, cell in cells:
+    refuse_separators(mark, header, example)
+    for column, cell in _cells(header) or []:
         place = Mark(mark.file, mark.line, column)
         name, _, unit = cell.rpartition("_")
         unit = unit.replace("µ", "u").replace("μ", "u")

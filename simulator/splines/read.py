@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ..experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from ..experiment.tables import MOST_ROWS, _cells, refuse_columns
+from ..experiment.tables import MOST_ROWS, _cells, refuse_columns, refuse_separators, wrong_count, wrong_number
 from ..experiment.yamltree import Mark, read_text
 from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number, metres_or_radians
 from ..settings import hint, listing, shorten
@@ -113,21 +113,18 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
         mark = Mark(file, number, 1)
         cells = _cells(line)
         if cells is None or len(cells) != len(header.order):
-            count = 0 if cells is None else len(cells)
-            text = f"{count} columns instead of {len(header.order)}; separate them by commas"
-            messages.append(mark.message("", text))
+            messages.append(mark.message("", wrong_count(line, cells, len(header.order))))
             continue
         row = []
         for column in wanted:
             place, cell = cells[header.index(column)]
             try:
-                if not cell:
-                    raise QuantityError(f"no {column.name}; write a number, or remove the line")
                 row.append(metres_or_radians(cell, header.factors[column.name], column.kind))
                 if column.name == UNCERTAINTY and row[-1] <= 0:
                     raise QuantityError(f'"{cell}" is no standard uncertainty; give one above zero')
             except QuantityError as error:
-                messages.append(Mark(file, number, place).message("", str(error)))
+                text = wrong_number(cell, column.name) or str(error)
+                messages.append(Mark(file, number, place).message("", text))
         values.append(row)
         if header.has_normals:
             try:
@@ -205,8 +202,7 @@ class _Header:
         self.mark = mark
         refuse_columns(mark, line, EXAMPLE)
         cells = _cells(line) or []
-        if len(cells) == 1 and re.search("[;\t]", line):
-            raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {EXAMPLE}")])
+        refuse_separators(mark, line, EXAMPLE)
         self.order = [cell for _, cell in cells]
         self.columns: dict[str, Column] = {}
         self.factors: dict[str, Fraction] = {}

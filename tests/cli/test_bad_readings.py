@@ -187,7 +187,7 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
         ),
         (
             lambda lines: with_cell(lines, 3, 3, lambda x: "187,5"),
-            ["3:1: 7 columns instead of 6; if a comma is meant as the decimal point, write a point, as in 500.0003"],
+            ["3:1: 7 columns instead of 6; if a comma is meant as the decimal point, write a point, as in 187.5"],
         ),
         (
             lambda lines: with_cell(lines, 3, 3, lambda x: '"187,5"'),

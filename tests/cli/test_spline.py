@@ -187,6 +187,7 @@ def test_drawings(tmp_path: Path) -> None:
         (("--knots", "10, 20 mm"), '--knots: "10" has no unit; write for example "10 mm" or "10 um"'),
         (("--start-slope", "3 um"), '--start-slope: "3 um" is not a slope; write for example "2 um/mm", or 0'),
         (("--start-slope", "3 um/s"), '"3 um/s" is not a slope; write for example "2 um/mm", or 0'),
+        (("--start-slope", "0,2 um/mm"), '"0,2 um/mm" has a decimal comma; write for example "0.2 um/mm"'),
         (("--start-value", "1 urad"), "--start-value:"),
         (("--at", "3 mm", "bend", "0"), '--at: "bend" should be value or slope'),
         (("--start", "end"), "the curve starts at its start"),

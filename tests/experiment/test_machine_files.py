@@ -164,6 +164,8 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         ("y = 400 mm, z", "y = 400 mm, y", ["eyx.csv:2:9: y is given twice; leave one of them out"]),
         ("y = 400 mm", "y = 400", ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm" or "400 um"']),
         ("y = 400 mm", "x = 400 mm", ["eyx.csv:2:9: the line runs along x; leave it out"]),
+        ("y = 400 mm", "y = 1,5 mm", ['eyx.csv:2:9: "1,5" has a decimal comma; write 1.5']),
+        ("0 mm, 0 mm, -50 mm", "0 mm, 0 mm, -0,5 mm", ['eyx.csv:4:10: "0,5" has a decimal comma; write 0.5']),
         ("y = 400 mm", "at the front", ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y']),
         ("y = 400 mm", "y = 4 m", ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"]),
         ("# line", "# lines", ['eyx.csv:2:3: unknown "lines:"; did you mean "line"?']),

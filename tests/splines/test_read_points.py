@@ -67,7 +67,7 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
         'data.csv:3:5: "x" is not a number; write for example "500.0003"',
         'data.csv:3:1: a second point "1", as in line 2; rename one',
         "data.csv:4:5: no error; write a number, or remove the line",
-        "data.csv:5:1: 2 columns instead of 4; separate them by commas",
+        "data.csv:5:1: 2 columns instead of 4; write one line per row, its columns separated by commas",
         'data.csv:6:7: "0" is no standard uncertainty; give one above zero',
         'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m',
     ]
@@ -93,6 +93,15 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
 def test_files_that_cannot_be_used(write: Path, text: str, x: str | None, y: str | None, message: str) -> None:
     found = told(write, text, x, y)
     assert len(found) == 1 and message in found[0]
+
+
+def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
+    assert told(write, 'position_mm,error_um\n10,2\n30,4,11\n40,"5,3"\n50;6\n60,7;8\n') == [
+        "data.csv:3:1: 3 columns instead of 2; if a comma is meant as the decimal point, write a point, as in 4.11",
+        'data.csv:4:4: "5,3" has a decimal comma; write 5.3',
+        "data.csv:5:1: 1 columns instead of 2; separate them by commas",
+        'data.csv:6:4: "7;8" is no number; separate the columns by commas',
+    ]
 
 
 def test_points_by_name(write: Path) -> None:
