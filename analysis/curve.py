@@ -21,6 +21,8 @@ Place = float | tuple[float, float] | Literal["start", "end"]
 """An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""
 
 EVERY = 5
+# A profile goes on beyond its points for no more than this many times the largest distance between two of them.
+CONTINUED = 2.0
 # Time grows with the square of these, times the points.
 MOST_COEFFICIENTS = 500
 
@@ -93,10 +95,12 @@ def fit_curve(
 ) -> Curve:
     """Fit the curve. `uncertainty` is that of each point where the points state none; `sigma` is given or estimated.
 
-    :raises SplineError: it cannot be fitted; all reasons found.
+    :raises SplineError: it cannot be fitted, all reasons found; or sigma should be given, and no uncertainty is.
     """
     x, ends, boundaries, holds, on_profile = _located(points, settings)
     lower, upper = ends
+    if lower == upper == x.min() == x.max():
+        raise SplineError([Problem("all points are at {0}, where there is no curve; give points at several", (lower,))])
     order = np.argsort(x, kind="stable")
     x, points = x[order], points.chosen(order.tolist())
     boundaries = tuple(sorted(set(boundaries)))
@@ -135,6 +139,9 @@ def fit_curve(
     stated = points.uncertainties
     if stated is None and uncertainty is not None:
         stated = np.full(len(x), uncertainty)
+    if stated is None and sigma == "given":
+        text = "no uncertainty is given that could be believed; add a column such as u_um, or give --uncertainty"
+        raise SplineError([Problem(text)])
     fitted = fit(space, x, points.y, stated, constraints)
     is_estimated = (sigma or ("estimated" if stated is None else "given")) == "estimated"
     factor = fitted.sigma if is_estimated else 1.0
@@ -198,6 +205,7 @@ def _on_profile(
         for place in (settings.start, settings.end)
     )
     _refuse_coincident(points.places)
+    _refuse_distant(points.places, start, end)
     try:
         profile, own, at = along(points.places, points.features, np.array(nominal).reshape(-1, 2), start, end)
     except NotOnProfileError as error:
@@ -209,6 +217,26 @@ def _on_profile(
         if isinstance(place, tuple):
             where[place] = float(lengths[(profile.places == place).all(axis=1)][0])
     return lengths[own], where
+
+
+def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> None:
+    """Refuse a start or an end that does not continue the profile beyond its first or last point.
+
+    :raises SplineError: it is nearer to another point, or much farther away than points are from one another.
+    """
+    if len(places) < 2:
+        return
+    farthest = CONTINUED * np.hypot(*np.diff(places, axis=0).T).max()
+    problems = []
+    for place, own in ((start, 0), (end, len(places) - 1)):
+        if place is None:
+            continue
+        away = np.hypot(*(places - place).T)
+        if away[own] > min(float(away.min()), farthest):
+            text = "the place ({0}, {1}) is not on the profile or just beyond it; correct it, or give the arc length"
+            problems.append(Problem(text, tuple(place.tolist())))
+    if problems:
+        raise SplineError(problems)
 
 
 def _refuse_coincident(places: Array) -> None:

@@ -195,7 +195,10 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
 
     if not isinstance(experiment.error_model, MetricSettings):
         kind = experiment.error_model.kind
-        say(("error_model", "kind"), f'the reversal is about a machine of kind "metric", not "{kind}"; write metric')
+        text = 'the reversal is about a machine of kind "metric" in two dimensions'
+        solid = experiment.dimension == 3
+        remedy = "write metric" + (" and leave z out of the volume and of all places" if solid else "")
+        say(("error_model", "kind"), f'{text}, not "{kind}"{" in three" if solid else ""}; {remedy}')
     elif experiment.dimension != 2:
         say(("machine", "volume"), "the reversal is about two dimensions, not three; leave z out")
     elif scale not in (None, experiment.error_model.plane_scale) and experiment.priors:

@@ -73,7 +73,7 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
         "positions": {"first": fit.first, "second": fit.second},
         "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
         "degrees_of_freedom": found.degrees_of_freedom,
-        "neglected_standard_uncertainties": found.bias if np.isfinite(found.bias) else None,
+        "neglected_standard_uncertainties": found.bias,
         "neglected_coordinates": fit.distortion,
         "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
         "estimates": {e.name: {"value": e.value, "unit": e.unit} for e in fit.estimates},

@@ -118,7 +118,7 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
         index[i] = own.get(ball, 0), positions[position], probes.get(probe, 0)
     messages = []
     for text, places in unknown.items():
-        more = f" (and in {len(places) - 1} lines more)" if len(places) > 1 else ""
+        more = f" (and in {len(places) - 1} line{'s' * (len(places) > 2)} more)" if len(places) > 1 else ""
         messages.append(places[0].mark.message("", text + more))
     return index, messages
 

@@ -65,6 +65,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.set_defaults(run=run)
 
 
+OF_DISTANCES = ("distances", "cresto", "kruth")
+
+
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
     from simulator.layout import lay_out
@@ -75,10 +78,17 @@ def run(options: Namespace) -> int:
     from ..tables import fit_data, fit_lines
     from .common import print_json, print_lines, single
 
-    if options.estimator != "reversal" and (options.scale or options.no_offsets):
-        given = "--scale" if options.scale else "--no-offsets"
-        print(f"ballplate fit: {given} goes with --estimator reversal only; leave it out, or add that", file=sys.stderr)
-        return 2
+    for option, given, estimators in (
+        ("--scale", options.scale, ("reversal",)),
+        ("--no-offsets", options.no_offsets, ("reversal",)),
+        ("--pairs", options.pairs, OF_DISTANCES),
+        ("--across-probes", options.across_probes, OF_DISTANCES),
+        ("--monomials", options.monomials, ("full", *OF_DISTANCES)),
+    ):
+        if given and options.estimator not in estimators:
+            wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
+            print(f"ballplate fit: {option} goes with --estimator {wanted} only; leave it out", file=sys.stderr)
+            return 2
     experiment = single(options)
     if options.plot and (experiment.dimension != 2 or options.estimator not in ("full", "reversal")):
         text = "--plot draws residuals of readings in two dimensions, by the full estimator or reversal; leave it out"

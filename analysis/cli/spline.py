@@ -73,9 +73,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         default=[],
         help="the K-th feature is a straight line; may be repeated",
     )
-    shape.add_argument(
-        "--periodic", metavar="PERIOD", nargs="?", const="360 deg", help="closed curve; PERIOD: 360 deg by default"
-    )
+    shape.add_argument("--periodic", action="store_true", help="closed curve, of 360 deg if there is no --period")
+    shape.add_argument("--period", metavar="PERIOD", help='closed curve of another period, such as "10 mm"')
     held = parser.add_argument_group("prescribed")
     for end in ("start", "end"):
         held.add_argument(f"--{end}-value", metavar="VALUE", help=f'error at the {end}, such as "3 um"')
@@ -218,10 +217,12 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
     if not 2 <= options.order <= 12:
         raise OptionError("--order should be 2 to 12; 4 is a cubic spline")
     period = None
-    if options.periodic is not None:
-        if options.periodic == "360 deg" and x.kind == "length":
-            raise OptionError('--periodic: the abscissa is a length; state the period, as in --periodic "10 mm"')
-        period = _positive(options.periodic, x, "--periodic")
+    if options.period is not None:
+        period = _positive(options.period, x, "--period")
+    elif options.periodic:
+        if x.kind == "length":
+            raise OptionError('--periodic: the abscissa is a length; state the period, as in --period "10 mm"')
+        period = _positive("360 deg", x)
     if options.start.strip() == "end" or options.end.strip() == "start":
         raise OptionError("the curve starts at its start and ends at its end; give --start and --end other places")
     return CurveSettings(

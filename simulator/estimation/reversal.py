@@ -24,10 +24,12 @@ from ..threads import single_threaded
 ON_A_LINE = 1e-4
 # Of an angle far from 90 degrees a third, at 45 degrees, is left wrong by each step.
 STEPS = 40
+# No machine reads finer, in metres; readings without noise scatter by their rounding only.
+FINEST = 1e-9
 
 
 class UndeterminedError(ValueError):
-    """The balls lie on one line, so that neither squareness nor scale difference shows."""
+    """The balls lie on one line, so that squareness and scale difference do not both show."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +90,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     # Without offsets a line has to go through the origin to leave anything open.
     arms = second - second.mean(axis=0) if offsets else second
     if _spread(arms) < ON_A_LINE:
-        raise UndeterminedError("the balls lie on one line, and show neither squareness nor scale difference")
+        raise UndeterminedError("the balls lie on one line, and do not show both squareness and scale difference")
     x2, y2 = second.T
     zero, one = np.zeros(len(x2)), np.ones(len(x2))
     by_x = np.stack([-x2, -x2, -y2, one, zero], axis=1)
@@ -144,8 +146,9 @@ def _bias(neglected: Array, offset: Array, sigma: float) -> float:
     and changes by no more than |l| |n| where the readings change by n: no more than |n| / s for any. A shift of all is
     no part of n, so that what the offset changes by is told apart; (2,), or (0,) without, for coefficients of length 1.
     """
+    sigma = max(sigma, float(np.sqrt(2.0)) * FINEST)
     size = max(float(np.sqrt(2.0 * (neglected**2).sum())), float(offset.max(initial=0.0)))
-    return size / sigma if sigma > 0.0 else float("inf") if size > 0.0 else 0.0
+    return size / sigma
 
 
 def _spread(arms: Array) -> float:

@@ -145,6 +145,10 @@ def _contradiction(constraints: tuple[Constraint, ...], matrix: Array, kept: Arr
         return Problem(text, constraints[k].places)
     parts = np.linalg.lstsq(matrix[kept].T, matrix[k], rcond=None)[0]
     others = [constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING]
+    if len(others) == 1 and _is_same(constraints[k], others[0]):
+        return Problem(
+            f"the {constraints[k].words} is prescribed twice, differently; leave one of them out", constraints[k].places
+        )
     texts: list[str] = []
     places: list[float] = []
     for one in (constraints[k], *others):
@@ -153,6 +157,11 @@ def _contradiction(constraints: tuple[Constraint, ...], matrix: Array, kept: Arr
         places += one.places
     text = f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; leave one of them out or add a knot"
     return Problem(text, tuple(places))
+
+
+def _is_same(one: Constraint, other: Constraint) -> bool:
+    """Whether two constraints prescribe the same thing."""
+    return one.words == other.words and bool(np.allclose(one.places, other.places, rtol=1e-12, atol=0.0))
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:

@@ -24,6 +24,7 @@ PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))
 NORMALS = ("normal_x", "normal_z")
 POINT, FEATURE, UNCERTAINTY, ARC_LENGTH = "point", "feature", "u", "arc_length"
 MOST_POINTS = 20_000
+NO_TABLES = (".yaml", ".yml", ".json")
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,9 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
     :raises ExperimentError: everything that is wrong with the file at once.
     """
     file = str(path)
+    if path.suffix.lower() in NO_TABLES:
+        text = f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV file that begins"
+        raise ExperimentError([Message(file, 0, 0, "", f"{text} with a line such as {EXAMPLE}")])
     lines = [
         (number, line)
         for number, line in enumerate(read_text(path).splitlines(), start=1)
@@ -185,6 +189,9 @@ def choose_points(points: Points, text: str, file: str) -> list[int]:
         span = re.fullmatch(r"([0-9]{1,9})\s*-\s*([0-9]{1,9})", part)
         if part in by_name:
             found.add(by_name[part])
+        elif span and numbers and (int(span[1]) < min(numbers) or int(span[2]) > max(numbers)):
+            text = f'"{shorten(part)}" goes beyond the points, {min(numbers)} to {max(numbers)}; leave those out'
+            messages.append(Message(file, 0, 0, "", text))
         elif span and any(int(span[1]) <= number <= int(span[2]) for number in numbers):
             found |= {k for number, k in numbers.items() if int(span[1]) <= number <= int(span[2])}
         else:
@@ -262,7 +269,10 @@ class _Header:
             text = f"no column is left for the error; its name needs a unit, as in {EXAMPLE}"
             messages.append(self.mark.message("", text))
         if not profile and x_column is None and not messages:
-            text = f"there is no abscissa beside the error; write for example {EXAMPLE}"
+            assert y_column is not None
+            bare = [name for name in self.order if name not in self.texts and name.rpartition("_")[0] != y_column.name]
+            lack = f"; {listing(bare)} has no unit, and columns without are not read" if bare else ""
+            text = f"there is no abscissa beside the error{lack}; write for example {EXAMPLE}"
             messages.append(self.mark.message("", text))
         if x_column is not None and x_column is y_column:
             messages.append(self.mark.message("", f"{x_column.name} is chosen for x and for y; choose another for one"))

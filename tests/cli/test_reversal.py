@@ -128,6 +128,17 @@ def test_too_far_from_a_quarter_turn(
     assert turned == pytest.approx(float(angle), abs=1e-4)
 
 
+def test_readings_without_noise(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A nanometre beside rounding errors is no reason for a warning."""
+    path, readings = tmp_path / "near.yaml", str(tmp_path / "r.csv")
+    path.write_text(Path(ANGLES).read_text().replace("rotation: 90 deg", "rotation: 90.001 deg"))
+    chosen = ["--variant", "quarter turn"]
+    told(capsys, "simulate", str(path), "-o", readings, *chosen, "--exact")
+    found = data(capsys, "fit", str(path), readings, *chosen, *REVERSAL)
+    assert found["sigma"] < 1e-10 and found["neglected_standard_uncertainties"] < 0.5
+    assert told(capsys, "fit", str(path), readings, *chosen, *REVERSAL)[1] == ""
+
+
 def test_positions_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
     """The readings shipped give their true machine and plate back, within their uncertainties."""
     found = data(capsys, "fit", ANGLES, str(FOLDER / "angles-readings.csv"), "--variant", "any angles")
@@ -206,7 +217,7 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     told(capsys, "simulate", str(path), "-o", str(tmp_path / "s.csv"))
     out, err = told(capsys, "fit", str(path), str(tmp_path / "s.csv"), *REVERSAL, status=3)
     assert out == "" and [line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()] == [
-        '3:21: error_model.kind: the reversal is about a machine of kind "metric"',
+        '3:21: error_model.kind: the reversal is about a machine of kind "metric" in two dimensions',
         "5:1: artefacts: the reversal takes one artefact",
         "8:1: positions: the reversal takes two positions, a quarter turn apart",
     ]
@@ -235,9 +246,14 @@ def test_several_probes_and_priors(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for option in (["--pairs", "all"], ["--across-probes"]):
+        _, err = told(capsys, "fit", *DUMMY, *REVERSAL, *option, status=2)
+        assert f"{option[0]} goes with --estimator distances, cresto or kruth only; leave it out" in err
+    _, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--monomials", status=2)
+    assert "--monomials goes with --estimator full, distances, cresto or kruth only; leave it out" in err
     for option in (["--scale", "x"], ["--no-offsets"]):
         _, err = told(capsys, "fit", *DUMMY, *option, status=2)
-        assert f"{option[0]} goes with --estimator reversal only" in err
+        assert f"{option[0]} goes with --estimator reversal only; leave it out" in err
     with pytest.raises(SystemExit) as caught:
         main(["fit", *DUMMY, *REVERSAL, "--scale", "z"])
     assert caught.value.code == 2

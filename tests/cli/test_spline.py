@@ -139,8 +139,12 @@ def test_nothing_is_told_of_uncertainty_without_degrees_of_freedom(
 
 
 def test_a_closed_curve(capsys: pytest.CaptureFixture[str], ring: Path) -> None:
-    assert run(ring, "--periodic", "--every", "2", "--json", "--evaluate", "0 deg, 360 deg") == 0
+    arguments = ("--every", "2", "--json", "--evaluate", "0 deg, 360 deg")
+    # In any order; the file is not taken for the period.
+    assert run("--periodic", ring, *arguments) == 0
     found = json.loads(capsys.readouterr().out)
+    assert run(ring, "--period", "360 deg", *arguments) == 0
+    assert json.loads(capsys.readouterr().out) == found
     start, end = found["values"]
     assert end["x"] == pytest.approx(2 * math.pi)
     assert start["curve"] == pytest.approx(end["curve"], abs=1e-18)
@@ -193,7 +197,7 @@ def test_drawings(tmp_path: Path) -> None:
         (("--start", "end"), "the curve starts at its start"),
         (("--order", "1"), "--order should be 2 to 12"),
         (("--periodic",), "--periodic: the abscissa is a length; state the period"),
-        (("--periodic", "-1 mm"), "must be above zero"),
+        (("--period", "-1 mm"), '--period: "-1 mm" must be above zero'),
         (("--boundary", "1 mm, 2 mm, 3 mm"), "should be one abscissa, or two nominal co-ordinates"),
         (("--uncertainty", "0 um"), "must be above zero"),
         (("--plot", "a.svg", "--whiskers", "a.svg"), "two of the files are the same"),
@@ -217,7 +221,10 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str], arguments: tuple[str, .
         ),
         (("--knots", "70 mm"), ["the knot at 70 mm is not between the ends, 0 mm and 56.9"]),
         (("--knots", "5.1 mm, 5.2 mm, 5.3 mm, 5.4 mm, 5.5 mm, 5.6 mm, 6 mm"), ["the curve lacks", "leave out knots"]),
-        (("--start-slope", "0", "--at", "start", "slope", "1 um/mm"), ["contradicts the slope at 0 mm"]),
+        (
+            ("--start-slope", "0", "--at", "start", "slope", "1 um/mm"),
+            ["the slope at 0 mm is prescribed twice, differently; leave one of them out"],
+        ),
         (("--boundary", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
         (
             ("--boundary", "90 mm", "--straight", "3"),
@@ -227,7 +234,11 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str], arguments: tuple[str, .
         (("--order", "2", "--boundary", "9 mm"), ["broken lines share no slope"]),
         (("--x", "nominal_z", "--start", TANGENT), ["nominal co-ordinates tell a place on the profile"]),
         (("--points", "12-32,44"), ['no point "44"']),
-        (("--points", "12"), ["the curve ends at 0 mm, not above its start"]),
+        (("--points", "12"), ["all points are at 0 mm, where there is no curve; give points at several"]),
+        (("--points", "12-40"), ['"12-40" goes beyond the points, 1 to 32']),
+        (("--sigma", "given"), ["no uncertainty is given that could be believed; add a column such as u_um, or give"]),
+        (("--start", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
+        (("--end", "20 mm, -20 mm"), ["the place (20 mm, -20 mm) is not on the profile"]),
     ],
 )
 def test_what_cannot_be_fitted(

@@ -78,7 +78,8 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
     [
         ("", None, None, "data.csv: the file is empty; its first line should be position_mm,error_um"),
         ("position_mm;error_um\n", None, None, "the columns are not separated by commas"),
-        ("position,error_um\n1,2\n", None, None, "there is no abscissa beside the error"),
+        ("position,error_um\n1,2\n", None, None, "there is no abscissa beside the error; position has no unit"),
+        ("position_mm,error\n1,2\n", None, None, "there is no abscissa beside the error; error has no unit"),
         ("position_mm\n1\n", None, None, "there is no abscissa beside the error"),
         ("position,error\n1,2\n", None, None, "no column is left for the error; its name needs a unit"),
         ("a_mm,b_um,c_um\n1,2,3\n", None, "d", 'no column "d" for --y; known: a, b, c'),
@@ -102,6 +103,15 @@ def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
         "data.csv:5:1: 1 columns instead of 2; separate them by commas",
         'data.csv:6:4: "7;8" is no number; separate the columns by commas',
     ]
+
+
+def test_an_experiment_is_no_table(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yml"
+    path.write_text("title: t\n", encoding="utf-8")
+    with pytest.raises(
+        ExperimentError, match="this is YAML, not a table; give a CSV file that begins with"
+    ):
+        read_points(path)
 
 
 def test_points_by_name(write: Path) -> None:
