@@ -19,15 +19,21 @@ from .svg import INK, MARKERS, MUTED, SERIES, WIDTH, drawing, placed_axes, round
 LONGEST = 0.2
 MARGIN, LINE, MARKER = 56.0, 15.0, 3.5
 TITLE = 52
+# More names would lie on one another.
+MOST_NAMES = 60
 
 
 @dataclass(frozen=True, eq=False)
 class Vectors:
-    """What is drawn alike: `residuals` (m, 2) of readings at `places` (m, 2), both in metres."""
+    """What is drawn alike: `residuals` (m, 2) of readings at `places` (m, 2), both in metres.
+
+    `names` (m,) are those of the balls; empty where there are none to be drawn.
+    """
 
     label: str
     places: Array
     residuals: Array
+    names: tuple[str, ...] = ()
 
 
 def of_fit(fit: Fit, observed: ObservedReadings) -> tuple[Vectors, ...]:
@@ -36,7 +42,12 @@ def of_fit(fit: Fit, observed: ObservedReadings) -> tuple[Vectors, ...]:
     readings, residuals, _ = reading_residuals(design, fit.solution, observed.x)
     places = observed.x[design.plate_readings]
     return tuple(
-        Vectors(design.position_names[k], places[mine], residuals[mine])
+        Vectors(
+            design.position_names[k],
+            places[mine],
+            residuals[mine],
+            tuple(design.ball_names[ball] for ball in readings.ball[mine]),
+        )
         for k in np.unique(readings.position)
         for mine in [readings.position == k]
     )
@@ -44,7 +55,7 @@ def of_fit(fit: Fit, observed: ObservedReadings) -> tuple[Vectors, ...]:
 
 def of_reversal(fit: ReversalFit) -> tuple[Vectors, ...]:
     """Residuals of a reversal: readings in the first position less what those in the second predict."""
-    return (Vectors(f"{fit.first}, less what {fit.second} predicts", fit.places, fit.found.residuals),)
+    return (Vectors(f"{fit.first}, less what {fit.second} predicts", fit.places, fit.found.residuals, fit.names),)
 
 
 def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
@@ -92,8 +103,30 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: Path) -> None:
             segments = np.stack([group.places, ends, np.full_like(ends, np.nan)], axis=1).reshape(-1, 2)
             axes.plot(*1e3 * segments.T, color=colour)
             axes.plot(*1e3 * group.places.T, color=colour, marker=marker, markersize=MARKER, linestyle="none")
+        for text, place, away in _named(groups):
+            axes.annotate(
+                text,
+                tuple(1e3 * place),
+                (5.0 * away[0], 7.0 * away[1]),
+                textcoords="offset points",
+                ha="left" if away[0] > 0.5 else "right" if away[0] < -0.5 else "center",
+                va="center",
+                color=MUTED,
+                fontsize=7.0,
+            )
         _legend(figure, groups, times, width / (1e3 * across))
         save(figure, path, f"{title}: residuals as vectors, magnified {times:g} times")
+
+
+def _named(groups: tuple[Vectors, ...]) -> list[tuple[str, Array, Array]]:
+    """Each ball's name once for each group, its place and the direction (2,) away from its vector."""
+    found: dict[tuple[int, str], tuple[str, Array, Array]] = {}
+    for k, group in enumerate(groups):
+        for name, place, residual in zip(group.names, group.places, group.residuals, strict=False):
+            length = float(np.hypot(*residual))
+            away = -residual / length if length > 0.0 else np.array([0.0, 1.0])
+            found.setdefault((k, name), (name, place, away))
+    return list(found.values()) if len(found) <= MOST_NAMES else []
 
 
 def _style(k: int) -> tuple[str, str]:

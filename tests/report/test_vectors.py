@@ -49,10 +49,22 @@ def test_no_residuals_at_all(tmp_path: Path) -> None:
     assert ElementTree.parse(tmp_path / "none.svg").getroot().tag.endswith("svg")
 
 
+def test_too_many_names_are_left_out(tmp_path: Path) -> None:
+    names = tuple(f"b{k}" for k in range(61))
+    places = np.stack([np.arange(61.0), np.arange(61.0) % 7], axis=1)
+    for count in (60, 61):
+        group = Vectors("", places[:count], np.full((count, 2), 1e-6), names[:count])
+        draw_vectors((group,), "many", tmp_path / "many.svg")
+        assert ("<!-- b59 -->" in (tmp_path / "many.svg").read_text()) == (count == 60)
+
+
 def test_fit_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, estimator in (("full.svg", "full"), ("reversal.svg", "reversal")):
         assert main(["fit", *REAL, "--estimator", estimator, "--plot", str(tmp_path / name)]) == 0
-        assert "magnified" in (tmp_path / name).read_text()
+        drawn = (tmp_path / name).read_text()
+        assert "magnified" in drawn
+        # Ball 13, which the documentation speaks of, can be found.
+        assert drawn.count("<!-- 13 -->") == (2 if estimator == "full" else 1)
     assert main(["fit", *REAL, "--plot", str(tmp_path / "none" / "a.svg")]) == 3
     assert "cannot be written" in capsys.readouterr().err
     for wrong in (["designs/quickstart.yaml"], [str(FOLDER / "real.yaml"), "--estimator", "kruth"]):
