@@ -82,7 +82,8 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: Path) -> None:
     times = magnification(groups, extent)
     drawn = np.concatenate([places, *(g.places + times * g.residuals for g in groups)])
     lower, upper = drawn.min(axis=0), drawn.max(axis=0)
-    pad = 0.06 * extent
+    named = _named(groups)
+    pad = (0.1 if named else 0.06) * extent
     heading = textwrap.wrap(title, TITLE)
     across, up = upper - lower + 2.0 * pad
     width = WIDTH - MARGIN - 10.0
@@ -103,7 +104,7 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: Path) -> None:
             segments = np.stack([group.places, ends, np.full_like(ends, np.nan)], axis=1).reshape(-1, 2)
             axes.plot(*1e3 * segments.T, color=colour)
             axes.plot(*1e3 * group.places.T, color=colour, marker=marker, markersize=MARKER, linestyle="none")
-        for text, place, away in _named(groups):
+        for text, place, away in named:
             axes.annotate(
                 text,
                 tuple(1e3 * place),
