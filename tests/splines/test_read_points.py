@@ -108,9 +108,7 @@ def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
 def test_an_experiment_is_no_table(tmp_path: Path) -> None:
     path = tmp_path / "mine.yml"
     path.write_text("title: t\n", encoding="utf-8")
-    with pytest.raises(
-        ExperimentError, match="this is YAML, not a table; give a CSV file that begins with"
-    ):
+    with pytest.raises(ExperimentError, match="this is YAML, not a table; give a CSV file that begins with"):
         read_points(path)
 
 
