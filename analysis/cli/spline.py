@@ -188,6 +188,8 @@ def _check(options: Namespace, points: Points) -> None:
         raise OptionError(f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle")
     if options.magnification is not None and not 0 < options.magnification < float("inf"):
         raise OptionError("--magnification should be above 0, such as 200")
+    if options.magnification is not None and options.whiskers is None:
+        raise OptionError("--magnification is that of --whiskers; add that, or leave it out")
     if options.json and str(options.coefficients) == "-":
         raise OptionError("--json and --coefficients - both go to the screen; name a file for one")
 

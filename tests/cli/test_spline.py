@@ -202,6 +202,7 @@ def test_drawings(tmp_path: Path) -> None:
         (("--uncertainty", "0 um"), "must be above zero"),
         (("--plot", "a.svg", "--whiskers", "a.svg"), "two of the files are the same"),
         (("--magnification", "nan"), "--magnification should be above 0"),
+        (("--magnification", "300"), "--magnification is that of --whiskers; add that, or leave it out"),
         (("--json", "--coefficients", "-"), "both go to the screen"),
         (("--evaluate", "x mm"), '--evaluate: "x mm" is not a length'),
     ],
