@@ -82,15 +82,14 @@ def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
         return lines
     if misfit.noise_free < NO_MISFIT * misfit.degrees_of_freedom:
         return [*lines, "the true machine has another error model, which the fitted one follows exactly"]
-    ratios = [
-        f"{symbol} {with_error(one.actual)}"
-        for symbol, one in outcome.comparisons.items()
-        if one.symbol in ("U4", "U5", "U6")
-    ]
+    told = {symbol: one.actual for symbol, one in outcome.comparisons.items() if one.symbol in ("U4", "U5", "U6")}
+    ratios = [f"{symbol} {with_error(ratio)}" for symbol, ratio in told.items()]
+    too_optimistic = any(ratio.value > 1.0 and ratio.differs_from(1.0) for ratio in told.values())
     lines += [
         "",
-        "Too optimistic? The fitted model cannot follow the true machine exactly.",
-        f"actual errors are, in units of those predicted: {', '.join(ratios)}",
+        ("Too optimistic? " if too_optimistic else "") + "The fitted model cannot follow the true machine exactly.",
+        f"actual errors are, in units of those predicted: {', '.join(ratios)}"
+        + ("" if too_optimistic else f"; none is above 1 by more than {BEYOND:g} standard errors"),
         f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2 alone shows the misfit in "
         f"{100 * done.optimism.power:.3g} % of experiments",
     ]

@@ -303,8 +303,10 @@ def fitted_volumetric(
     Polynomials have the stated numbers of coefficients, tables become cubic splines with so many interior `knots`,
     evenly spaced. The frame is that of the equations: functions are zero at the lower corner, straightness errors at
     both ends; squareness errors that are not stated are zero. Expansion is part of the positioning errors, and the
-    arm's bend phi2 of its straightness where that is stated; neither is a parameter then.
+    arm's bend phi2 of its straightness where that is stated; neither is a parameter then. An axis with a temperature
+    has a positioning error that is linear at least.
     """
+    expanding = {f"E{axis.upper()}{axis.upper()}" for axis in machine.temperature}
     functions: dict[str, Basis] = {}
     for error in machine.errors:
         if error.shape is None:
@@ -313,10 +315,11 @@ def fitted_volumetric(
         if isinstance(error.shape, Points):
             basis = Spline(4, tuple((np.arange(1, knots + 1) / (knots + 1)).tolist()))
         else:
-            basis = Polynomial(len(error.shape.coefficients))
+            basis = Polynomial(max(len(error.shape.coefficients), 2 if error.name in expanding else 1))
         basis = basis.interior() if error.is_straightness else basis
         if basis.size:
             functions[error.name] = basis
+    functions |= {name: Polynomial(2) for name in sorted(expanding) if name not in functions}
     found = tuple(error_function(name, basis) for name, basis in functions.items())
     fields = [squareness_field(one.name) for one in machine.squareness]
     for which in machine.droop:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import Settings, hint
+from .framing import in_frame_of
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
 from .settings import (
     CoefficientSettings,
@@ -31,7 +32,8 @@ class TruthError(ValueError):
 def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
     """The true machine in a volume from `lower` to `upper` in metres.
 
-    Its error model is `fitted`, the one that is estimated, unless the settings name another.
+    Its error model is `fitted`, the one that is estimated, unless the settings name another. A machine that a file
+    describes is brought into the frame of `fitted`.
 
     :raises TruthError: see `true_parameters`.
 
@@ -45,7 +47,7 @@ def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: C
         curves = settings.model(lower, upper)
         return TrueMachine(curves, np.ones(len(curves.parameters)))
     if isinstance(settings, TrueMachineFileSettings):
-        return settings.machine()
+        return in_frame_of(fitted, settings.machine(), lower, upper)
     other = getattr(settings, "error_model", None)
     model = fitted if other is None else build_error_model(other, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))

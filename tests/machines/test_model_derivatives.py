@@ -12,6 +12,7 @@ from simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from simulator.machines.bases import Monomial, Polynomial, Spline
 from simulator.machines.description import fitted_volumetric, true_volumetric
 from simulator.machines.empirical import empirical_model
+from simulator.machines.framing import FramedModel
 from simulator.machines.joined import JoinedModel
 from simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
 from simulator.machines.metric import MetricModel
@@ -57,6 +58,9 @@ MODELS: dict[str, ErrorModel] = {
     ),
     "volumetric stated": true_volumetric(load_machine("designs/park/machines/measured-errors.yaml")).model,
     "volumetric with droop": true_volumetric(load_machine("designs/park/machines/gec-like.yaml")).model,
+    "volumetric in another frame": FramedModel(
+        true_volumetric(load_machine("designs/park/machines/npl-like.yaml")).model, LOWER
+    ),
     **{
         f"volumetric fitted {name}": fitted_volumetric(
             load_machine(f"designs/park/machines/{name}.yaml"), LOWER, UPPER, 2

@@ -153,6 +153,14 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
     lines = "\n".join(trials_lines(done))
     assert "Too optimistic? The fitted model cannot follow the true machine exactly." in lines
     assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
+    # A misfit that does no harm.
+    for ratio, harm in ((Figure(1.03, 0.01), False), (Figure(1.05, 0.01), True), (Figure(0.9, 0.01), False)):
+        one = replace(done.outcome.comparisons["U4"], actual=ratio)
+        harmless = replace(done, outcome=replace(done.outcome, comparisons={"U4": one}))
+        lines = "\n".join(trials_lines(harmless))
+        assert "The fitted model cannot follow the true machine exactly." in lines
+        assert ("Too optimistic?" in lines) is harm
+        assert ("none is above 1 by more than 4 standard errors" in lines) is not harm
 
 
 @pytest.mark.parametrize("variant", ["kinematic fit", "empirical fit"])
