@@ -28,6 +28,14 @@ def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
 
     :raises ExperimentError: everything that is wrong with the file at once.
     """
+    return read_numbered_curves(path, bandwidths)[0]
+
+
+def read_numbered_curves(path: Path, bandwidths: bool = False) -> tuple[dict[str, Points], tuple[int, ...]]:
+    """The same with the number of each point's line.
+
+    :raises ExperimentError: as `read_curves`.
+    """
     file = str(path)
     lines = [
         (number, line)
@@ -69,9 +77,10 @@ def read_curves(path: Path, bandwidths: bool = False) -> dict[str, Points]:
             text = "this position stands in the file twice; leave one of the rows out"
             raise ExperimentError([Message(file, number, 1, "", text)])
     positions = tuple(row[place] for _, row in rows)
-    return {
+    curves = {
         name: Points(positions, tuple(row[k] for _, row in rows)) for k, name in enumerate(names) if name != POSITION
     }
+    return curves, tuple(number for number, _ in rows)
 
 
 def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str], list[Fraction]]:

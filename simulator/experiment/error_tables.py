@@ -11,14 +11,17 @@ from ..machines.arrangement import AXES
 from ..machines.curves import Points
 from ..machines.description import Three
 from ..machines.straightness import Criterion
-from ..quantities import QuantityError, parse_length
+from ..quantities import QuantityError, format_length, parse_length
 from ..settings import hint, listing, nearest, shorten
-from .curves import BANDWIDTH, read_curves
+from .curves import BANDWIDTH, read_numbered_curves
 from .messages import ExperimentError, Message
 from .yamltree import Mark, read_text
 
 COMMENT = re.compile(r"\s*#\s*([A-Za-z]+)\s*:\s*(.*?)\s*$")
 KEYS = ("line", "straightness", "straightedge", "probe")
+
+# Part of an axis by which a table may go beyond it, or fall short of it; with wide spacing it may by one more point.
+MARGIN, WIDEST = 0.05, 0.25
 
 
 @dataclass(frozen=True)
@@ -71,8 +74,10 @@ def _refuse_decimal_comma(text: str) -> None:
         raise LineError(f'"{comma[0]}" has a decimal comma; write {comma[0].replace(",", ".")}')
 
 
-def read_error_table(path: Path, name: str) -> ErrorTable:
+def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = None) -> ErrorTable:
     """Read the table of the error `name` from a CSV file such as position_mm,EYX_um,EYX_bandwidth_um.
+
+    Where the ends of the `axis` are given, in metres, the table should cover it.
 
     :raises ExperimentError: everything that is wrong with the file at once.
     """
@@ -94,7 +99,9 @@ def read_error_table(path: Path, name: str) -> ErrorTable:
     line_of, probe, criterion = _line(stated, name, messages), _probe(stated, messages), _criterion(stated, messages)
     curves: dict[str, Points] = {}
     try:
-        curves = read_curves(path, bandwidths=True)
+        curves, numbers = read_numbered_curves(path, bandwidths=True)
+        if axis is not None:
+            messages += _range(str(path), next(iter(curves.values())).positions, numbers, axis)
     except ExperimentError as error:
         messages += error.messages
     others = [one for one in curves if one.removesuffix(BANDWIDTH) != name]
@@ -113,6 +120,29 @@ def read_error_table(path: Path, name: str) -> ErrorTable:
     if messages:
         raise ExperimentError(sorted(messages))
     return ErrorTable(curves[name], bandwidth, line_of, probe, criterion, "straightedge" in stated)
+
+
+def _range(
+    file: str, positions: tuple[float, ...], numbers: tuple[int, ...], axis: tuple[float, float]
+) -> list[Message]:
+    """What is wrong with the ends of a table whose points stand in lines `numbers`."""
+    lower, upper = axis
+    length = upper - lower
+    found = []
+    for k, beside, end, sign, word in ((0, 1, lower, -1.0, "begins"), (-1, -2, upper, 1.0, "ends")):
+        beyond = sign * (positions[k] - end)
+        spacing = min(abs(positions[beside] - positions[k]), WIDEST * length)
+        if beyond > MARGIN * length or -beyond > max(MARGIN * length, spacing):
+            found.append((numbers[k], f"the table {word} at {format_length(positions[k])}"))
+    if not found:
+        return []
+    shift = lower - positions[0]
+    right = "give positions of the axis, in the unit that the header says, and cover the axis"
+    if abs(shift) > MARGIN * length and abs(positions[-1] + shift - upper) <= MARGIN * length:
+        change = f"add {format_length(shift)} to" if shift > 0.0 else f"take {format_length(-shift)} from"
+        right = f"{change} every position, or state the volume as the scales read"
+    told = f"but the axis goes from {format_length(lower)} to {format_length(upper)}"
+    return [Message(file, number, 1, "", f"{text}, {told}; {right}") for number, text in found]
 
 
 def _line(stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message]) -> dict[str, float]:

@@ -157,10 +157,10 @@ def _errors(
             _check_table(on_table, machine, error.axis, (*steps, "straightedge"), problems)
             yield replace(error, shape=shape, line=line, probe=probe, criterion=criterion, on_table=on_table)
         elif one.file is not None:
-            table = _table(source.parent / one.file, name, (*steps, "file"), problems)
+            ends = machine.lower[error.axis], machine.upper[error.axis]
+            table = _table(source.parent / one.file, name, ends, (*steps, "file"), problems)
             if table is None:
                 continue
-            _check_range(table.points, machine, error.axis, (*steps, "file"), problems)
             line = _complete(table.line, machine, error.axis)
             _inside(line, machine, (*steps, "file"), problems)
             if table.bandwidth is not None:
@@ -175,9 +175,11 @@ def _errors(
             yield error
 
 
-def _table(path: Path, name: str, steps: Steps, problems: Problems) -> ErrorTable | None:
+def _table(
+    path: Path, name: str, ends: tuple[float, float] | None, steps: Steps, problems: Problems
+) -> ErrorTable | None:
     try:
-        return read_error_table(path, name)
+        return read_error_table(path, name, ends)
     except ExperimentError as error:
         problems.take(error, steps)
         return None
@@ -189,7 +191,7 @@ def _read_tables(root: Mapping, source: Path, problems: Problems) -> None:
     for name, node in errors.items.items() if isinstance(errors, Mapping) else ():
         file = node.items.get("file") if isinstance(node, Mapping) else None
         if name in NAMES and isinstance(file, Scalar) and isinstance(file.value, str):
-            _table(source.parent / file.value, name, ("errors", name, "file"), problems)
+            _table(source.parent / file.value, name, None, ("errors", name, "file"), problems)
 
 
 def _line(settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> Three | None:
@@ -227,17 +229,6 @@ def _inside(point: Three | None, machine: MachineDescription, steps: Steps, prob
 def _check_table(on_table: bool, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:
     if on_table and AXES[axis] not in machine.arrangement.workpiece_side:
         problems.add(steps, f"the {AXES[axis]} axis moves no table; leave straightedge: table out")
-
-
-def _check_range(points: Points, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:
-    lower, upper = machine.lower[axis], machine.upper[axis]
-    covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
-    if covered < 0.5 * (upper - lower):
-        text = (
-            f"goes from {format_length(points.positions[0])} to {format_length(points.positions[-1])}, but the volume "
-            f"from {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most of it"
-        )
-        problems.add(steps, text)
 
 
 @cache

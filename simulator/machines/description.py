@@ -7,7 +7,7 @@ from that on the line through the reference point by its axis's rotations, times
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,11 +55,12 @@ class Lever:
 
 @dataclass(frozen=True)
 class Combination:
-    """A single function: a sum of multiples of others, less a straight line."""
+    """A single function: a sum of multiples of others, less a straight line; beyond the ends `held` it is constant."""
 
     parts: tuple[tuple[float, PowerSeries | Curve | Combination | Lever], ...]
     intercept: float = 0.0
     slope: float = 0.0
+    held: tuple[float, float] | None = None
 
     @property
     def zero_at_one(self) -> bool:
@@ -71,6 +72,7 @@ class Combination:
 
     def values(self, t: Array) -> Array:
         """The function at t (m,), as (m, 1)."""
+        t = t if self.held is None else np.clip(t, *self.held)
         found = -self.intercept - self.slope * t[:, None]
         for factor, part in self.parts:
             found = found + factor * part.values(t)
@@ -78,7 +80,7 @@ class Combination:
 
     def less(self, intercept: float, slope: float = 0.0) -> Combination:
         """The function less another straight line."""
-        return Combination(self.parts, self.intercept + intercept, self.slope + slope)
+        return replace(self, intercept=self.intercept + intercept, slope=self.slope + slope)
 
     def interior(self) -> Basis:
         raise TypeError("a stated function is a single one")
@@ -203,14 +205,15 @@ def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
     """Errors on lines through the reference point, zero there, by ISO 230-1 name.
 
     Rotations first, as displacements measured elsewhere need them; then straightness errors lose their straight line.
-    Where a rotation is not stated it counts as zero.
+    Where a rotation is not stated it counts as zero. Beyond the ends of a table what is left there goes on.
     """
     found: dict[str, Combination] = {}
     for error in sorted(machine.errors, key=lambda one: not one.is_rotation):
         shape = stated_function(machine, error)
         if shape is None:
             continue
-        function = Combination(((1.0, shape), *_by_rotations(machine, error, found)))
+        held = (shape.t[0], shape.t[-1]) if isinstance(shape, Curve) else None
+        function = Combination(((1.0, shape), *_by_rotations(machine, error, found)), held=held)
         if error.is_straightness:
             t = np.asarray(shape.t) if isinstance(shape, Curve) else np.linspace(0.0, 1.0, REDUCTION_POINTS)
             function = function.less(*reference_line(t, function.values(t)[:, 0], error.criterion))

@@ -181,14 +181,24 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         ("900,3,1500", "900,three,15,00", ["eyx.csv:6:1: 4 columns instead of 3"]),
         ("1500", "-1500", ["m.yaml:9:15: errors.EYX.file: eyx.csv: a bandwidth is below zero"]),
         ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write it with its unit']),
-        ("1800,", "950,", []),
-        ("1800,", "901,", []),
+        # The last point but a wide spacing away from the end of the axis, and a little beyond it.
+        ("1800,", "1650,", []),
+        ("1800,", "1890,", []),
+        ("1800,", "950,", ["eyx.csv:8:1: the table ends at 950 mm, but the axis goes from -100 mm to 1800 mm; give"]),
+        ("-100,", "-200,", ["eyx.csv:7:1: the table begins at -200 mm, but the axis goes from -100 mm to 1800 mm"]),
+        (
+            "position_mm",
+            "position_m",
+            [
+                "eyx.csv:7:1: the table begins at -100000 mm",
+                "eyx.csv:8:1: the table ends at 1800000 mm, but the axis goes",
+            ],
+        ),
     ],
 )
 def test_what_is_wrong_with_a_table(tmp_path: Path, old: str, new: str, messages: list[str]) -> None:
     assert old in TABLE
     if not messages:
-        # More than half of the axis, from -100 mm to 1800 mm, is enough.
         load_machine(written(tmp_path, table=TABLE.replace(old, new)))
         return
     lines = told(written(tmp_path, table=TABLE.replace(old, new)))
@@ -203,12 +213,13 @@ def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert line.startswith("eyx.csv:5:1: 3 points are too many; at most 2 are possible")
 
 
-def test_a_table_of_a_part_of_the_axis(tmp_path: Path) -> None:
-    table = "position_mm,EYX_um\n0,0\n500,1\n"
-    (line,) = told(written(tmp_path, table=table))
-    assert line.startswith(
-        "m.yaml:9:15: errors.EYX.file: goes from 0 mm to 500 mm, but the volume from -100 mm to 1800"
-    )
+def test_a_table_from_zero_on_an_axis_that_begins_elsewhere(tmp_path: Path) -> None:
+    lines = told(written(tmp_path, table="position_mm,EYX_um\n0,0\n50,1\n1900,0\n"))
+    assert [line.partition(",")[0] for line in lines] == [
+        "eyx.csv:2:1: the table begins at 0 mm",
+        "eyx.csv:4:1: the table ends at 1900 mm",
+    ]
+    assert all("take 100 mm from every position" in line for line in lines)
 
 
 EXPERIMENT = """\

@@ -11,6 +11,7 @@ import pytest
 from analysis.volumetric import Volumetric, between
 from simulator.experiment.machine_file import load_machine
 from simulator.machines.arrangement import ARRANGEMENTS
+from simulator.machines.curves import Points
 from simulator.machines.description import (
     AxisTemperature,
     MachineDescription,
@@ -21,6 +22,7 @@ from simulator.machines.description import (
     true_volumetric,
 )
 from simulator.machines.settings import RandomSettings
+from simulator.machines.straightness import Criterion
 from simulator.machines.truth import true_parameters
 from tests.published.rigid_body import tip_error
 
@@ -108,6 +110,15 @@ def test_errors_are_zero_at_the_reference_point_wherever_it_is() -> None:
 
 
 # Smooth errors of all kinds, straightness errors zero at both ends, rotations and positioning errors at the first.
+@pytest.mark.parametrize("criterion", ["end points", "least squares", "minimum zone"])
+def test_a_straight_table_that_is_shorter_than_its_axis_is_no_error(criterion: Criterion) -> None:
+    table = Points((0.02, 0.6, 1.75), (2e-6, 60e-6, 175e-6))
+    roll = ParametricError("EAX", Points((0.02, 1.75), (1e-6, 1e-6)))
+    eyx = ParametricError("EYX", table, line=(0.0, 0.0, 0.5), criterion=criterion)
+    found = Volumetric(machine(errors=(roll, eyx))).systematic(np.linspace((0, 0, 0), (1.8, 0, 0), 181))
+    np.testing.assert_allclose(found, 0.0, atol=1e-15)
+
+
 def true_functions(seed: int) -> dict[str, Callable[[float], float]]:
     found = {}
     generator = np.random.default_rng(seed)
