@@ -64,9 +64,16 @@ def _others(built: Volumetric) -> list[list[str]]:
     for parameter, value in _numbers(built):
         square = parameter.name.startswith("E")
         unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
-        told = parameter.meaning + ("" if square or parameter.unit == "1" else ", over the whole axis")
-        rows.append([parameter.name, symbol(parameter.name) if square else "", told, number(1e6 * value), unit])
+        rows.append(
+            [parameter.name, symbol(parameter.name) if square else "", _told(parameter), number(1e6 * value), unit]
+        )
     return rows
+
+
+def _told(parameter: Parameter) -> str:
+    """What an error that is no function means."""
+    is_droop = parameter.name.startswith("phi")
+    return parameter.meaning + (", over the whole axis" if is_droop else "")
 
 
 def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
@@ -178,7 +185,8 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
         "convention": CONVENTION,
         "parametric_errors": functions,
         "other_errors": {
-            parameter.name: {"value": value, "unit": parameter.unit} for parameter, value in _numbers(built)
+            parameter.name: {"value": value, "unit": parameter.unit, "meaning": _told(parameter)}
+            for parameter, value in _numbers(built)
         },
     }
 

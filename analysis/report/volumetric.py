@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.design import Integers
 from simulator.machines.protocol import Array
 from simulator.machines.volumetric import meaning, symbol
 
@@ -35,6 +36,9 @@ WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 30.0
 
 # Part of the volume's diagonal that the largest displacement is drawn as, about.
 LARGEST = 0.06
+
+# Lines that are drawn of a face of the grid in each direction, and points of each line; the table has them all.
+MOST_LINES, MOST_ON_LINE = 41, 201
 
 # Points beyond which they are not marked one by one.
 MOST_MARKS = 60
@@ -90,9 +94,14 @@ def draw_grid(
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
     """Lines of a face (n, m, 2) of the grid."""
     for lines in (face, face.transpose(1, 0, 2)):
-        chosen = lines if is_near else lines[[0, -1]]
-        for line in chosen:
+        chosen = lines[_spread(len(lines), MOST_LINES)] if is_near else lines[[0, -1]]
+        for line in chosen[:, _spread(lines.shape[1], MOST_ON_LINE)]:
             axes.plot(*line.T, color=colour, linewidth=width, linestyle="-" if is_near else ":")
+
+
+def _spread(count: int, most: int) -> Integers:
+    """Indices of all, or of `most` evenly spread ones of them, both ends included."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:

@@ -149,7 +149,7 @@ class TemperatureSettings(Settings):
 
 
 class DroopSettings(Settings):
-    """Droop of a horizontal arm, for each metre that it is moved out."""
+    """Droop of a horizontal arm, for each metre that it is moved out; it counts besides the stated errors."""
 
     phi1: Bending | None = Field(None, description="tilt of the column: phi1 x z in X (MH1), phi1 y z in Y (MH2)")
     phi2: Bending | None = Field(None, description="bend of the arm: -phi2 x^2/2 (MH1), +phi2 y^2/2 (MH2), in Z")

@@ -213,7 +213,8 @@ def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
         if shape is None:
             continue
         held = (shape.t[0], shape.t[-1]) if isinstance(shape, Curve) else None
-        function = Combination(((1.0, shape), *_by_rotations(machine, error, found)), held=held)
+        elsewhere = (*_by_rotations(machine, error, found), *_by_droop(machine, error))
+        function = Combination(((1.0, shape), *elsewhere), held=held)
         if error.is_straightness:
             t = np.asarray(shape.t) if isinstance(shape, Curve) else np.linspace(0.0, 1.0, REDUCTION_POINTS)
             function = function.less(*reference_line(t, function.values(t)[:, 0], error.criterion))
@@ -241,6 +242,22 @@ def _by_rotations(
             # A table turns the workpiece the other way.
             parts.append((float(lever), Lever(rotation, length, t0)))
     return parts
+
+
+def _by_droop(machine: MachineDescription, error: ParametricError) -> list[tuple[float, PowerSeries]]:
+    """What the tilt of the column has added to a displacement where it was measured, with the opposite sign.
+
+    It is linear along the line, and zero on the one through the reference point. The bend of the arm is the same on
+    all lines: it counts besides what is stated.
+    """
+    if error.is_rotation or error.line is None or "phi1" not in machine.droop:
+        return []
+    tilt = droop_field(machine.arrangement_name, "phi1", 1.0)
+    ends = np.array([error.line, error.line])
+    ends[:, error.axis] = machine.lower[error.axis], machine.upper[error.axis]
+    component = TRANSLATIONS.index(error.name[1])
+    start, end = (machine.droop["phi1"] * tilt.values(ends - np.array(machine.reference))[:, component]).tolist()
+    return [(-1.0, PowerSeries((start, end - start)))]
 
 
 def true_volumetric(machine: MachineDescription) -> TrueMachine:

@@ -68,7 +68,17 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     assert [one["error"] for one in found["diagonals"]] == built.diagonals().error.tolist()
     assert found["arrangement"] == "MB1" and found["parametric_errors"]["EBX"]["symbol"] == "Ey(x)"
     assert found["parametric_errors"]["ECX"] == {"symbol": "Ez(x)", "unit": "rad", "bandwidth": None, "random": 2e-6}
-    assert found["other_errors"]["thermal x"] == {"value": pytest.approx(6.3e-6), "unit": "1"}
+    assert found["other_errors"]["thermal x"] == {
+        "value": pytest.approx(6.3e-6),
+        "unit": "1",
+        "meaning": "thermal expansion along x",
+    }
+    assert run("map", ARM, "--grid", "2,2,2", "--json") == 0
+    phi1 = json.loads(capsys.readouterr().out)["other_errors"]["phi1"]
+    assert (phi1["value"], phi1["meaning"]) == (
+        pytest.approx(7.2e-6),
+        "tilt of the column by the arm, over the whole axis",
+    )
 
 
 def test_csv_of_a_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,6 +143,12 @@ def test_pictures(options: tuple[str, ...], words: str, tmp_path: Path, capsys: 
         b"http://purl.org", b""
     ).replace(b"http://creativecommons.org", b"")
     assert capsys.readouterr().err == ""
+
+
+def test_a_long_grid_is_drawn_with_some_of_its_lines(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    assert run("map", ARM, "--grid", "2,2,2000", "--format", "csv", "--plot", tmp_path / "long.svg") == 0
+    assert (tmp_path / "long.svg").stat().st_size < 300_000
 
 
 def test_a_picture_for_other_programs(scales: Path, tmp_path: Path) -> None:

@@ -119,6 +119,22 @@ def test_a_straight_table_that_is_shorter_than_its_axis_is_no_error(criterion: C
     np.testing.assert_allclose(found, 0.0, atol=1e-15)
 
 
+@pytest.mark.parametrize(("name", "error"), [("MH1", "EXX"), ("MH2", "EYY")])
+def test_droop_that_was_measured_with_a_positioning_error_counts_once(name: str, error: str) -> None:
+    axis = AXES.index(error[2].lower())
+    line = (0.1, 0.2, 0.4)
+    reference = (0.3, 0.1, 0.15)
+    droop = 10e-6 * (np.array([0.0, SIZE[axis]]) - reference[axis]) * (0.4 - 0.15)
+    measured = PowerSeries((0.0, float(droop[1] - droop[0])))
+    described = machine(
+        name, errors=(ParametricError(error, measured, line),), droop={"phi1": 10e-6}, reference=reference
+    )
+    points = np.array([line, line])
+    points[:, axis] = 0.0, SIZE[axis]
+    found = Volumetric(described).systematic(points)
+    np.testing.assert_allclose(found[:, axis], droop, rtol=0, atol=1e-18)
+
+
 def true_functions(seed: int) -> dict[str, Callable[[float], float]]:
     found = {}
     generator = np.random.default_rng(seed)
