@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -289,6 +290,35 @@ def test_init_writes_the_quickstart(capsys: pytest.CaptureFixture[str], tmp_path
     assert run("init", path) == 3
     assert run("init", tmp_path / "no" / "folder.yaml") == 3
     assert "exists already" in capsys.readouterr().err
+
+
+def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "machine.yaml"
+    assert run("init", "--machine", path) == 0
+    assert f"next: ballplate map {path}" in capsys.readouterr().err
+    assert run("map", path) == 0
+    assert (
+        "EYX  δy(x)   straightness of X in Y      2.000          um    polynomial at y = 300" in capsys.readouterr().out
+    )
+    text = path.read_text(encoding="utf-8")
+    schema = json.loads(Path("designs/machine-schema.json").read_text(encoding="utf-8"))
+    for part in (schema, *schema["$defs"].values()):
+        for key in part.get("properties", {}):
+            # One error stands for the others.
+            assert key[0] == "E" and len(key) == 3 or re.search(rf"\b{key}:", text), key
+    # What stands in comments is right as well.
+    lines = text.splitlines()
+    begins = next(k for k, line in enumerate(lines) if "  #   # line" in line)
+    table = [line.removeprefix("  #   ") for line in lines[begins:] if line.startswith("  #   ")]
+    (tmp_path / "ezx.csv").write_text("\n".join([*table, "800,0,1"]), encoding="utf-8")
+    text = text.replace("# EZX: {", "EZX: {").replace("# EXY: {", "EXY: {").replace("# droop", "droop")
+    path.write_text(text.replace("arrangement: MB2", "arrangement: {probe_side: [x, z], workpiece_side: [y]}"))
+    assert run("map", path) == 3
+    (told,) = capsys.readouterr().err.strip().split("\n")
+    assert "only the arm of MH1, MH2 droops" in told
+    path.write_text(path.read_text(encoding="utf-8").replace("droop: {", "# {"), encoding="utf-8")
+    assert run("map", path) == 0
+    assert "table of 3 points at y = 300 mm, z = 400 mm, minimum zone" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
