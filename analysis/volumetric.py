@@ -197,7 +197,7 @@ class AlongAxis:
     measured: Points | None
 
     @property
-    def bandwidth(self) -> float:
+    def range(self) -> float:
         """Largest less smallest value at the reference point, 0 of a random error."""
         return 0.0 if self.values is None else float(np.ptp(self.values))
 

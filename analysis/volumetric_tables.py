@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from simulator.machines.arrangement import AXES, Arrangement
-from simulator.machines.description import MachineDescription
+from simulator.machines.curves import NAMES
 from simulator.machines.protocol import Array, Parameter
-from simulator.machines.volumetric import meaning, symbol
+from simulator.machines.volumetric import SQUARENESS, meaning, symbol
 from simulator.quantities import format_length
+from simulator.settings import hint, listing
 
 from .tables import SHOWN, aligned, number
 from .volumetric import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
@@ -25,14 +26,14 @@ def machine_lines(built: Volumetric) -> list[str]:
     machine = built.machine
     name = f"{machine.arrangement_name}: " if machine.arrangement_name else ""
     lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
-    rows = [["", "symbol", "error", "bandwidth", "random", "unit", "stated as"]]
+    rows = [["", "symbol", "error", "range", "random", "unit", "stated as"]]
     for one in along_axes(machine):
         unit = "rad" if one.error.is_rotation else "m"
         factor = 1e6
         random = "" if one.deviation is None else number(factor * float(one.deviation.max()))
-        bandwidth = "" if one.values is None else number(factor * one.bandwidth)
-        cells = [one.error.name, symbol(one.error.name), meaning(one.error.name), bandwidth, random, SHOWN[unit]]
-        rows.append([*cells, _stated_as(one, machine)])
+        found = "" if one.values is None else number(factor * one.range)
+        cells = [one.error.name, symbol(one.error.name), meaning(one.error.name), found, random, SHOWN[unit]]
+        rows.append([*cells, _stated_as(one)])
     lines += aligned(rows, [False, False, False, True, True, False, False]) if len(rows) > 1 else ["no errors of axes"]
     others = _others(built)
     lines += ["", *aligned(others, [False, False, False, True, False])] if others else []
@@ -47,15 +48,27 @@ def _chain(arrangement: Arrangement) -> str:
     return ", ".join(sides)
 
 
-def _stated_as(one: AlongAxis, machine: MachineDescription) -> str:
+def _stated_as(one: AlongAxis) -> str:
     error = one.error
     if one.values is None:
         return "random"
     form = f"table of {len(one.measured.positions)} points" if one.measured is not None else "polynomial"
-    if error.line is not None:
+    if error.line is not None and not error.is_rotation:
         others = [k for k in range(3) if k != error.axis]
         form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)
     return form + (f", {error.criterion}" if error.is_straightness else "")
+
+
+def why_not_along(name: str, built: Volumetric, file: str) -> str:
+    """Why there is no parametric error of that name along an axis."""
+    stated = {one.name for one in built.machine.errors}
+    value = {parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}" for parameter, size in _numbers(built)}
+    if name in SQUARENESS:
+        told = f"{value[name]} at the reference point, in the table without --error" if name in value else "not stated"
+        return f"{name} is the {meaning(name)}, a single number: {told}"
+    if name in NAMES:
+        return f"{file} does not state {name}, {meaning(name)}; it is zero (stated: {listing(sorted(stated))})"
+    return f'{file} states no error "{name}"; {hint(name, stated)}'
 
 
 def _others(built: Volumetric) -> list[list[str]]:
@@ -109,13 +122,13 @@ def error_lines(found: VolumetricErrors) -> list[str]:
         found.points, found.systematic, found.resultant, found.deviation, strict=True
     ):
         cells = [_millimetres(value) for value in point]
-        cells += [f"{1e6 * value + 0.0:.2f}" for value in (*error, resultant, *(random if is_random else ()))]
+        cells += [_fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))]
         rows.append(cells)
     return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(found)]
 
 
 def extreme_lines(found: VolumetricErrors) -> list[str]:
-    """Bandwidths of the components, and the largest resultant."""
+    """Ranges of the components, and the largest resultant."""
     worst = int(found.resultant.argmax())
     at = ", ".join(f"{axis} = {format_length(v)}" for axis, v in zip(AXES, found.points[worst].tolist(), strict=True))
     bands = ", ".join(
@@ -123,7 +136,7 @@ def extreme_lines(found: VolumetricErrors) -> list[str]:
     )
     resultant = found.resultant
     return [
-        f"bandwidth in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
+        f"range in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
         f"largest resultant {number(1e6 * float(resultant[worst]))} um at {at}",
     ]
 
@@ -142,10 +155,17 @@ def along_lines(one: AlongAxis) -> list[str]:
     axis = one.error.name[2].lower()
     rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name, _ in given)]]
     for k in keep:
-        rows.append([_millimetres(float(positions[k])), *(f"{1e6 * values[k] + 0.0:.3f}" for _, values in given)])
+        rows.append([_millimetres(float(positions[k])), *(_fixed(float(1e6 * values[k]), 3) for _, values in given)])
     head = f"{one.error.name} {symbol(one.error.name)}: {meaning(one.error.name)}"
-    band = "" if one.values is None else f", bandwidth {number(1e6 * one.bandwidth)} {unit}"
-    return [head + band, *aligned(rows, [True] * len(rows[0]))]
+    band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"
+    told = [] if one.values is None else [f"stated as {_stated_as(one)}; {_line_stated(one)}".rstrip("; ")]
+    return [head + band, *told, *aligned(rows, [True] * len(rows[0]))]
+
+
+def _line_stated(one: AlongAxis) -> str:
+    if one.error.is_rotation:
+        return "a rotation is the same on all lines"
+    return "at the reference point (no line stated)" if one.error.line is None else ""
 
 
 def error_csv(found: VolumetricErrors) -> Iterator[str]:
@@ -174,7 +194,7 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
         functions[one.error.name] = {
             "symbol": symbol(one.error.name),
             "unit": "rad" if one.error.is_rotation else "m",
-            "bandwidth": None if one.values is None else one.bandwidth,
+            "range": None if one.values is None else one.range,
             "random": None if one.deviation is None else float(one.deviation.max()),
         }
     return {
@@ -239,6 +259,11 @@ def along_data(one: AlongAxis) -> dict[str, Any]:
         "value": listed(one.values),
         "random": listed(one.deviation),
     }
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals; what rounds to zero has no sign."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 def _millimetres(value: float) -> str:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
+# Points along a line unless told.
+POINTS = 21
+
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
@@ -40,9 +43,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         'as in "0 mm, 0 mm, 0 mm to 1.8 m, 1.2 m, 1.2 m"',
     )
     where.add_argument("--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX")
-    parser.add_argument(
-        "--points", metavar="N", type=_points, help="points along the line, at least 2; default 21", default=21
-    )
+    parser.add_argument("--points", metavar="N", type=_points, help="points along the line, at least 2; default 21")
     parser.add_argument(
         "--plot", metavar="FILE", type=picture, help="draw it as well, in three dimensions or along the line or axis"
     )
@@ -108,15 +109,19 @@ def run(options: Namespace) -> int:
     if options.plot is not None and options.plot.resolve() == options.file.resolve():
         print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
         return WRONG_USAGE
-    if options.magnification is not None and (options.line is not None or options.error is not None):
+    drawn = options.plot is not None and options.line is None and options.error is None
+    if options.magnification is not None and not drawn:
         print("ballplate map: --magnification is for the drawing of the grid; leave it out", file=sys.stderr)
         return WRONG_USAGE
+    if options.points is not None and options.line is None:
+        print("ballplate map: --points is for --line; leave it out", file=sys.stderr)
+        return WRONG_USAGE
     if options.error is not None:
-        from simulator.settings import hint
+        from ..volumetric_tables import why_not_along
 
         every = {one.error.name: one for one in along_axes(machine)}
         if options.error not in every:
-            told = f'{options.file} states no error "{options.error}"; {hint(options.error, every)}'
+            told = why_not_along(options.error, Volumetric(machine), str(options.file))
             print(f"ballplate map: {told}", file=sys.stderr)
             return WRONG_USAGE
         return _of_one(every[options.error], options)
@@ -149,7 +154,7 @@ def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace
     from ..volumetric import between
     from ..volumetric_tables import error_csv, error_data, error_lines, length_data, length_line, machine_data
 
-    found = machine.errors(between(start, end, options.points))
+    found = machine.errors(between(start, end, options.points or POINTS))
     length = machine.lengths(start[None], end[None])
     if options.format == "json":
         print_json([{**machine_data(machine), "length": length_data(length)[0], "line": error_data(found)}])

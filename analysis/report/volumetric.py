@@ -165,7 +165,7 @@ def draw_along(one: AlongAxis, path: Path) -> None:
     name, unit = one.error.name, micro(SHOWN["rad" if one.error.is_rotation else "m"])
     with drawing(260.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 260.0 - BELOW - ABOVE)
-        band = "" if one.values is None else f", bandwidth {number(1e6 * one.bandwidth)} {unit}"
+        band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"
         axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left")
         values = np.zeros(len(positions)) if one.values is None else 1e6 * one.values
         deviation = np.zeros(len(positions)) if one.deviation is None else 1e6 * one.deviation

@@ -17,8 +17,13 @@ from .curves import BANDWIDTH, read_numbered_curves
 from .messages import ExperimentError, Message
 from .yamltree import Mark, read_text
 
-COMMENT = re.compile(r"\s*#\s*([A-Za-z]+)\s*:\s*(.*?)\s*$")
+COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
 KEYS = ("line", "straightness", "straightedge", "probe")
+
+# Words that may be meant for a key, and what a value without its colon looks like.
+OTHER_WORDS = {"offset": "probe", "reflector": "probe", "criterion": "straightness"}
+VALUE = re.compile(r"=|\d\s*(mm|m|um|in)\b|^(table|end points|least squares|minimum zone)$")
+MOST_WORDS = 3
 
 # Part of an axis by which a table may go beyond it, or fall short of it; with wide spacing it may by one more point.
 MARGIN, WIDEST = 0.05, 0.25
@@ -87,15 +92,18 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         match = COMMENT.match(line)
         if match is None:
             continue
-        key, mark = match[1], Mark(str(path), number, match.start(1) + 1)
-        if key not in KEYS:
+        mark = Mark(str(path), number, match.start(1) + 1)
+        key, colon, value = match[1].partition(":")
+        if not colon or key.rstrip() not in KEYS:
             # Any other comment is one.
-            if nearest(key, KEYS) is not None:
-                messages.append(mark.message("", f'unknown "{key}:"; {hint(key, KEYS)}'))
-        elif key in stated:
+            if (meant := _meant(match[1])) is not None:
+                text = f'unknown "{shorten(key.rstrip())}{colon}"; did you mean "{meant}:"? If not, reword the comment'
+                messages.append(mark.message("", text))
+        elif (key := key.rstrip()) in stated:
             messages.append(mark.message("", f'"{key}:" stands already in line {stated[key][0].line}; remove one'))
         else:
-            stated[key] = (Mark(str(path), number, match.start(2) + 1), match[2])
+            begin = match.end(1) - len(value.lstrip()) + 1
+            stated[key] = (Mark(str(path), number, begin), value.strip())
     line_of, probe, criterion = _line(stated, name, messages), _probe(stated, messages), _criterion(stated, messages)
     curves: dict[str, Points] = {}
     try:
@@ -120,6 +128,19 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
     if messages:
         raise ExperimentError(sorted(messages))
     return ErrorTable(curves[name], bandwidth, line_of, probe, criterion, "straightedge" in stated)
+
+
+def _meant(comment: str) -> str | None:
+    """The key that a comment is meant for, if it looks as if."""
+    head, colon, _ = comment.partition(":")
+    words = re.findall(r"[a-z]+", head.partition("=")[0].casefold())
+    if colon and len(words) <= MOST_WORDS:
+        for word in words:
+            if (found := OTHER_WORDS.get(word) or nearest(word, KEYS)) is not None:
+                return found
+    first, _, rest = comment.partition(" ")
+    known = first.casefold().rstrip("=:,")
+    return known if known in KEYS and VALUE.search(rest) else None
 
 
 def _range(

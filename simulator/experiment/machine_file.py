@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable
 from dataclasses import replace
@@ -28,6 +29,7 @@ from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings
 from .messages import ExperimentError, Steps
 from .problems import Problems
+from .sections import VolumeSettings
 from .wording import explain
 from .yamltree import Mapping, Scalar, read_tree, to_python, walk
 
@@ -64,6 +66,7 @@ def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescript
     except ValidationError as error:
         for one in explain(error.errors(include_url=False), root, _json_schema()):
             problems.add(one.steps, one.text, one.of_key)
+        _volume_of(root, problems)
         # Tables are told about as well, where the keys that name them can be read.
         _read_tables(root, source, problems)
         return None
@@ -93,10 +96,9 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
             problems.add(("volume", "z"), "missing; a machine file has three axes")
             return None
         ends = [volume.x, volume.y, volume.z]
-    for axis, (lower, upper) in zip(AXES, ends, strict=True):
-        if upper <= lower:
-            text = f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)}; exchange them"
-            problems.add(("volume", axis), text)
+    _check_ends(ends, problems)
+    # What else is wrong is told with the ends exchanged, or without any.
+    ends = [(min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends]
     name = settings.arrangement if isinstance(settings.arrangement, str) else ""
     stated = settings.arrangement
     if isinstance(stated, str):
@@ -107,8 +109,6 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
     if droop and name not in DROOP:
         text = f"only the arm of {listing(DROOP)} droops; leave it out, or name one of them as arrangement"
         problems.add(("droop",), text, of_key=True)
-    if problems.messages:
-        return None
     bottom, top = (_three(end) for end in zip(*ends, strict=True))
     temperature = {
         axis: AxisTemperature(one.expansion, one.deviation, one.standard_uncertainty or 0.0)
@@ -129,8 +129,28 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         droop=droop,
         probing=settings.probing or 0.0,
     )
-    _inside(settings.reference_point, machine, ("reference_point",), problems)
-    return None if problems.messages else machine
+    if _inside(settings.reference_point, machine, ("reference_point",), problems):
+        return machine
+    return replace(machine, reference=bottom)
+
+
+def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None:
+    for axis, (lower, upper) in zip(AXES, ends, strict=False):
+        if upper < lower:
+            text = f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)}; exchange them"
+            problems.add(("volume", axis), text)
+        elif upper == lower:
+            text = f"ends where it begins, at {format_length(lower)}; give an end above it"
+            problems.add(("volume", axis), text)
+
+
+def _volume_of(root: Mapping, problems: Problems) -> None:
+    """Say what is wrong with the volume of a file that is wrong elsewhere."""
+    try:
+        volume = VolumeSettings.model_validate(to_python(root).get("volume"))
+    except ValidationError:
+        return
+    _check_ends([ends for ends in (volume.x, volume.y, volume.z) if ends is not None], problems)
 
 
 def _three(values: Iterable[float]) -> Three:
@@ -158,7 +178,8 @@ def _errors(
             yield replace(error, shape=shape, line=line, probe=probe, criterion=criterion, on_table=on_table)
         elif one.file is not None:
             ends = machine.lower[error.axis], machine.upper[error.axis]
-            table = _table(source.parent / one.file, name, ends, (*steps, "file"), problems)
+            covered = ends if math.isfinite(ends[0]) else None
+            table = _table(source.parent / one.file, name, covered, (*steps, "file"), problems)
             if table is None:
                 continue
             line = _complete(table.line, machine, error.axis)
@@ -216,7 +237,8 @@ def _complete(stated: dict[str, float], machine: MachineDescription, axis: int) 
     return x, y, z
 
 
-def _inside(point: Three | None, machine: MachineDescription, steps: Steps, problems: Problems) -> None:
+def _inside(point: Three | None, machine: MachineDescription, steps: Steps, problems: Problems) -> bool:
+    is_inside = True
     for k, value in enumerate(point or ()):
         if not machine.lower[k] <= value <= machine.upper[k]:
             text = (
@@ -224,6 +246,8 @@ def _inside(point: Three | None, machine: MachineDescription, steps: Steps, prob
                 f"{format_length(machine.lower[k])} to {format_length(machine.upper[k])}; correct one of the two"
             )
             problems.add(steps, text)
+            is_inside = False
+    return is_inside
 
 
 def _check_table(on_table: bool, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:

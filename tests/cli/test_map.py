@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -55,7 +56,15 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # (0.4 x 4 + 0.3 x 6 + 1.2 x 36) / 1.3 = 35.85 along every diagonal; random: 0.3 / 1.3 of 1 um at both ends.
     diagonals = [line.split() for line in lines if line.startswith(("1  ", "2  ", "3  ", "4  "))]
     assert [row[-2:] for row in diagonals] == [["35.85", "0.3264"]] * 4
-    assert "bandwidth in um: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 um at x = 400" in out
+    assert "range in um: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 um at x = 400" in out
+
+
+def test_what_rounds_to_zero_has_no_sign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "small.yaml"
+    path.write_text(SCALES.replace("[0 um, 36 um]", "[0 um, -4 nm]").replace("6 um]", "-0.1 nm]"), encoding="utf-8")
+    for options in (("--grid", "2,2,2"), ("--error", "EYY")):
+        assert run("map", path, *options) == 0
+        assert not re.search(r"-0\.0+\b", capsys.readouterr().out)
 
 
 def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
@@ -67,7 +76,7 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     assert [one["random"] for one in found["grid"]] == expected.deviation.tolist()
     assert [one["error"] for one in found["diagonals"]] == built.diagonals().error.tolist()
     assert found["arrangement"] == "MB1" and found["parametric_errors"]["EBX"]["symbol"] == "Ey(x)"
-    assert found["parametric_errors"]["ECX"] == {"symbol": "Ez(x)", "unit": "rad", "bandwidth": None, "random": 2e-6}
+    assert found["parametric_errors"]["ECX"] == {"symbol": "Ez(x)", "unit": "rad", "range": None, "random": 2e-6}
     assert found["other_errors"]["thermal x"] == {
         "value": pytest.approx(6.3e-6),
         "unit": "1",
@@ -118,7 +127,14 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytes
     assert points.sum() == 17
     assert abs(np.polyfit(at[points], values[points], 1)[0]) < 1e-16
     assert run("map", MEASURED, "--error", "EYX") == 0
-    assert capsys.readouterr().out.startswith("EYX δy(x): straightness of X in Y, bandwidth 3.062 um\n")
+    assert capsys.readouterr().out.startswith(
+        "EYX δy(x): straightness of X in Y, range 3.062 um\n"
+        "stated as table of 17 points at y = 100 mm, z = 400 mm, least squares\n"
+    )
+    assert run("map", ARM, "--error", "EYX") == 0
+    assert "polynomial, end points; at the reference point (no line stated)\n" in capsys.readouterr().out
+    assert run("map", ARM, "--error", "EBX") == 0
+    assert "stated as polynomial; a rotation is the same on all lines\n" in capsys.readouterr().out
     assert run("map", MEASURED, "--error", "EYX", "--format", "csv") == 0
     assert capsys.readouterr().out.startswith("position_mm,stated_um,EYX_um,random_um\n0,3,0,0.5\n")
 
@@ -129,7 +145,7 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytes
         (("--grid", "3,2,2"), "Volumetric errors, magnified"),
         (("--line", "y = 600 mm, z = 600 mm"), "Volumetric errors along x at y = 600 mm, z = 600 mm"),
         (("--line", "0 mm, 0 mm, 0 mm to 1 m, 1 m, 0 mm"), "Volumetric errors from (0, 0, 0) to (1000, 1000, 0) mm"),
-        (("--error", "EXX"), "EXX, positioning error of X, bandwidth 66.00 µm"),
+        (("--error", "EXX"), "EXX, positioning error of X, range 66.00 µm"),
     ],
 )
 def test_pictures(options: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -193,7 +209,11 @@ def test_wrong_usage(options: tuple[str, ...], message: str, capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--error", "EXY"), 'states no error "EXY"; did you mean'),
+        (("--error", "EXY"), "does not state EXY, straightness of Y in X; it is zero (stated: EAY"),
+        (("--error", "EC0Y"), "EC0Y is the squareness of Y to X, a single number: -45.00 urad at the reference point"),
+        (("--error", "EEX"), 'states no error "EEX"; did you mean'),
+        (("--points", "10"), "--points is for --line; leave it out"),
+        (("--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
         (("--error", "EXX", "--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
     ],

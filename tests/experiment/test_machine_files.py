@@ -130,7 +130,12 @@ probing: 0 um
     ("old", "new", "message"),
     [
         ("MH2", "MB1", "m.yaml:13:1: droop: only the arm of MH1, MH2 droops; leave it out, or name one of them"),
-        ("x: [-100 mm, 1800 mm]", "x: [2 m, 1 m]", "m.yaml:3:13: volume.x: ends at 1000 mm, not above its beginning"),
+        (
+            "x: [-100 mm, 1800 mm]",
+            "x: [1800 mm, -100 mm]",
+            "m.yaml:3:13: volume.x: ends at -100 mm, not above its",
+        ),
+        ("y: [0 mm, 1200 mm]", "y: [1 m, 1 m]", "m.yaml:3:36: volume.y: ends where it begins, at 1000 mm; give an end"),
         (", z: [0 mm, 1200 mm]}", "}", "m.yaml:3:9: volume.z: missing; a machine file has three axes"),
         (
             "[0 mm, 100 mm, 0 mm]",
@@ -168,7 +173,20 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         ("0 mm, 0 mm, -50 mm", "0 mm, 0 mm, -0,5 mm", ['eyx.csv:4:10: "0,5" has a decimal comma; write 0.5']),
         ("y = 400 mm", "at the front", ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y']),
         ("y = 400 mm", "y = 4 m", ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"]),
-        ("# line", "# lines", ['eyx.csv:2:3: unknown "lines:"; did you mean "line"?']),
+        ("# line:", "# lines:", ['eyx.csv:2:3: unknown "lines:"; did you mean "line:"? If not, reword the comment']),
+        ("# line:", "#LINE:", ['eyx.csv:2:2: unknown "LINE:"; did you mean "line:"?']),
+        ("# line:", "# Line at:", ['eyx.csv:2:3: unknown "Line at:"; did you mean "line:"?']),
+        ("# line:", "# line", ['eyx.csv:2:3: unknown "line y = 400 mm, z = 250 mm"; did you mean "line:"?']),
+        ("# line: y =", "# line = y:", ['eyx.csv:2:3: unknown "line = y:"; did you mean "line:"?']),
+        ("# straightness:", "# straigthness:", ['eyx.csv:3:3: unknown "straigthness:"; did you mean "straightness:"?']),
+        (
+            "# straightness:",
+            "# straightness",
+            ['eyx.csv:3:3: unknown "straightness minimum zone"; did you'],
+        ),
+        ("# probe:", "# Offset:", ['eyx.csv:4:3: unknown "Offset:"; did you mean "probe:"?']),
+        ("# measured: last year", "# straightness of X in Y, measured along the granite: very fine", []),
+        ("# measured: last year", "# file: 2021", []),
         ("# straightness", "# line", ['eyx.csv:3:3: "line:" stands already in line 2; remove one']),
         ("minimum zone", "minimal zone", ['eyx.csv:3:17: unknown criterion "minimal zone"; did you mean "minimum']),
         ("0 mm, 0 mm, -50 mm", "0 mm, -50", ["eyx.csv:4:10: has 2 co-ordinates; give three, such as"]),
@@ -205,6 +223,19 @@ def test_what_is_wrong_with_a_table(tmp_path: Path, old: str, new: str, messages
     assert len(lines) == len(messages)
     for line, start in zip(lines, messages, strict=True):
         assert line.startswith(start), line
+
+
+def test_reversed_ends_are_told_with_everything_else(tmp_path: Path) -> None:
+    text = MACHINE.replace("x: [-100 mm, 1800 mm]", "x: [1800 mm, -100 mm]").replace("probing: 1 um", "probing: 1")
+    text = text.replace("z: [0 mm, 1200 mm]", "z: [1200 mm, 0 mm]")
+    lines = told(written(tmp_path, text, TABLE.replace("y = 400 mm", "y = 400")))
+    places = ["m.yaml:3:13", "m.yaml:3:56", "m.yaml:14:10", "eyx.csv:2:9"]
+    assert sorted(line.partition(": ")[0] for line in lines) == sorted(places), lines
+    # Mistakes that only a whole machine can have.
+    text = text.replace("probing: 1", "probing: 1 um").replace("MH2", "MB1").replace("line: {z: 250", "line: {z: 2500")
+    lines = told(written(tmp_path, text, TABLE.replace("1800,", "180,")))
+    places = ["m.yaml:3:13", "m.yaml:3:56", "m.yaml:8:77", "m.yaml:13:1", "eyx.csv:6:1"]
+    assert sorted(line.partition(": ")[0] for line in lines) == sorted(places), lines
 
 
 def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
