@@ -32,13 +32,19 @@ from .svg import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 30.0
+WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 52.0
 
 # Part of the volume's diagonal that the largest displacement is drawn as, about.
 LARGEST = 0.06
 
 # Lines that are drawn of a face of the grid in each direction, and points of each line; the table has them all.
 MOST_LINES, MOST_ON_LINE = 41, 201
+
+# Between the plot and its title, in points: the legend stands there and covers nothing.
+TITLE_PAD = 26.0
+
+# Part of the drawing's size below which an edge is too short for its name between its numbers.
+SHORT = 0.25
 
 # Points beyond which they are not marked one by one.
 MOST_MARKS = 60
@@ -81,14 +87,20 @@ def draw_grid(
         drawn = np.concatenate([edges.reshape(-1, 3), moved.reshape(-1, 3)]) @ view.T
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         _axis_names(axes, nominal, view, size)
+        middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
+        for k, corner in enumerate(diagonals.starts @ view.T):
+            x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
+            circle = {"boxstyle": "circle,pad=0.2", "facecolor": PAPER, "edgecolor": MUTED, "linewidth": 0.7}
+            axes.text(x, y, str(k + 1), ha="center", va="center", fontsize=8.5, bbox=circle)
         axes.plot([], [], color=MUTED, linewidth=0.9, label="nominal grid")
         axes.plot([], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor:g} times")
         axes.legend(loc="upper left", borderaxespad=0.8)
-        told = [f"diagonal {k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)]
-        figure.text(0.5, 0.025, "length errors of " + ", ".join(told), ha="center", fontsize=8.5)
-        axes.set_xlim(low[0] - 0.08 * size, high[0] + 0.08 * size)
+        told = [f"{k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)]
+        lengths = f"length errors of the diagonals from the corners {', '.join(told)}"
+        figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
+        axes.set_xlim(low[0] - 0.16 * size, high[0] + 0.12 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
-        save(figure, path, f"Volumetric errors, magnified {factor:g} times: " + ", ".join(told))
+        save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
 
 
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
@@ -121,11 +133,12 @@ def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
         along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
         out = np.array([along[1], -along[0]])
         out = out if out @ (edge.mean(axis=0) - middle) > 0 else -out
-        texts = [(edge.mean(axis=0), f"{'xyz'[axis]}, mm")]
-        texts += [(edge[k] + (0.05 - 0.1 * k) * size * along, f"{1e3 * ends[k][axis]:.6g}") for k in (0, 1)]
-        for at, text in texts:
-            x, y = at + 0.055 * size * out
-            axes.text(x, y, text, ha="center", va="center")
+        # Beside a short edge the name stands outside its numbers.
+        off = 0.02 if np.linalg.norm(edge[1] - edge[0]) > SHORT * size else 0.12
+        texts = [(edge.mean(axis=0) + off * size * out, f"{'xyz'[axis]}, mm")]
+        texts += [(edge[k] + 0.02 * size * out, f"{1e3 * ends[k][axis] + 0.0:.6g}") for k in (0, 1)]
+        for (x, y), text in texts:
+            axes.text(x, y, text, ha="left" if out[0] > 0 else "right", va="center" if axis == 2 else "top")
 
 
 def draw_line(found: VolumetricErrors, path: Path) -> None:
@@ -144,12 +157,13 @@ def draw_line(found: VolumetricErrors, path: Path) -> None:
         name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
         ends = [f"({', '.join(f'{value:.6g}' for value in point)})" for point in (start, end)]
         where = along = f"from {ends[0]} to {ends[1]} mm"
-    with drawing(300.0, WIDTH) as figure:
-        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 300.0 - BELOW - ABOVE)
-        axes.set_title(where, loc="left")
+    with drawing(320.0, WIDTH) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 320.0 - BELOW - ABOVE)
+        axes.set_title(where, loc="left", pad=TITLE_PAD)
         for k, letter in enumerate("XYZ"):
             _band(axes, positions, 1e6 * found.systematic[:, k], 1e6 * found.deviation[:, k], k, letter)
         axes.plot(positions, 1e6 * found.resultant, color=INK, linewidth=1.2, linestyle=DASHES[3], label="resultant")
+        _band_in_legend(axes, bool(found.deviation.any()))
         _finish(axes, f"{name}, mm", "error, µm")
         worst = int(found.resultant.argmax())
         told = f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at {positions[worst]:.6g} mm"
@@ -163,10 +177,10 @@ def draw_along(one: AlongAxis, path: Path) -> None:
     """
     positions = 1e3 * one.positions
     name, unit = one.error.name, micro(SHOWN["rad" if one.error.is_rotation else "m"])
-    with drawing(260.0, WIDTH) as figure:
-        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 260.0 - BELOW - ABOVE)
+    with drawing(280.0, WIDTH) as figure:
+        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
         band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"
-        axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left")
+        axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left", pad=TITLE_PAD)
         values = np.zeros(len(positions)) if one.values is None else 1e6 * one.values
         deviation = np.zeros(len(positions)) if one.deviation is None else 1e6 * one.deviation
         label = "random part alone" if one.values is None else "at the reference point"
@@ -177,8 +191,9 @@ def draw_along(one: AlongAxis, path: Path) -> None:
             x, y = 1e3 * np.array(one.measured.positions), 1e6 * np.array(one.measured.values)
             axes.plot(
                 x, y, color=SERIES[1], linestyle="none", marker=MARKERS[1], markersize=4.0, markerfacecolor=PAPER,
-                label="measured",
+                label="measured", clip_on=False, zorder=3,
             )  # fmt: skip
+        _band_in_legend(axes, bool(deviation.any()))
         _finish(axes, f"{name[2].lower()}, mm", unit)
         save(figure, path, f"{name}, {meaning(name)}{band}")
 
@@ -188,13 +203,20 @@ def _band(axes: Axes, x: Array, values: Array, deviation: Array, k: int, label: 
     marker = MARKERS[k] if mark and len(x) <= MOST_MARKS else ""
     axes.plot(
         x, values, color=SERIES[k], linestyle=DASHES[k], marker=marker, markersize=3.5, markerfacecolor=PAPER,
-        label=label,
+        label=label, clip_on=not marker, zorder=3,
     )  # fmt: skip
     if deviation.any():
-        axes.fill_between(
-            x, values - 2.0 * deviation, values + 2.0 * deviation, color=SERIES[k], alpha=0.15, linewidth=0,
-            label="± 2 standard deviations" if k == 0 else None,
-        )  # fmt: skip
+        low, high = values - 2.0 * deviation, values + 2.0 * deviation
+        axes.fill_between(x, low, high, color=SERIES[k], alpha=0.1, linewidth=0)
+        # Where bands overlap their edges tell whose they are.
+        for edge in (low, high):
+            axes.plot(x, edge, color=SERIES[k], linewidth=0.7, linestyle=DASHES[k])
+
+
+def _band_in_legend(axes: Axes, is_drawn: bool) -> None:
+    """An entry for the bands of all colours."""
+    if is_drawn:
+        axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label="± 2 standard deviations")
 
 
 def _finish(axes: Axes, x: str, y: str) -> None:
@@ -203,4 +225,7 @@ def _finish(axes: Axes, x: str, y: str) -> None:
     axes.margins(x=0.0)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    axes.legend(loc="best", ncols=2)
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.3, borderpad=0.2, columnspacing=1.2,
+        handlelength=2.0, handletextpad=0.5,
+    )  # fmt: skip

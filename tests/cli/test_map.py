@@ -142,7 +142,7 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytes
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--grid", "3,2,2"), "Volumetric errors, magnified"),
+        (("--grid", "3,2,2"), "magnified 1000 times; length errors of the diagonals from the corners 1: 42.9 µm, 2: "),
         (("--line", "y = 600 mm, z = 600 mm"), "Volumetric errors along x at y = 600 mm, z = 600 mm"),
         (("--line", "0 mm, 0 mm, 0 mm to 1 m, 1 m, 0 mm"), "Volumetric errors from (0, 0, 0) to (1000, 1000, 0) mm"),
         (("--error", "EXX"), "EXX, positioning error of X, range 66.00 µm"),
