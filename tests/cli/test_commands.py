@@ -314,8 +314,8 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     text = text.replace("# EZX: {", "EZX: {").replace("# EXY: {", "EXY: {").replace("# droop", "droop")
     path.write_text(text.replace("arrangement: MB2", "arrangement: {probe_side: [x, z], workpiece_side: [y]}"))
     assert run("map", path) == 3
-    (told,) = capsys.readouterr().err.strip().split("\n")
-    assert "only the arm of MH1, MH2 droops" in told
+    (message,) = capsys.readouterr().err.strip().split("\n")
+    assert "only the arm of MH1, MH2 droops" in message
     path.write_text(path.read_text(encoding="utf-8").replace("droop: {", "# {"), encoding="utf-8")
     assert run("map", path) == 0
     assert "table of 3 points at y = 300 mm, z = 400 mm, minimum zone" in capsys.readouterr().out
