@@ -72,11 +72,21 @@ def adjustments(values: Array, spread: Array, null: Array | None = None) -> tupl
 def _scale(axis: str, value: float, against: str = "") -> str:
     if np.isnan(value):
         return "cannot be told"
-    return f"let {axis} read {1e6 * abs(value):.3g} um per m {'more' if value > 0 else 'less'}{against}"
+    return f"let {axis} read {_amount(1e6 * abs(value))} um per m {'more' if value > 0 else 'less'}{against}"
 
 
 def _turn(guideway: str, other: str, lean: float) -> str:
     if np.isnan(lean):
         return "cannot be told"
-    angle = f"{abs(lean) / ARCSECOND:.3g} arcsec ({1e6 * abs(lean):.3g} um per m)"
+    angle = f"{_amount(abs(lean) / ARCSECOND)} arcsec ({_amount(1e6 * abs(lean))} um per m)"
     return f"turn the {guideway} guideway by {angle} towards {'-' if lean > 0 else '+'}{other}"
+
+
+def _amount(value: float) -> str:
+    """Three significant digits without an exponent, thousands apart.
+
+    >>> _amount(50020.0), _amount(12.34), _amount(2.0), _amount(0.000012)
+    ('50 000', '12.3', '2', '0.000012')
+    """
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:,.0f}".replace(",", " ") if rounded >= 1e3 else np.format_float_positional(rounded, trim="-")

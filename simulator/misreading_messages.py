@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .design import Design
+from .estimation.length_ratios import LengthRatio, doubtful_lengths
 from .estimation.misreadings import WrongPosition, WrongReading, find_misreadings
 from .experiment.messages import ExperimentError, Message
 from .experiment.yamltree import Mark
@@ -15,9 +16,10 @@ from .quantities import format_length
 
 
 def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
-    """Refuse readings that cannot be of the ball, or with the probe, that they are said to be of.
+    """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they are said to be of.
 
-    `marks` tell where each of the design's readings stands. The rule is that of `estimation.misreadings`.
+    `marks` tell where each of the design's readings stands. The rules are those of `estimation.misreadings` and
+    `estimation.length_ratios`.
 
     :raises ExperimentError: some readings are wrong; names all of them.
     """
@@ -28,8 +30,27 @@ def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
         if wrong.reading not in told:
             messages.append(_of_reading(design, wrong, marks))
             told |= {wrong.reading, wrong.partner}
+    if not messages:
+        doubtful = doubtful_lengths(design, x)
+        messages = [marks[one.reading].message("", _of_length(design, one)) for one in doubtful if one.is_impossible]
     if messages:
         raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
+
+
+def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
+    """Sentences about standards whose lengths are all off by a factor that machines hardly have."""
+    return tuple(_of_length(design, one) for one in doubtful_lengths(design, x))
+
+
+def _of_length(design: Design, one: LengthRatio) -> str:
+    name, digits = design.artefact_names[one.artefact], 3 if one.is_impossible else 4
+    what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
+    stated = f"the stated {format_length(one.stated)}" if one.is_radius else "the stated ones"
+    passes = "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    return (
+        f"{name}: the read {what} {verb} {one.ratio:.{digits}f} of {stated}; {passes}: correct the "
+        f"{'radius' if one.is_radius else 'length'} in the experiment file, or the unit of the readings"
+    )
 
 
 def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) -> Message:

@@ -1,0 +1,56 @@
+"""What `fit` says of results that look definite and are not: wrong lengths."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from analysis.cli import main
+
+FOLDER = Path("designs/hurt_foss")
+STATED = {"bar-bell": "length: 500 mm", "bryan-gauge": "radius: 300 mm"}
+TOLD = {"bar-bell": "bar: the read lengths are {} of the stated ones", "bryan-gauge": "gauge: the read radius is {} of"}
+
+
+def fit(tmp_path: Path, name: str, factor: float, *options: str) -> int:
+    """Fit shipped readings with a stated length that is wrong by a factor."""
+    what, _, value = STATED[name].partition(": ")
+    text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8").split("variants:")[0]
+    wrong = text.replace(STATED[name], f"{what}: {factor * float(value.removesuffix(' mm'))} mm")
+    (tmp_path / "wrong.yaml").write_text(wrong, encoding="utf-8")
+    return main(["fit", str(tmp_path / "wrong.yaml"), str(FOLDER / f"{name}-readings.csv"), *options])
+
+
+@pytest.mark.parametrize("name", STATED)
+@pytest.mark.parametrize("estimator", ["full", "length-equations"])
+def test_a_length_that_no_machine_explains_is_refused(
+    name: str, estimator: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert fit(tmp_path, name, 1.05, "--estimator", estimator) == 3
+    out, err = capsys.readouterr()
+    assert not out and TOLD[name].format("0.952") in err and "readings.csv:2:1: " in err
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_a_length_that_hardly_any_machine_explains_is_doubted(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert fit(tmp_path, name, 1.003) == 0
+    out, err = capsys.readouterr()
+    assert f"warning: {TOLD[name].partition('{}')[0]}0.997" in err and "correct the " in err
+    assert " um per m more" in out and "e+0" not in out.split("what to do")[1]
+    assert fit(tmp_path, name, 1.0001) == 0
+    assert "stated" not in capsys.readouterr().err
+
+
+def test_one_wrong_reading_is_no_wrong_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with (FOLDER / "bar-bell-readings.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    rows[1][3] = str(float(rows[1][3]) + 5.0)
+    with (tmp_path / "r.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows(rows)
+    main(["fit", str(FOLDER / "bar-bell.yaml"), str(tmp_path / "r.csv"), "--variant", "length known"])
+    out, err = capsys.readouterr()
+    assert "along x" in out.split("largest residuals")[1].splitlines()[1] and "of the stated ones" not in err
