@@ -14,6 +14,9 @@ from simulator.machines.protocol import Array, Unit
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
 
+# Below so many degrees of freedom a standard deviation is uncertain by more than about a quarter (GUM, E.4.3).
+FEW = 10
+
 # Name, axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess over 90 degrees.
 _SQUARENESS = (
     ("C0Y", "X and Y", "Y", "X", -1, 1),
@@ -24,8 +27,9 @@ _SQUARENESS = (
 
 @dataclass(frozen=True)
 class Adjustment:
-    """An error with its standard uncertainty, both NaN where it is open, and what to do about it in words.
+    """An error with its uncertainty, NaN where it is open, and what to do about it in words.
 
+    The expanded uncertainty is of 95 %: Student's factor times the standard uncertainty (GUM, annex G).
     `what` is the scale of an axis, or two axes whose angle differs from 90 degrees by `value`; `unit` is 1 or rad.
     """
 
@@ -33,16 +37,21 @@ class Adjustment:
     what: str
     value: float
     standard_uncertainty: float
+    expanded_uncertainty: float
     unit: Unit
     words: str
 
 
-def adjustments(values: Array, spread: Array, null: Array | None = None) -> tuple[Adjustment, ...]:
+def adjustments(
+    values: Array, spread: Array, null: Array | None = None, degrees_of_freedom: float = np.inf
+) -> tuple[Adjustment, ...]:
     """From scale errors of X, Y and Z and C0Y, B0Z and A0Z (6,), or the latter alone (3,).
 
     `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where scales are open and
-    their differences are not, those of Y and Z against X are told as well.
+    their differences are not, those of Y and Z against X are told as well. `degrees_of_freedom` are those of the
+    scatter that `spread` comes from, infinite where uncertainties are as stated.
     """
+    factor = coverage_factor(degrees_of_freedom)
     null = np.zeros((len(values), 0)) if null is None else null
     rows, found = np.eye(len(values)), []
     size = np.abs(null).max(initial=0.0)
@@ -54,19 +63,43 @@ def adjustments(values: Array, spread: Array, null: Array | None = None) -> tupl
     if len(values) == 6:
         for row, axis in zip(rows[:3], "XYZ", strict=True):
             value, u = told(row)
-            found.append(Adjustment(f"scale {axis.lower()}", f"scale of {axis}", value, u, "1", _scale(axis, value)))
+            found.append(
+                Adjustment(f"scale {axis.lower()}", f"scale of {axis}", value, u, factor * u, "1", _scale(axis, value))
+            )
         alone = [not np.isnan(one.value) for one in found]
         for k, axis in ((1, "Y"), (2, "Z")):
             value, u = told(rows[k] - rows[0])
             if not np.isnan(value) and not (alone[0] and alone[k]):
                 name = f"scale {axis.lower()} - scale x"
                 words = _scale(axis, value, " against X")
-                found.append(Adjustment(name, f"scale of {axis} against X", value, u, "1", words))
+                found.append(Adjustment(name, f"scale of {axis} against X", value, u, factor * u, "1", words))
     for row, (name, axes, guideway, other, sign, excess) in zip(rows[-3:], _SQUARENESS, strict=True):
         value, u = told(row)
         words = _turn(guideway, other, sign * value)
-        found.append(Adjustment(name, f"angle of {axes}", excess * value, u, "rad", words))
+        found.append(Adjustment(name, f"angle of {axes}", excess * value, u, factor * u, "rad", words))
     return tuple(found)
+
+
+def coverage_factor(degrees_of_freedom: float) -> float:
+    """Student's factor for an expanded uncertainty of 95 % (GUM, table G.2), NaN without degrees of freedom.
+
+    >>> [round(coverage_factor(freedom), 2) for freedom in (1, 2, 10, float("inf"))]
+    [12.71, 4.3, 2.23, 1.96]
+    """
+    from scipy.special import ndtri, stdtrit
+
+    if not degrees_of_freedom > 0:
+        return float("nan")
+    return float(ndtri(0.975) if np.isinf(degrees_of_freedom) else stdtrit(degrees_of_freedom, 0.975))
+
+
+def few_degrees_of_freedom(degrees_of_freedom: int, what: str, instead: str) -> str:
+    """A warning where `what` has been estimated from few degrees of freedom, and `instead`; otherwise empty."""
+    if not 0 < degrees_of_freedom < FEW:
+        return ""
+    doubt = 100.0 / np.sqrt(2.0 * degrees_of_freedom)
+    of = "1 degree" if degrees_of_freedom == 1 else f"{degrees_of_freedom} degrees"
+    return f"{what} from {of} of freedom is itself uncertain by {doubt:.0f} %; {instead}"
 
 
 def _scale(axis: str, value: float, against: str = "") -> str:

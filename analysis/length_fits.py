@@ -12,7 +12,7 @@ from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
 from simulator.readings import ObservedReadings
 
-from .adjustments import Adjustment, adjustments
+from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .tables import adjustment_data, adjustment_lines, aligned, number
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
@@ -62,11 +62,14 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
         )
     if not np.isfinite(solution.scatter):
         remarks.append("there are no more equations than unknowns, and hence no uncertainties")
+    instead = "the full estimator with --sigma given takes the uncertainties as stated"
+    doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
+    remarks += [doubt] if doubt else []
     return LengthFit(
         experiment.label,
         experiment.title,
         solution,
-        adjustments(solution.parameters, solution.spread, solution.null),
+        adjustments(solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom),
         tuple((design.position_names[k], tuple(solution.centres[k].tolist())) for k in design.gauge_positions),
         tuple(zip(design.length_names, solution.lengths.tolist(), strict=True)),
         tuple(remarks),
@@ -80,7 +83,8 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     status = "converged" if found.converged else "not converged"
     lines = [
         f"{fit.label}: {fit.title}",
-        f"estimator {found.estimator}: {found.equations} equations, all of the same weight; {rank}",
+        f"estimator {found.estimator}: {found.equations} equations, all of the same weight; {rank}; "
+        f"{found.degrees_of_freedom} degrees of freedom",
         f"{status} after {found.iterations} iterations",
         "",
     ]
@@ -100,6 +104,7 @@ def length_fit_data(fit: LengthFit) -> dict[str, Any]:
         "estimator": found.estimator,
         "status": "converged" if found.converged else "not converged",
         "equations": found.equations,
+        "degrees_of_freedom": found.degrees_of_freedom,
         "rank_deficiency": found.deficiency,
         "factors": dict(zip(FACTORS, found.factors.tolist(), strict=True)),
         "adjustments": adjustment_data(fit.adjustments),

@@ -21,7 +21,7 @@ from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.readings import ObservedReadings
 from simulator.threads import single_threaded
 
-from .adjustments import Adjustment, adjustments
+from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
 from .uncertainty import Quantity, uncertainties
@@ -91,6 +91,15 @@ class Fit:
     @property
     def converged(self) -> bool:
         return self.solution.status == "converged"
+
+    @property
+    def doubt(self) -> str:
+        """What is to be said of sigma where it comes from few degrees of freedom; otherwise empty."""
+        if not self.sigma_is_estimated:
+            return ""
+        return few_degrees_of_freedom(
+            self.degrees_of_freedom, "sigma", "--sigma given takes the uncertainties as stated"
+        )
 
     @property
     def too_large(self) -> bool:
@@ -170,7 +179,7 @@ def fit(
         _estimates(design, layout, solution, spread, scale, monomials),
         _largest(design, solution, observed.x),
         plate_coordinates(experiment, design, solution.state, spread, scale),
-        _adjustments(design, layout, solution, spread, scale),
+        _adjustments(design, layout, solution, spread, scale, freedom if estimated else np.inf),
     )
 
 
@@ -183,11 +192,12 @@ def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Rea
 
 
 def _adjustments(
-    design: Design, layout: SharedLayout, solution: Solution, spread: Covariance, sigma: float
+    design: Design, layout: SharedLayout, solution: Solution, spread: Covariance, sigma: float, freedom: float
 ) -> tuple[Adjustment, ...]:
     if not isinstance(design.model, SpatialMetricModel):
         return ()
-    return adjustments(solution.state.a, sigma * spread.shared[layout.model], spread.shared_null[layout.model])
+    of_model = layout.model
+    return adjustments(solution.state.a, sigma * spread.shared[of_model], spread.shared_null[of_model], freedom)
 
 
 def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:

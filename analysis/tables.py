@@ -183,13 +183,15 @@ def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_B
 
 def adjustment_lines(found: Sequence[Adjustment]) -> list[str]:
     """Adjustments as a table of text."""
-    rows = [["adjustment", "is off by", "standard uncertainty", "unit", "what to do"]]
+    rows = [["adjustment", "is off by", "standard uncertainty", "expanded, 95 %", "unit", "what to do"]]
     for one in found:
         shown = ARCSECOND if one.unit == "rad" else 1e-6
-        value, u = (number(v / shown) for v in (one.value, one.standard_uncertainty))
-        rows.append([one.what, value, u, "arcsec" if one.unit == "rad" else "um/m", one.words])
+        value, u, expanded = (
+            number(v / shown) for v in (one.value, one.standard_uncertainty, one.expanded_uncertainty)
+        )
+        rows.append([one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "um/m", one.words])
     return [
-        *aligned(rows, [False, True, True, False, False]),
+        *aligned(rows, [False, True, True, True, False, False]),
         "(a scale is off by what readings lack of the true length; an angle by what it exceeds 90 deg)",
     ]
 
@@ -201,6 +203,7 @@ def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
             "what": one.what,
             "value": _finite(one.value),
             "standard_uncertainty": _finite(one.standard_uncertainty),
+            "expanded_uncertainty": _finite(one.expanded_uncertainty),
             "unit": one.unit,
             "words": one.words,
         }

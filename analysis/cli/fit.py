@@ -121,6 +121,8 @@ def run(options: Namespace) -> int:
             "or state larger uncertainties, or a richer error model",
             file=sys.stderr,
         )
+    if result.doubt:
+        print(f"warning: {result.doubt}", file=sys.stderr)
     if not result.verdict.as_expected:
         expected = result.verdict.expected or 0
         print(f"rank deficiency {result.verdict.deficiency} where the file expects {expected}", file=sys.stderr)

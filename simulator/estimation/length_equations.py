@@ -66,6 +66,7 @@ class LengthSolution:
     lengths: Array
     scatter: float
     equations: int
+    degrees_of_freedom: int
     iterations: int
     converged: bool
 
@@ -121,6 +122,7 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
         lengths,
         scatter,
         len(residual),
+        freedom,
         iterations,
         converged,
     )

@@ -1,11 +1,13 @@
-"""What `fit` says of results that look definite and are not: wrong lengths."""
+"""What `fit` says of results that look definite and are not: wrong lengths, few degrees of freedom."""
 
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import pytest
+from scipy.stats import t
 
 from analysis.cli import main
 
@@ -54,3 +56,27 @@ def test_one_wrong_reading_is_no_wrong_length(tmp_path: Path, capsys: pytest.Cap
     main(["fit", str(FOLDER / "bar-bell.yaml"), str(tmp_path / "r.csv"), "--variant", "length known"])
     out, err = capsys.readouterr()
     assert "along x" in out.split("largest residuals")[1].splitlines()[1] and "of the stated ones" not in err
+
+
+@pytest.mark.parametrize("estimator", ["full", "length-equations"])
+def test_few_degrees_of_freedom_are_told_and_widen(estimator: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["fit", str(FOLDER / "bar-bell.yaml"), str(FOLDER / "bar-bell-readings.csv")]
+    arguments += ["--variant", "length known", "--estimator", estimator, "--json"]
+    assert main(arguments) == 0
+    out, err = capsys.readouterr()
+    assert "from 6 degrees of freedom is itself uncertain by 29 %; " in err and "--sigma given" in err
+    for one in json.loads(out)[0]["adjustments"].values():
+        assert one["expanded_uncertainty"] == pytest.approx(t.ppf(0.975, 6) * one["standard_uncertainty"])
+
+
+def test_stated_uncertainties_and_many_degrees_of_freedom_raise_no_doubt(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["fit", str(FOLDER / "bar-bell.yaml"), str(FOLDER / "bar-bell-readings.csv"), "--json"]
+    assert main([*arguments, "--variant", "length known", "--sigma", "given"]) == 0
+    out, err = capsys.readouterr()
+    assert "degrees of freedom" not in err
+    for one in json.loads(out)[0]["adjustments"].values():
+        assert one["expanded_uncertainty"] == pytest.approx(1.959964 * one["standard_uncertainty"])
+    gauge = ["fit", str(FOLDER / "bryan-gauge.yaml"), str(FOLDER / "bryan-gauge-readings.csv")]
+    assert main([*gauge, "--variant", "radius known"]) == 0
+    out, err = capsys.readouterr()
+    assert "degrees of freedom" not in err and "expanded, 95 %" in out
