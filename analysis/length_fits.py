@@ -13,15 +13,16 @@ from simulator.experiment.model import Experiment
 from simulator.readings import ObservedReadings
 
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
-from .tables import adjustment_data, adjustment_lines, aligned, number
+from .tables import adjustment_data, adjustment_lines, aligned, finite, number
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 
 
 @dataclass(frozen=True)
 class LengthFit:
-    """Length equations solved for an experiment's readings; `pivots` are the names of the gauges' positions.
+    """Length equations solved for an experiment's readings; `pivots` have the names of the gauges' positions.
 
+    `factors`, `pivots` and `lengths` are NaN where they are open.
     `remarks` tell what should be known beside the figures.
     """
 
@@ -29,6 +30,7 @@ class LengthFit:
     title: str
     solution: LengthSolution
     adjustments: tuple[Adjustment, ...]
+    factors: tuple[float, ...]
     pivots: tuple[tuple[str, tuple[float, float, float]], ...]
     lengths: tuple[tuple[str, float], ...]
     remarks: tuple[str, ...]
@@ -65,13 +67,17 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
     instead = "the full estimator with --sigma given takes the uncertainties as stated"
     doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
     remarks += [doubt] if doubt else []
+    factors = np.where(solution.open_factors, np.nan, solution.factors)
+    centres = np.where(solution.open_centres, np.nan, solution.centres)
+    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
     return LengthFit(
         experiment.label,
         experiment.title,
         solution,
         adjustments(solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom),
-        tuple((design.position_names[k], tuple(solution.centres[k].tolist())) for k in design.gauge_positions),
-        tuple(zip(design.length_names, solution.lengths.tolist(), strict=True)),
+        tuple(factors.tolist()),
+        tuple((design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions),
+        tuple(zip(design.length_names, lengths.tolist(), strict=True)),
         tuple(remarks),
     )
 
@@ -88,15 +94,19 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
         f"{status} after {found.iterations} iterations",
         "",
     ]
-    rows = [["factor of the metric", *FACTORS], ["1e-6", *(number(1e6 * value) for value in found.factors)]]
+    rows = [["factor of the metric", *FACTORS], ["1e-6", *(number(1e6 * value) for value in fit.factors)]]
     lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(fit.adjustments)]
-    where = [f"{name} ({', '.join(f'{1e3 * c:.4f}' for c in centre)}) mm" for name, centre in fit.pivots]
+    where = [f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm" for name, centre in fit.pivots]
     lines += [f"pivots: {'; '.join(where)}"] if where else []
-    return lines + [f"{name}: {1e3 * value:.5f} mm" for name, value in fit.lengths]
+    return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
+
+
+def _millimetres(value: float, decimals: int) -> str:
+    return "-" if np.isnan(value) else f"{1e3 * value:.{decimals}f}"
 
 
 def length_fit_data(fit: LengthFit) -> dict[str, Any]:
-    """Solved length equations as plain data in metres and radians."""
+    """Solved length equations as plain data in metres and radians; what is open is None."""
     found = fit.solution
     return {
         "experiment": fit.label,
@@ -106,9 +116,9 @@ def length_fit_data(fit: LengthFit) -> dict[str, Any]:
         "equations": found.equations,
         "degrees_of_freedom": found.degrees_of_freedom,
         "rank_deficiency": found.deficiency,
-        "factors": dict(zip(FACTORS, found.factors.tolist(), strict=True)),
+        "factors": {name: finite(value) for name, value in zip(FACTORS, fit.factors, strict=True)},
         "adjustments": adjustment_data(fit.adjustments),
-        "pivots": {name: list(centre) for name, centre in fit.pivots},
-        "lengths": dict(fit.lengths),
+        "pivots": {name: [finite(value) for value in centre] for name, centre in fit.pivots},
+        "lengths": {name: finite(value) for name, value in fit.lengths},
         "remarks": list(fit.remarks),
     }

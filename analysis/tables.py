@@ -201,9 +201,9 @@ def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
     return {
         one.name: {
             "what": one.what,
-            "value": _finite(one.value),
-            "standard_uncertainty": _finite(one.standard_uncertainty),
-            "expanded_uncertainty": _finite(one.expanded_uncertainty),
+            "value": finite(one.value),
+            "standard_uncertainty": finite(one.standard_uncertainty),
+            "expanded_uncertainty": finite(one.expanded_uncertainty),
             "unit": one.unit,
             "words": one.words,
         }
@@ -243,9 +243,9 @@ def fit_data(fit: Fit) -> dict[str, Any]:
         "sigma_is_estimated": fit.sigma_is_estimated,
         "degrees_of_freedom": fit.degrees_of_freedom,
         "too_large": fit.too_large,
-        "sum_of_squares": _finite(fit.solution.factor.sum_of_squares),
+        "sum_of_squares": finite(fit.solution.factor.sum_of_squares),
         "iterations": [
-            {"step": _finite(it.step), "sum_of_squares": _finite(it.sum_of_squares)} for it in fit.solution.iterations
+            {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)} for it in fit.solution.iterations
         ],
         "quantities": _quantities_data(fit.quantities),
         "largest_residuals": [
@@ -262,8 +262,8 @@ def fit_data(fit: Fit) -> dict[str, Any]:
         ],
         "estimates": {
             e.name: {
-                "value": _finite(e.value),
-                "standard_uncertainty": _finite(e.standard_uncertainty),
+                "value": finite(e.value),
+                "standard_uncertainty": finite(e.standard_uncertainty),
                 "unit": e.unit,
             }
             for e in fit.estimates
@@ -280,7 +280,7 @@ def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
         "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
         "balls": {
             name: {
-                axis: {"value": _finite(value), "standard_uncertainty": _finite(uncertainty), "unit": "m"}
+                axis: {"value": finite(value), "standard_uncertainty": finite(uncertainty), "unit": "m"}
                 for axis, value, uncertainty in zip("xy", values, uncertainties, strict=True)
             }
             for name, values, uncertainties in zip(
@@ -290,15 +290,16 @@ def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
     }
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """A value as JSON can have it; None for what is undetermined."""
     return value if math.isfinite(value) else None
 
 
 def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
     return {
         symbol: {
-            "maximum": _finite(q.maximum),
-            "average": _finite(q.average),
+            "maximum": finite(q.maximum),
+            "average": finite(q.average),
             "unit": q.unit,
             "count": q.count,
             "undetermined": q.undetermined,
@@ -318,7 +319,7 @@ def _verdict_data(judged: Verdict) -> dict[str, Any]:
         "expected_rank_deficiency": judged.expected,
         "as_expected": judged.as_expected,
         "singular_values": [float(v) for v in judged.singular_values],
-        "gap": _finite(judged.gap),
+        "gap": finite(judged.gap),
         "undetermined": [str(direction) for direction in judged.null],
         "reasons": list(judged.reasons),
         "weakly_determined": [

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..design import Design
 from ..machines.protocol import Array
@@ -52,7 +53,8 @@ class LengthSolution:
     A0Z that they amount to, `spread` (6, r) a square root of the covariance of the latter as the scatter about the
     equations has it, the same for all, NaN without redundancy. `deficiency` and `null` (6, deficiency) tell what of the
     parameters the equations for everything together leave open. `centres` (positions, 3) has NaN where there is no
-    gauge; `lengths` are those that were unknown. `scatter` is the root of the sum of squares over the degrees of
+    gauge; `lengths` are those that were unknown. Of factors, centres and lengths, `open_factors`, `open_centres` and
+    `open_lengths` say which have a value only because what is open is held. `scatter` is the root of the sum of squares over the degrees of
     freedom, in square metres.
     """
 
@@ -64,6 +66,9 @@ class LengthSolution:
     deficiency: int
     centres: Array
     lengths: Array
+    open_factors: NDArray[np.bool_]
+    open_centres: NDArray[np.bool_]
+    open_lengths: NDArray[np.bool_]
     scatter: float
     equations: int
     degrees_of_freedom: int
@@ -110,6 +115,10 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
     except ValueError as error:
         raise NotAMetricError(str(error)) from None
     by_factor = _by_factor()
+    is_open = (np.abs(held) > 1e-7 * np.abs(held).max(initial=0.0)).any(axis=1)
+    end = 6 + 3 * len(found.pivots)
+    open_centres = np.zeros(design.origins.shape, bool)
+    open_centres[found.pivots] = is_open[6:end].reshape(-1, 3)
     spread = scatter * by_factor @ root[:6] if freedom > 0 else np.full((6, 1), np.nan)
     return LengthSolution(
         estimator,
@@ -120,6 +129,9 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
         held.shape[1],
         _centres(design, found),
         lengths,
+        is_open[:6],
+        open_centres,
+        is_open[end:],
         scatter,
         len(residual),
         freedom,

@@ -87,6 +87,17 @@ def test_an_unknown_radius_leaves_ratios_of_scales(estimator: str, capsys: pytes
     assert ratio == pytest.approx(known["scale y"]["value"] - known["scale x"]["value"], abs=2e-8)
 
 
+def test_what_is_open_has_no_value_in_length_equations(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("fit", *UNKNOWN, "--estimator", "length-equations")
+    found = json_of(capsys, *arguments)
+    assert [name for name, value in found["factors"].items() if value is None] == ["e1", "e4", "e6"]
+    assert found["lengths"] == {"gauge: radius": None} and None not in found["pivots"]["pivot"]
+    assert main([*arguments]) == 0
+    assert "gauge: radius: - mm" in capsys.readouterr().out
+    known = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")
+    assert None not in known["factors"].values()
+
+
 def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (
         Path(GAUGE)
