@@ -93,13 +93,17 @@ def coverage_factor(degrees_of_freedom: float) -> float:
     return float(ndtri(0.975) if np.isinf(degrees_of_freedom) else stdtrit(degrees_of_freedom, 0.975))
 
 
+def freedom_words(degrees_of_freedom: int) -> str:
+    """The number of degrees of freedom in words."""
+    return f"{degrees_of_freedom} degree{'' if degrees_of_freedom == 1 else 's'} of freedom"
+
+
 def few_degrees_of_freedom(degrees_of_freedom: int, what: str, instead: str) -> str:
     """A warning where `what` has been estimated from few degrees of freedom, and `instead`; otherwise empty."""
     if not 0 < degrees_of_freedom < FEW:
         return ""
     doubt = 100.0 / np.sqrt(2.0 * degrees_of_freedom)
-    of = "1 degree" if degrees_of_freedom == 1 else f"{degrees_of_freedom} degrees"
-    return f"{what} from {of} of freedom is itself uncertain by {doubt:.0f} %; {instead}"
+    return f"{what} from {freedom_words(degrees_of_freedom)} is itself uncertain by {doubt:.0f} %; {instead}"
 
 
 def _scale(axis: str, value: float, against: str = "") -> str:

@@ -12,7 +12,7 @@ from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
 from simulator.readings import ObservedReadings
 
-from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
+from .adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
 from .tables import adjustment_data, adjustment_lines, aligned, finite, number
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
@@ -90,7 +90,7 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     lines = [
         f"{fit.label}: {fit.title}",
         f"estimator {found.estimator}: {found.equations} equations, all of the same weight; {rank}; "
-        f"{found.degrees_of_freedom} degrees of freedom",
+        f"{freedom_words(found.degrees_of_freedom)}",
         f"{status} after {found.iterations} iterations",
         "",
     ]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from .adjustments import ARCSECOND, Adjustment
+from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates
 from .rank import Verdict
 from .study import Fit, Plan
@@ -139,7 +139,7 @@ def fit_lines(fit: Fit) -> list[str]:
     how = "estimated from the residuals" if fit.sigma_is_estimated else "as given"
     summary = f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
     if fit.converged:
-        summary += f" with {fit.degrees_of_freedom} degrees of freedom; sigma = {fit.sigma:.4g} times the stated "
+        summary += f" with {freedom_words(fit.degrees_of_freedom)}; sigma = {fit.sigma:.4g} times the stated "
         summary += f"uncertainties ({how})"
     rows = [["iteration", "step", "S^2"]]
     rows += [[str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]

@@ -49,13 +49,13 @@ class NotAMetricError(ValueError):
 class LengthSolution:
     """What the length equations give.
 
-    `factors` (6,) are e1 to e6, `parameters` (6,) the scale errors of X, Y and Z and the squareness errors C0Y, B0Z and
-    A0Z that they amount to, `spread` (6, r) a square root of the covariance of the latter as the scatter about the
-    equations has it, the same for all, NaN without redundancy. `deficiency` and `null` (6, deficiency) tell what of the
-    parameters the equations for everything together leave open. `centres` (positions, 3) has NaN where there is no
-    gauge; `lengths` are those that were unknown. Of factors, centres and lengths, `open_factors`, `open_centres` and
-    `open_lengths` say which have a value only because what is open is held. `scatter` is the root of the sum of squares over the degrees of
-    freedom, in square metres.
+    `factors` (6,) are e1 to e6, `parameters` (6,) the scale errors of X, Y and Z and the squareness errors C0Y, B0Z
+    and A0Z that they amount to, `spread` (6, r) a square root of the covariance of the latter as the scatter about
+    the equations has it, the same for all, NaN without redundancy. `deficiency` and `null` (6, deficiency) tell
+    what of the parameters the equations for everything together leave open. `centres` (positions, 3) has NaN where
+    there is no gauge; `lengths` are those that were unknown. Of factors, centres and lengths, `open_factors`,
+    `open_centres` and `open_lengths` say which have a value only because what is open is held. `scatter` is the
+    root of the sum of squares over the degrees of freedom, in square metres.
     """
 
     estimator: LengthEstimator
@@ -144,16 +144,20 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
 class _Equations:
     """Rows: the difference of both ends or, of a gauge, the place read (m, 3); pivot, or -1, and length of each.
 
-    `known` (m,) are lengths in metres, `free` (m,) numbers of unknown ones, -1 where the length is known.
+    `direction` (m, 3) is the design's. `known` (m,) are lengths in metres, `free` (m,) numbers of unknown ones,
+    -1 where the length is known.
     """
 
     place: Array
+    direction: Array
     pivot: np.ndarray
     known: Array
     free: np.ndarray
 
     def select(self, chosen: np.ndarray) -> _Equations:
-        return _Equations(self.place[chosen], self.pivot[chosen], self.known[chosen], self.free[chosen])
+        return _Equations(
+            self.place[chosen], self.direction[chosen], self.pivot[chosen], self.known[chosen], self.free[chosen]
+        )
 
     @property
     def all_free(self) -> bool:
@@ -177,7 +181,7 @@ def _equations(design: Design, x: Array) -> _Equations:
     number = np.full(len(design.position_names), -1)
     number[design.gauge_positions] = np.arange(len(design.gauge_positions))
     free = np.full(len(given), -1) if given.free is None else given.free
-    return _Equations(place, np.where(given.to_pivot, number[position], -1), given.value, free)
+    return _Equations(place, given.direction, np.where(given.to_pivot, number[position], -1), given.value, free)
 
 
 def _start(design: Design, x: Array) -> _Unknowns:
@@ -232,11 +236,11 @@ def _derivative(equations: _Equations, at: _Unknowns, difference: Array, pulled:
 def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
     """Orthonormal directions (n, k), in micrometres and parts per million, that the equations leave open.
 
-    They are those of a machine without errors that reads without noise in the same directions. What else equations seem
-    to tell of them leads astray: where no length is known, all of them hold if all lengths are zero.
+    They are those of a machine without errors that reads without noise in the design's directions. What else equations
+    seem to tell of them leads astray: where no length is known, all of them hold if all lengths are zero.
     """
-    difference, length = _differences(equations, at)
-    exact = difference * (length / np.sqrt((difference**2).sum(axis=1)))[:, None]
+    _, length = _differences(equations, at)
+    exact = equations.direction * length[:, None]
     rows = _derivative(equations, at, exact, exact, length) * MICROMETRE
     _, values, vh = np.linalg.svd(np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows)
     return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)

@@ -6,8 +6,9 @@ import numpy as np
 
 from ..machines.protocol import Array
 
-# Directions of the centre that points show by less than this fraction of what they show best are left alone.
-FLAT = 1e-6
+# Directions of the centre that points show by less than this fraction of what they show best are left alone: a
+# machine's errors and noise bend a plane by less.
+FLAT = 1e-3
 
 
 def fit_sphere(points: Array, near: Array) -> tuple[Array, float]:

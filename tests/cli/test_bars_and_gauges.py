@@ -98,6 +98,31 @@ def test_what_is_open_has_no_value_in_length_equations(capsys: pytest.CaptureFix
     assert None not in known["factors"].values()
 
 
+OPEN = [(BARS, name) for name in ("length unknown", "flat", "one axis", "axes only")]
+OPEN += [(GAUGE, name) for name in ("radius unknown", "one height", "one plane")]
+
+
+@pytest.mark.parametrize(("path", "variant"), OPEN)
+def test_readings_tell_nothing_of_what_the_design_leaves_open(
+    path: str, variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Noise and errors make bars and places of a gauge differ a little from the directions of the design."""
+    readings = str(tmp_path / "r.csv")
+    assert main(["simulate", path, "--variant", variant, "-o", readings]) == 0
+    (design,) = [one for one in load(Path(path)) if one.name == variant]
+    capsys.readouterr()
+    full, equations = (
+        json_of(capsys, "fit", path, readings, "--variant", variant, "--estimator", name)
+        for name in ("full", "length-equations")
+    )
+    assert full["rank_deficiency"] == equations["rank_deficiency"] == design.expected_rank_deficiency
+    for name, one in full["adjustments"].items():
+        other = equations["adjustments"][name]["value"]
+        assert (one["value"] is None) == (other is None)
+        if other is not None:
+            assert other == pytest.approx(one["value"], abs=5e-8)
+
+
 def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (
         Path(GAUGE)
