@@ -17,11 +17,11 @@ ARCSECOND = np.pi / (180.0 * 3600.0)
 # Below so many degrees of freedom a standard deviation is uncertain by more than about a quarter (GUM, E.4.3).
 FEW = 10
 
-# Name, axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess over 90 degrees.
+# Axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess over 90 degrees.
 _SQUARENESS = (
-    ("C0Y", "X and Y", "Y", "X", -1, 1),
-    ("B0Z", "X and Z", "Z", "X", 1, -1),
-    ("A0Z", "Y and Z", "Z", "Y", -1, 1),
+    ("X and Y", "Y", "X", -1, 1),  # C0Y
+    ("X and Z", "Z", "X", 1, -1),  # B0Z
+    ("Y and Z", "Z", "Y", -1, 1),  # A0Z
 )
 
 
@@ -73,9 +73,10 @@ def adjustments(
                 name = f"scale {axis.lower()} - scale x"
                 words = _scale(axis, value, " against X")
                 found.append(Adjustment(name, f"scale of {axis} against X", value, u, factor * u, "1", words))
-    for row, (name, axes, guideway, other, sign, excess) in zip(rows[-3:], _SQUARENESS, strict=True):
+    for row, (axes, guideway, other, sign, excess) in zip(rows[-3:], _SQUARENESS, strict=True):
         value, u = told(row)
         words = _turn(guideway, other, sign * value)
+        name = f"angle {other}{guideway}".lower()
         found.append(Adjustment(name, f"angle of {axes}", excess * value, u, factor * u, "rad", words))
     return tuple(found)
 

@@ -43,12 +43,14 @@ def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
 
 
 def _of_length(design: Design, one: LengthRatio) -> str:
-    name, digits = design.artefact_names[one.artefact], 3 if one.is_impossible else 4
+    name = design.artefact_names[one.artefact]
     what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
-    stated = f"the stated {format_length(one.stated)}" if one.is_radius else "the stated ones"
-    passes = "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    word = "stated" if one.is_known else "drawn"
+    stated = f"the {word} {format_length(one.stated)}" if one.is_radius else f"the {word} ones"
+    why = "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    ratio = f"{one.ratio:.3g}" if one.is_impossible else f"{one.ratio:.4f}"
     return (
-        f"{name}: the read {what} {verb} {one.ratio:.{digits}f} of {stated}; {passes}: correct the "
+        f"{name}: the read {what} {verb} {ratio} of {stated}{f'; {why}' if one.is_known else ''}: correct the "
         f"{'radius' if one.is_radius else 'length'} in the experiment file, or the unit of the readings"
     )
 

@@ -255,9 +255,11 @@ def _with_radii(
 ) -> Lengths:
     """Lengths with those of the readings `carried` of Bryan gauges added, which stand from `start` on.
 
-    Their directions are those of the readings about the centre of a sphere; the planned ones if all of a position are
-    met, so that noise and a machine's errors do not seem to tell what the plan leaves open.
+    Their directions are those of the readings about the centre of a sphere; the nearest planned ones, whatever their
+    names, if all of a position are met, so that noise and errors do not seem to tell what the plan leaves open.
     """
+    from scipy.spatial import cKDTree
+
     given = design.lengths
     planned = np.flatnonzero(given.to_pivot)
     # Of the same gauge all are alike.
@@ -267,16 +269,14 @@ def _with_radii(
     like = planned[first[np.searchsorted(gauges, own)]]
     seen = x[carried] + design.probes[readings.probe[carried]]
     direction = np.empty_like(seen)
-    of_key = dict(zip([_key(design.readings)[i] for i in given.first[planned]], given.direction[planned], strict=True))
     for k in np.unique(readings.position[carried]):
         rows = readings.position[carried] == k
         away = seen[rows] - fit_sphere(seen[rows], design.origins[k])[0]
         direction[rows] = away / np.sqrt((away**2).sum(axis=1))[:, None]
-        drawn = [of_key.get(key) for key in _key(readings.select(carried[rows]))]
-        if all(one is not None for one in drawn):
-            as_drawn = np.array(drawn)
-            if np.abs(as_drawn - direction[rows]).max() < AS_PLANNED:
-                direction[rows] = as_drawn
+        drawn = given.direction[planned[of_gauge == own[rows][0]]]
+        nearest = drawn[cKDTree(drawn).query(direction[rows])[1]]
+        if np.abs(nearest - direction[rows]).max() < AS_PLANNED:
+            direction[rows] = nearest
     added = replace(given.select(like), first=start + np.arange(len(carried)), direction=direction)
     both: dict[str, Any] = {
         name: None if values is None else np.concatenate([values, getattr(added, name)])

@@ -13,8 +13,9 @@ from ..design import Design
 from ..machines.protocol import Array
 from .spheres import FLAT, fit_sphere
 
-# Departures of the factor from one that are doubtful, and that no machine has.
+# Departures of the factor from one that are doubtful, and that no machine has; a length that is only drawn may be off.
 DOUBTFUL, IMPOSSIBLE = 1e-3, 1e-2
+OFF_DRAWING = 0.3
 
 # Half of the lengths agree with the factor to within this share of its departure from one.
 AGREEMENT = 0.25
@@ -22,29 +23,37 @@ AGREEMENT = 0.25
 
 @dataclass(frozen=True)
 class LengthRatio:
-    """Read lengths of an artefact over stated ones, the same `ratio` for all; the first has been read in `reading`."""
+    """Read lengths of an artefact over stated ones, the same `ratio` for all; the first has been read in `reading`.
+
+    Lengths that are not known have been drawn.
+    """
 
     artefact: int
     ratio: float
     stated: float
     reading: int
     is_radius: bool
+    is_known: bool
 
     @property
     def is_impossible(self) -> bool:
         """Whether no machine has such a scale error."""
-        return abs(self.ratio - 1.0) > IMPOSSIBLE
+        return abs(self.ratio - 1.0) > (IMPOSSIBLE if self.is_known else OFF_DRAWING)
 
 
 def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
-    """Artefacts whose stated lengths are off by a common factor of more than 0.1 %, from readings x (readings, d)."""
+    """Artefacts whose stated lengths are off by a common factor of more than 0.1 %, from readings x (readings, d).
+
+    Of unknown lengths the drawn ones, if they are off by more than 30 %.
+    """
     given, readings = design.lengths, design.readings
     known = np.ones(len(given), bool) if given.free is None else given.free < 0
     seen = x + design.probes[readings.probe]
     artefact = design.ball_artefact[readings.ball[given.first]]
     found = []
-    for one in np.unique(artefact[known]):
-        mine = np.flatnonzero(known & (artefact == one))
+    for one in np.unique(artefact):
+        mine = np.flatnonzero(artefact == one)
+        is_known = bool(known[mine[0]])
         is_radius = bool(given.to_pivot[mine[0]])
         if is_radius:
             ratios = _of_radii(design, seen, mine)
@@ -57,9 +66,10 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
             continue
         ratio = float(np.median(ratios))
         agree = float(np.median(np.abs(ratios - ratio))) < AGREEMENT * abs(ratio - 1.0)
-        if abs(ratio - 1.0) > DOUBTFUL and agree:
+        if abs(ratio - 1.0) > (DOUBTFUL if is_known else OFF_DRAWING) and agree:
             first = mine[0]
-            found.append(LengthRatio(int(one), ratio, float(given.value[first]), int(given.first[first]), is_radius))
+            stated, reading = float(given.value[first]), int(given.first[first])
+            found.append(LengthRatio(int(one), ratio, stated, reading, is_radius, is_known))
     return tuple(found)
 
 

@@ -46,10 +46,11 @@ def test_the_two_fits_of_bars_are_one(capsys: pytest.CaptureFixture[str]) -> Non
         # The same to the second order of the errors: squares of lengths, and lengths.
         assert adjustment["value"] == pytest.approx(full["adjustments"][name]["value"], abs=2e-8)
         assert adjustment["words"] == full["adjustments"][name]["words"]
-    excess = {"C0Y": 1, "B0Z": -1, "A0Z": 1}
+    excess = {"angle xy": ("C0Y", 1), "angle xz": ("B0Z", -1), "angle yz": ("A0Z", 1)}
     for name in ("scale x", "scale y", "scale z", *excess):
-        estimate = full["estimates"][name]
-        assert full["adjustments"][name]["value"] == excess.get(name, 1) * estimate["value"]
+        error, sign = excess.get(name, (name, 1))
+        estimate = full["estimates"][error]
+        assert full["adjustments"][name]["value"] == sign * estimate["value"]
         assert full["adjustments"][name]["standard_uncertainty"] == pytest.approx(estimate["standard_uncertainty"])
 
 
@@ -71,8 +72,8 @@ def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFix
     assert "warning: the pivot is the centre of a sphere, as if the machine were right" in err
     two = json.loads(out)["adjustments"]
     joint = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")["adjustments"]
-    assert abs(two["A0Z"]["value"]) < 0.4 * abs(joint["A0Z"]["value"])
-    assert two["C0Y"]["value"] == pytest.approx(joint["C0Y"]["value"], abs=1e-8)
+    assert abs(two["angle yz"]["value"]) < 0.4 * abs(joint["angle yz"]["value"])
+    assert two["angle xy"]["value"] == pytest.approx(joint["angle xy"]["value"], abs=1e-8)
 
 
 @pytest.mark.parametrize("estimator", ["full", "length-equations", "sphere-then-metric"])
@@ -99,7 +100,14 @@ def test_what_is_open_has_no_value_in_length_equations(capsys: pytest.CaptureFix
 
 
 OPEN = [(BARS, name) for name in ("length unknown", "flat", "one axis", "axes only")]
-OPEN += [(GAUGE, name) for name in ("radius unknown", "one height", "one plane")]
+OPEN += [(GAUGE, name) for name in ("radius unknown", "one height", "one plane", "two heights")]
+TRUE = {"scale x": 20, "scale y": -30, "scale z": 15, "angle xy": 60, "angle xz": 40, "angle yz": 80}
+TRUE |= {"scale y - scale x": -50, "scale z - scale x": -5}
+TWO_HEIGHTS = """
+  two heights:
+    artefacts.gauge.directions: {azimuths: 36, elevations: [30 deg, 60 deg]}
+    expected_rank_deficiency: 1
+"""
 
 
 @pytest.mark.parametrize(("path", "variant"), OPEN)
@@ -107,20 +115,22 @@ def test_readings_tell_nothing_of_what_the_design_leaves_open(
     path: str, variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Noise and errors make bars and places of a gauge differ a little from the directions of the design."""
+    text = Path(path).read_text(encoding="utf-8") + (TWO_HEIGHTS if path == GAUGE else "")
+    (tmp_path / "e.yaml").write_text(text, encoding="utf-8")
+    arguments = [str(tmp_path / "e.yaml"), "--variant", variant]
     readings = str(tmp_path / "r.csv")
-    assert main(["simulate", path, "--variant", variant, "-o", readings]) == 0
-    (design,) = [one for one in load(Path(path)) if one.name == variant]
+    assert main(["simulate", *arguments, "-o", readings]) == 0
+    (design,) = [one for one in load(tmp_path / "e.yaml") if one.name == variant]
     capsys.readouterr()
-    full, equations = (
-        json_of(capsys, "fit", path, readings, "--variant", variant, "--estimator", name)
-        for name in ("full", "length-equations")
-    )
+    full = json_of(capsys, "fit", arguments[0], readings, *arguments[1:], "--sigma", "given")
+    equations = json_of(capsys, "fit", arguments[0], readings, *arguments[1:], "--estimator", "length-equations")
     assert full["rank_deficiency"] == equations["rank_deficiency"] == design.expected_rank_deficiency
     for name, one in full["adjustments"].items():
         other = equations["adjustments"][name]["value"]
         assert (one["value"] is None) == (other is None)
         if other is not None:
             assert other == pytest.approx(one["value"], abs=5e-8)
+            assert abs(one["value"] - 1e-6 * TRUE[name]) < 4.0 * one["standard_uncertainty"]
 
 
 def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -47,6 +47,17 @@ def test_a_length_that_hardly_any_machine_explains_is_doubted(
     assert "of the stated" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("variant", ["radius known", "radius unknown"])
+def test_readings_of_a_gauge_in_another_unit_are_refused(
+    variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (FOLDER / "bryan-gauge-readings.csv").read_text(encoding="utf-8")
+    (tmp_path / "r.csv").write_text(text.replace("_mm", "_um"), encoding="utf-8")
+    assert main(["fit", str(FOLDER / "bryan-gauge.yaml"), str(tmp_path / "r.csv"), "--variant", variant]) == 3
+    known = "stated 300 mm; no machine has such a scale error" if variant == "radius known" else "drawn 300 mm"
+    assert f"gauge: the read radius is 0.001 of the {known}: correct the radius in" in capsys.readouterr().err
+
+
 def test_one_wrong_reading_is_no_wrong_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (FOLDER / "bar-bell-readings.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))

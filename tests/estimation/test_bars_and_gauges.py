@@ -162,10 +162,10 @@ def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
     assert np.isnan(left["scale x"].value) and left["scale x"].words == "cannot be told"
     right = {e.name: e for e in found[1].estimates}
     assert right["scale x"].standard_uncertainty == pytest.approx(20e-6 / 0.3, rel=1e-2)
-    for name in ("C0Y", "B0Z", "A0Z"):
+    for name, angle in (("C0Y", "angle xy"), ("B0Z", "angle xz"), ("A0Z", "angle yz")):
         excess = -1.0 if name == "B0Z" else 1.0
-        assert excess * left[name].value == pytest.approx(right[name].value, abs=1e-9)
-        assert left[name].standard_uncertainty == pytest.approx(right[name].standard_uncertainty, rel=1e-4)
+        assert excess * left[angle].value == pytest.approx(right[name].value, abs=1e-9)
+        assert left[angle].standard_uncertainty == pytest.approx(right[name].standard_uncertainty, rel=1e-4)
     difference = right["scale y"].value - right["scale x"].value
     assert left["scale y - scale x"].value == pytest.approx(difference, abs=1e-9)
 
