@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from simulator.design import Design, Integers, State
-from simulator.estimation.gauss_newton import GaussNewtonSettings, estimate
+from simulator.estimation.gauss_newton import GaussNewtonSettings, estimate, open_as_drawn
+from simulator.estimation.length_equations import LENGTH_ESTIMATORS, LengthEstimator, NotAMetricError, length_estimate
 from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
@@ -17,6 +18,7 @@ from simulator.generate import noisy_certificate, noisy_readings, on_true_machin
 from simulator.geometry.artefacts import pairs
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
+from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.machines.truth import true_machine
 from simulator.readings import ObservedReadings, observe
 
@@ -37,6 +39,7 @@ class RivalFit:
     title: str
     solution: RivalSolution
     pairs: int
+    lengths: int
     estimates: tuple[ParameterEstimate, ...]
 
 
@@ -50,9 +53,10 @@ class Comparison:
 
     label: str
     title: str
-    estimator: RivalName
+    estimator: RivalName | LengthEstimator
     trials: int
     pairs: int
+    lengths: int
     across_probes: bool
     points: int
     rms: Array
@@ -87,8 +91,24 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
     gauges = design.is_gauge is not None and bool(design.is_gauge.any())
     if gauges or design.length_names:
         what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({design.length_names[0]})"
-        text = f"estimators of distances alone cannot follow {what}; use the full estimator, or length-equations"
+        text = f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+
+
+def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
+    """Refuse what length equations and the full estimator do not both estimate.
+
+    :raises ExperimentError: no lengths, another error model than three scales and squareness, or errors left open.
+    """
+    model, what, text = design.model, "artefacts", ""
+    if not len(design.lengths):
+        text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
+    elif not (isinstance(model, SpatialMetricModel) and model.with_scales):
+        what, text = "error_model", "length equations have the errors of {kind: metric}, in three dimensions, only"
+    elif open_as_drawn(design) is not None:
+        text = "the design leaves errors open, and then estimates differ by what they hold; see ballplate check"
+    if text:
+        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
 
 
 def fit_rival(
@@ -120,13 +140,13 @@ def fit_rival(
         ParameterEstimate(name, float(value), np.nan, unit)
         for name, value, unit in zip(names, values, units, strict=True)
     )
-    return RivalFit(experiment.label, experiment.title, solution, len(chosen), estimates)
+    return RivalFit(experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates)
 
 
 def compare_estimators(
     experiment: Experiment,
     trials: int,
-    estimator: RivalName = "distances",
+    estimator: RivalName | LengthEstimator = "distances",
     pair_set: str | None = None,
     across_probes: bool = False,
     seed: int | None = None,
@@ -140,8 +160,9 @@ def compare_estimators(
     corrected with the probe of the file's evaluation. `progress` is told the number of data sets done.
     """
     design = lay_out(experiment)
-    _refuse_unknown_lengths(experiment, design)
-    chosen = ball_pairs(experiment, design, pair_set)
+    of_lengths = estimator in LENGTH_ESTIMATORS
+    (_refuse_other_lengths if of_lengths else _refuse_unknown_lengths)(experiment, design)
+    chosen = np.zeros((0, 2), np.int64) if of_lengths else ball_pairs(experiment, design, pair_set)
     corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
     on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
     seed = experiment.seed if seed is None else seed
@@ -164,6 +185,7 @@ def compare_estimators(
         estimator,
         trials,
         len(chosen),
+        len(design.lengths),
         across_probes,
         points,
         np.array(rms),
@@ -177,14 +199,20 @@ def _both_estimates(
     on_truth: Design,
     truth: State,
     chosen: Integers,
-    estimator: RivalName,
+    estimator: RivalName | LengthEstimator,
     across_probes: bool,
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
-    """Parameters by the full and by the rival estimator from one data set; None where one did not converge."""
+    """Parameters by the full and by the other estimator from one data set; None where one did not converge."""
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
     full = estimate(observed.design, observed.x, ENOUGH)
+    if estimator == "length-equations" or estimator == "sphere-then-metric":
+        try:
+            solved = length_estimate(observed.design, observed.x, estimator)
+        except NotAMetricError:
+            return None
+        return (full.state.a, solved.parameters) if full.status == "converged" and solved.converged else None
     rival = rival_estimate(observed.design, observed.x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
     if full.status != "converged" or rival.status != "converged":
         return None
@@ -207,9 +235,10 @@ def rival_fit_lines(fit: RivalFit) -> list[str]:
     """A rival's fit as lines of text: iterations and the machine's parameters."""
     record = fit.solution.iterations
     rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
+    used = _used(fit.pairs, fit.lengths)
     lines = [
         f"{fit.label}: {fit.title}",
-        f"estimator {fit.solution.estimator}: {fit.pairs} pairs of balls, {fit.solution.observations} terms; {rank}",
+        f"estimator {fit.solution.estimator}: {used}, {fit.solution.observations} terms; {rank}",
         f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g} (its terms "
         "are not independent, so that it estimates no sigma and the values have no uncertainty here)",
         "",
@@ -222,6 +251,16 @@ def rival_fit_lines(fit: RivalFit) -> list[str]:
     return lines + aligned(rows, [False, True, False])
 
 
+def _used(pairs: int, lengths: int) -> str:
+    """What distances an estimator uses, in words.
+
+    >>> _used(0, 12), _used(1, 0)
+    ('12 lengths of standards', '1 pairs of balls')
+    """
+    words = [f"{pairs} pairs of balls"] if pairs or not lengths else []
+    return " and ".join([*words, *([f"{lengths} lengths of standards"] if lengths else [])])
+
+
 def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
     """A rival's fit as plain data in metres and radians; what is undetermined is None."""
     return {
@@ -229,6 +268,7 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
         "title": fit.title,
         "estimator": fit.solution.estimator,
         "pairs": fit.pairs,
+        "lengths": fit.lengths,
         "observations": fit.solution.observations,
         "rank_deficiency": fit.solution.deficiency,
         "status": fit.solution.status,
@@ -240,9 +280,10 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
 def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
     """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum") stand in them."""
     across = ", across probes" if found.across_probes else ""
+    used = _used(found.pairs, found.lengths)
     lines = [
         f"{found.label}: {found.title}",
-        f"estimator {found.estimator} ({found.pairs} pairs of balls{across}) against the full one: corrected distances "
+        f"estimator {found.estimator} ({used}{across}) against the full one: corrected distances "
         f"of {found.points} random pairs of points in each of {found.trials} data sets, differences in um",
     ]
     if found.failed:
@@ -267,6 +308,7 @@ def comparison_data(found: Comparison, published: dict[str, float | None]) -> di
         "estimator": found.estimator,
         "trials": found.trials,
         "pairs": found.pairs,
+        "lengths": found.lengths,
         "across_probes": found.across_probes,
         "points": found.points,
         "not_converged": list(found.failed),

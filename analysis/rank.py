@@ -91,6 +91,20 @@ class Direction:
         return in_words(self)
 
 
+def rank_complaint(deficiency: int, expected: int | None) -> str:
+    """A rank that is not the expected one, in words that are true where the file expects nothing.
+
+    >>> rank_complaint(1, None)
+    'rank deficiency 1, and the file does not say expected_rank_deficiency: 1'
+    >>> rank_complaint(0, 2)
+    'full rank where the file expects rank deficiency 2'
+    """
+    found = f"rank deficiency {deficiency}" if deficiency else "full rank"
+    if expected is None:
+        return f"{found}, and the file does not say expected_rank_deficiency: {deficiency}"
+    return f"{found} where the file expects {f'rank deficiency {expected}' if expected else 'full rank'}"
+
+
 @dataclass(frozen=True)
 class Verdict:
     """Whether a design determines its parameters.
@@ -113,6 +127,11 @@ class Verdict:
     def as_expected(self) -> bool:
         """Whether the deficiency is the one the file states; a file that states none expects full rank."""
         return self.deficiency == (self.expected or 0)
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong where the deficiency is not as expected; otherwise empty."""
+        return "" if self.as_expected else rank_complaint(self.deficiency, self.expected)
 
 
 def verdict(

@@ -107,6 +107,7 @@ def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
     if judged.expected is not None or not judged.as_expected:
         wanted = judged.expected or 0
         rank += ", as expected" if judged.as_expected else f", expected {wanted or 'full rank'}"
+        rank += " (the file does not say otherwise)" if judged.expected is None else ""
     lines.append(f"{rank}; {judged.parameters} parameters, {judged.observations} observations")
     values = judged.singular_values
     if len(values) and with_values:

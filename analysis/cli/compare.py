@@ -15,13 +15,16 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "compare",
         help="compare a rival estimator with the full one on synthetic data",
         description="Estimate synthetic data sets of the file's true machine with the full estimator and with one that "
-        "uses distances alone, and tell how far the distances that both correct are apart (NPL Report CISE 15/98, "
-        "section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
+        "uses distances or lengths alone, and tell how far the distances that both correct are apart (NPL Report "
+        "CISE 15/98, section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
     )
     add_file(parser, several=True)
     parser.add_argument("--trials", metavar="N", type=count, default=100, help="number of data sets; default 100")
     parser.add_argument(
-        "--estimator", choices=("distances", "cresto", "kruth"), default="distances", help="default: distances"
+        "--estimator",
+        choices=("distances", "cresto", "kruth", "length-equations", "sphere-then-metric"),
+        default="distances",
+        help="default: distances; of ball bars and Bryan gauges length-equations or sphere-then-metric",
     )
     add_pairs(parser)
     parser.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")

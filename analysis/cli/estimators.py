@@ -56,8 +56,7 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
     if not found.full.converged:
         complaint = f"the estimate by multiple redundancy has {found.full.solution.status}"
     elif not found.full.verdict.as_expected:
-        expected = found.full.verdict.expected or 0
-        complaint = f"rank deficiency {found.full.verdict.deficiency} where the file expects {expected}"
+        complaint = found.full.verdict.complaint
 
     def draw(path: Path) -> None:
         from ..report.vectors import draw_vectors, of_reversal
@@ -69,13 +68,14 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
 
 def _of_length_equations(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
     from ..length_fits import fit_lengths, length_fit_data, length_fit_lines
+    from ..rank import rank_complaint
 
     found = fit_lengths(experiment, observed, options.estimator)
     complaint, deficiency = "", found.solution.deficiency
     if not found.solution.converged:
         complaint = "the estimate has not converged; look for wrong units, balls or positions among the readings"
     elif deficiency != (experiment.expected_rank_deficiency or 0):
-        complaint = f"rank deficiency {deficiency} where the file expects {experiment.expected_rank_deficiency or 0}"
+        complaint = rank_complaint(deficiency, experiment.expected_rank_deficiency)
     remarks = found.remarks
     if options.sigma is not None:
         remarks += ("--sigma has no effect: uncertainties come from the scatter about the equations",)

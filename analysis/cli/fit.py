@@ -90,6 +90,10 @@ def run(options: Namespace) -> int:
             wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
             print(f"ballplate fit: {option} goes with --estimator {wanted} only; leave it out", file=sys.stderr)
             return 2
+    if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (".yaml", ".yml"):
+        told = f"the experiment file comes first, then the readings: fit {options.readings} {options.files[0]}"
+        print(f"ballplate fit: {told}", file=sys.stderr)
+        return 2
     experiment = single(options)
     if options.plot and (experiment.dimension != 2 or options.estimator not in ("full", "reversal")):
         text = "--plot draws residuals of readings in two dimensions, by the full estimator or reversal; leave it out"
@@ -124,8 +128,7 @@ def run(options: Namespace) -> int:
     if result.doubt:
         print(f"warning: {result.doubt}", file=sys.stderr)
     if not result.verdict.as_expected:
-        expected = result.verdict.expected or 0
-        print(f"rank deficiency {result.verdict.deficiency} where the file expects {expected}", file=sys.stderr)
+        print(result.verdict.complaint, file=sys.stderr)
         return 1
     return 0
 

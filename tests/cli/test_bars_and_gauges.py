@@ -140,11 +140,18 @@ def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pyte
         .split("variants:")[0]
         .replace("  - {kind: radius", "  # - {kind: radius")
     )
-    (tmp_path / "g.yaml").write_text(text.replace("calibration:", "calibration: []"), encoding="utf-8")
-    arguments = ["fit", str(tmp_path / "g.yaml"), KNOWN[1]]
-    for estimator in ("full", "length-equations"):
-        assert main([*arguments, "--estimator", estimator]) == 1
-        assert "rank deficiency 1 where the file expects 0" in capsys.readouterr().err
+    text = text.replace("calibration:", "calibration: []")
+    (tmp_path / "g.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "silent.yaml").write_text(text.replace("expected_rank_deficiency: 0", ""), encoding="utf-8")
+    for name, told in (("g", " where the file expects full rank"), ("silent", ", and the file does not say expected_")):
+        for estimator in ("full", "length-equations"):
+            assert main(["fit", str(tmp_path / f"{name}.yaml"), KNOWN[1], "--estimator", estimator]) == 1
+            assert f"rank deficiency 1{told}" in capsys.readouterr().err
+
+
+def test_exchanged_arguments_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fit", KNOWN[1], GAUGE]) == 2
+    assert f"the experiment file comes first, then the readings: fit {GAUGE} {KNOWN[1]}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [["fit", *KNOWN, "--estimator", "kruth"], ["compare", GAUGE]])
@@ -152,10 +159,26 @@ def test_estimators_of_distances_refuse_gauges(command: list[str], capsys: pytes
     assert main(command) == 3
     out, err = capsys.readouterr()
     assert (
-        not out and "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use the full" in err
+        not out
+        and "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator" in err
     )
     assert main(["fit", *BAR_READINGS[:3], "length unknown", "--estimator", "distances"]) == 3
     assert "cannot follow an unknown length (bar: length)" in capsys.readouterr().err
+
+
+def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -> None:
+    few = ("--variant", "radius known", "--trials", "5", "--estimator")
+    joint, two = (json_of(capsys, "compare", GAUGE, *few, name) for name in ("length-equations", "sphere-then-metric"))
+    assert joint["lengths"] == two["lengths"] == 60 and not joint["not_converged"]
+    assert max(joint["maximum"]["values"]) < 1e-8
+    # Of B0Z = -40 and A0Z = 80 urad more than half is lost, over distances of some 0.5 m.
+    assert 3e-6 < min(two["rms"]["values"]) < max(two["rms"]["values"]) < 2e-5
+    assert main(["compare", GAUGE, "--variant", "radius unknown", "--estimator", "length-equations"]) == 3
+    assert "the design leaves errors open" in capsys.readouterr().err
+    assert main(["compare", "designs/quickstart.yaml", "--estimator", "length-equations"]) == 3
+    assert "has no ball bar or Bryan gauge" in capsys.readouterr().err
+    assert main(["compare", BARS, "--variant", "length known", "--trials", "1"]) == 0
+    assert "estimator distances (12 lengths of standards) against" in capsys.readouterr().out
 
 
 def test_length_equations_refuse_plates_alone_and_planes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
