@@ -16,8 +16,8 @@ from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array
 
-# Singular values below this fraction of the largest: what readings tell of a direction through their own scatter only.
-MISSING = 1e-3
+from .bar_cures import MISSING, bars_to_add, listed
+
 AXES = "xyz"
 
 
@@ -31,14 +31,19 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     found = []
     unknown = design.lengths.free is not None and bool((design.lengths.free >= 0).all())
     overall = _unit_strain(np.eye(design.dimension))
-    if unknown and _is_among(overall, strains):
+    is_free = unknown and _is_among(overall, strains)
+    if is_free:
         names = " and ".join(design.length_names)
         found.append(
             f"no length is known ({names}): the overall scale of the machine stays open until one is calibrated"
         )
-        strains = _less(strains, overall)
-    missing = _what_is_missing(design, strains)
-    return (*found, missing) if missing else tuple(found)
+    left = _less(strains, overall) if is_free else strains
+    missing = _what_is_missing(design, strains, left) if left.shape[1] else ""
+    if missing:
+        told = _told(strains, design.dimension, is_free)
+        cure = bars_to_add(design, strains, overall if is_free else None)
+        found.append(f"{missing}: nothing tells {told}{f'; {cure}' if cure else ''}")
+    return tuple(found)
 
 
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
@@ -59,8 +64,11 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     return _null_space(left, float(np.linalg.norm(strain, 2)))
 
 
-def _what_is_missing(design: Design, strains: Array) -> str:
-    """The common property of all directions that leaves the open strains open; empty where another reason must do."""
+def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
+    """What all directions have in common that leaves strains open; empty where another reason must do.
+
+    `left` is what remains of the open strains without the overall scale of a machine whose lengths are all unknown.
+    """
     given, d = design.lengths, design.dimension
     position = design.readings.position[given.first]
     directions = given.direction.copy()
@@ -68,32 +76,32 @@ def _what_is_missing(design: Design, strains: Array) -> str:
         mine = given.to_pivot & (position == k)
         directions[mine] -= directions[mine].mean(axis=0)
     normals = _null_space(directions)
-    normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]
-    what = "every place of the ball" if given.to_pivot.all() else "every bar"
-    if given.to_pivot.any() and not given.to_pivot.all():
+    only_gauges = bool(given.to_pivot.all())
+    # Any three places lie in a plane.
+    few = only_gauges and np.bincount(position).max() <= d
+    with_plates = bool(design.is_plate.any())
+    if with_plates:
+        # What else bars would have to do, plates may do.
+        normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]
+    what = "every place of the ball" if only_gauges else "every bar"
+    if given.to_pivot.any() and not only_gauges:
         what = "every bar, and every place of a gauge's ball,"
-    if d == 3 and normals.shape[1] == 1:
-        plane = _plane(normals[:, 0])
-        lies = "lies in a plane parallel to" if given.to_pivot.all() else "lies parallel to"
-        return f"{what} {lies} {plane}: nothing tells {_told(strains, d)}"
-    if d - normals.shape[1] == 1:
-        along = np.linalg.svd(directions)[2][0]
-        return f"{what} lies along {_axis(along)}: nothing tells {_told(strains, d)}"
-    # What else bars would have to do, plates may do.
-    if design.is_plate.any() or not strains.shape[1]:
+    if d == 3 and normals.shape[1] == 1 and not few:
+        lies = "lies in a plane parallel to" if only_gauges else "lies parallel to"
+        return f"{what} {lies} {_plane(normals[:, 0])}"
+    if d - normals.shape[1] == 1 and not few:
+        return f"{what} lies along {_axis(np.linalg.svd(directions)[2][0])}"
+    if with_plates:
         return ""
-    different = len(np.unique(np.round([_products(u) for u in given.direction], 6), axis=0))
-    if different < _size(d) and not given.to_pivot.any():
-        few = f"the bars have only {different} different directions of the {_size(d)} needed"
-        return f"{few}: nothing tells {_told(strains, d)}"
-    if strains.shape[1] == 1:
+    if left.shape[1] == 1:
         # With an unknown length the form need not be zero, only the same.
-        form = _matrix(strains[:, 0], d)
+        form = _matrix(left[:, 0], d)
         values = np.einsum("mi,ij,mj->m", given.direction, form, given.direction)
         if np.ptp(values) < MISSING:
             who = "every direction of the bar" if given.to_pivot.any() else "every bar"
-            return f"{who} {_quadric(form - values.mean() * np.eye(d))}: nothing tells {_told(strains, d)}"
-    return ""
+            return f"{who} {_quadric(form - values.mean() * np.eye(d))}"
+    who = "places of the ball" if only_gauges else "bars' directions"
+    return f"the {who} are too few or too much alike"
 
 
 def _quadric(form: Array) -> str:
@@ -114,8 +122,8 @@ def _quadric(form: Array) -> str:
     return "lies on one cone"
 
 
-def _told(strains: Array, d: int) -> str:
-    """Scales and squareness that are open by themselves, in words; others as mixtures of them."""
+def _told(strains: Array, d: int, without_one: bool) -> str:
+    """Scales and squareness that are open by themselves, in words; others as mixtures of them, one of them left out."""
     pairs = list(combinations_with_replacement(range(d), 2))
     pure = [pair for pair, unit in zip(pairs, np.eye(len(pairs)), strict=True) if _is_among(unit, strains)]
     scales = [AXES[i].upper() for i, j in pure if i == j]
@@ -126,10 +134,11 @@ def _told(strains: Array, d: int) -> str:
         words.append(f"the scale of {scales[0]} nor its squareness to {' and '.join(others)}")
     else:
         if scales:
-            words.append(f"the {'scales' if len(scales) > 1 else 'scale'} of {_list(scales)}")
+            words.append(f"the {'scales' if len(scales) > 1 else 'scale'} of {listed(scales)}")
         if square:
-            words.append(f"the squareness of {_list([f'{b} to {a}' for a, b in square])}")
-    if len(pure) < strains.shape[1]:
+            words.append(f"the squareness of {listed([f'{b} to {a}' for a, b in square])}")
+    more = strains.shape[1] - len(pure) - without_one
+    if more > 0:
         touched = np.abs(strains).max(axis=1) > MISSING
         for pair in pure:
             touched[pairs.index(pair)] = False
@@ -138,13 +147,8 @@ def _told(strains: Array, d: int) -> str:
             for (i, j), one in zip(pairs, touched, strict=True)
             if one
         ]
-        more = strains.shape[1] - len(pure)
-        words.append(f"{'a combination' if more == 1 else f'{more} combinations'} of {_list(names)}")
+        words.append(f"{'a combination' if more == 1 else f'{more} combinations'} of {listed(names)}")
     return " nor ".join(words)
-
-
-def _list(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _axis(vector: Array) -> str:
@@ -158,7 +162,7 @@ def _axis(vector: Array) -> str:
 
 def _plane(normal: Array) -> str:
     axis = _axis(normal)
-    return f"the {AXES.replace(axis, '')} plane" if len(axis) == 1 else f"the plane across {axis}"
+    return f"the {AXES.replace(axis, '')} plane" if len(axis) == 1 else f"the plane perpendicular to {axis}"
 
 
 def _size(d: int) -> int:
@@ -172,11 +176,6 @@ def _matrix(strain: Array, d: int) -> Array:
         found[i, j] += 0.5 * value
         found[j, i] += 0.5 * value
     return found
-
-
-def _products(direction: Array) -> Array:
-    """Products of direction cosines, so that u' S u is their product with a strain."""
-    return np.array([direction[i] * direction[j] for i, j in combinations_with_replacement(range(len(direction)), 2)])
 
 
 def _unit_strain(form: Array) -> Array:
