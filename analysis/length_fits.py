@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from simulator.design import Design
 from simulator.estimation.length_equations import LengthEstimator, LengthSolution, NotAMetricError, length_estimate
+from simulator.experiment.load import place_in
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
+from simulator.geometry.artefacts import TwoSpheresSettings
+from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.readings import ObservedReadings
 
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
@@ -36,6 +40,11 @@ class LengthFit:
     remarks: tuple[str, ...]
 
 
+def has_all_errors(design: Design) -> bool:
+    """Whether the error model is the one that length equations have."""
+    return isinstance(design.model, SpatialMetricModel) and design.model.with_scales
+
+
 def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: LengthEstimator) -> LengthFit:
     """Solve the length equations of an experiment's readings.
 
@@ -46,6 +55,11 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
         what = "machine.volume" if design.dimension != 3 else "artefacts"
         has = "has two dimensions" if design.dimension != 3 else "has no ball bar or Bryan gauge whose lengths are read"
         text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
+        bars = [name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)]
+        if bars and design.dimension == 3:
+            text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
+            mark = place_in(experiment.source, experiment.name, ("artefacts", bars[0]))
+            raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
     try:
         solution = length_estimate(design, observed.x, estimator)
@@ -54,7 +68,15 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
     remarks = []
     if len(design.plate_readings):
-        remarks.append(f"{estimator} takes no notice of plates, calibrated co-ordinates and priors")
+        remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
+    if len(design.priors):
+        remarks.append(f"{estimator} takes no notice of priors")
+    if design.free_offsets is not None and design.free_offsets.any():
+        remarks.append(f"{estimator} takes the probes' offsets as the file states them, though they are unknown")
+    if not has_all_errors(design):
+        remarks.append(
+            f"{estimator} has three scale errors and three squareness errors, whatever the file's error model"
+        )
     if design.lengths.free is not None and (design.lengths.free >= 0).all():
         remarks.append("no length is known: scales are told against one another, and the overall scale stays open")
     if estimator == "sphere-then-metric" and len(design.gauge_positions):

@@ -67,18 +67,20 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
 
 
 def _of_length_equations(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
-    from ..length_fits import fit_lengths, length_fit_data, length_fit_lines
+    from ..length_fits import fit_lengths, has_all_errors, length_fit_data, length_fit_lines
     from ..rank import rank_complaint
 
     found = fit_lengths(experiment, observed, options.estimator)
     complaint, deficiency = "", found.solution.deficiency
     if not found.solution.converged:
         complaint = "the estimate has not converged; look for wrong units, balls or positions among the readings"
-    elif deficiency != (experiment.expected_rank_deficiency or 0):
+    elif has_all_errors(observed.design) and deficiency != (experiment.expected_rank_deficiency or 0):
         complaint = rank_complaint(deficiency, experiment.expected_rank_deficiency)
     remarks = found.remarks
     if options.sigma is not None:
         remarks += ("--sigma has no effect: uncertainties come from the scatter about the equations",)
+    given = [("--pairs", options.pairs), ("--across-probes", options.across_probes), ("--monomials", options.monomials)]
+    remarks += tuple(f"{name} has no effect with {options.estimator}" for name, value in given if value)
     return Outcome(length_fit_lines(found), length_fit_data(found), complaint, remarks)
 
 

@@ -135,6 +135,19 @@ def test_other_models_are_told_the_same(tmp_path: Path) -> None:
     assert told == SHIPPED["bar-bell", "flat"][0]
 
 
+def test_planes_and_axes_are_told_without_a_length_or_without_scales(tmp_path: Path) -> None:
+    upright = check(with_bars(tmp_path, [(0.0, 30.0 * k) for k in range(6)], calibration=[])).verdict
+    assert upright.deficiency == 4 and upright.reasons[0] == NO_LENGTH
+    assert upright.reasons[1].startswith(
+        "every bar lies parallel to the xz plane: nothing tells the scale of Y nor its squareness to X and Z; add for"
+    )
+    squareness = {"error_model": {"kind": "metric", "scale": "none"}, "true_machine": {"kind": "zero"}}
+    assert reason(tmp_path, [(30.0 * k, 0.0) for k in range(6)], **squareness) == (
+        "every bar lies parallel to the xy plane: nothing tells the squareness of Z to X and Z to Y; add for example a "
+        "bar in the xz plane at 45 deg and one in the yz plane at 45 deg"
+    )
+
+
 # Azimuths and elevations of the bars that are proposed.
 BARS = {"along x": (0.0, 0.0), "along y": (90.0, 0.0), "along z": (0.0, 90.0)}
 BARS |= {f"in the xy plane at {sign}45 deg": (float(f"{sign}45"), 0.0) for sign in ("", "-")}

@@ -193,6 +193,34 @@ def test_length_equations_refuse_plates_alone_and_planes(tmp_path: Path, capsys:
     assert "has two dimensions" in capsys.readouterr().err
 
 
+def test_length_equations_tell_what_they_pass_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path(GAUGE).read_text(encoding="utf-8").split("variants:")[0]
+    text = text.replace("{kind: metric}", "{kind: metric, scale: none}").split("true_machine:")
+    text = text[0] + "probes:" + text[1].partition("probes:")[2]
+    prior = 'priors: [{parameter: "pivot: origin z", standard_uncertainty: 1 mm}]\n'
+    (tmp_path / "g.yaml").write_text(text + prior, encoding="utf-8")
+    arguments = ["fit", str(tmp_path / "g.yaml"), KNOWN[1], "--estimator", "length-equations"]
+    assert main([*arguments, "--pairs", "all", "--monomials"]) == 0
+    err = capsys.readouterr().err
+    for told in (
+        "takes no notice of priors",
+        "whatever the file's error model",
+        "--pairs has no",
+        "--monomials has no",
+    ):
+        assert told in err
+    assert "plates" not in err
+
+
+def test_a_bar_that_is_a_plate_is_no_length_standard(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path(BARS).read_text(encoding="utf-8").split("variants:")[0].replace(", role: length_standard", "")
+    (tmp_path / "b.yaml").write_text(text, encoding="utf-8")
+    assert main(["fit", str(tmp_path / "b.yaml"), BAR_READINGS[1], "--estimator", "length-equations"]) == 3
+    err = capsys.readouterr().err
+    line = text[: text.index("bar: {kind")].count("\n") + 1
+    assert f"b.yaml:{line}:" in err and "artefacts.bar: is a plate, but length-equations needs length standards" in err
+
+
 def test_readings_of_two_balls_exchanged_are_no_metric_or_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
