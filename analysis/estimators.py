@@ -18,10 +18,10 @@ from simulator.generate import noisy_certificate, noisy_readings, on_true_machin
 from simulator.geometry.artefacts import pairs
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
-from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.machines.truth import true_machine
 from simulator.readings import ObservedReadings, observe
 
+from .length_fits import has_all_errors
 from .study import ParameterEstimate
 from .tables import SHOWN, aligned, number
 
@@ -100,10 +100,10 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
 
     :raises ExperimentError: no lengths, another error model than three scales and squareness, or errors left open.
     """
-    model, what, text = design.model, "artefacts", ""
+    what, text = "artefacts", ""
     if not len(design.lengths):
         text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
-    elif not (isinstance(model, SpatialMetricModel) and model.with_scales):
+    elif not has_all_errors(design):
         what, text = "error_model", "length equations have the errors of {kind: metric}, in three dimensions, only"
     elif open_as_drawn(design) is not None:
         text = "the design leaves errors open, and then estimates differ by what they hold; see ballplate check"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.adjustments import adjustments
-from simulator.machines.spatial_metric import SpatialMetricModel
+from simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
 
 MODEL = SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 
@@ -31,3 +31,8 @@ def test_a_guideway_is_turned_back_to_square(k: int, guideway: int, other: int, 
     assert one.name == f"angle {'xyz'[other]}{'xyz'[guideway]}"
     turn = f"turn the {'XYZ'[guideway]} guideway by 20.6 arcsec (100 um per m) towards"
     assert one.words == f"{turn} {'-' if cosine > 0 else '+'}{'XYZ'[other]}"
+
+
+def test_a_tensor_that_gives_some_differences_no_length_is_no_metric() -> None:
+    with pytest.raises(ValueError, match="no length"):
+        parameters_of_metric(np.diag([1.0, 1.0, -1e-6]))

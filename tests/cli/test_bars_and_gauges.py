@@ -221,7 +221,7 @@ def test_a_bar_that_is_a_plate_is_no_length_standard(tmp_path: Path, capsys: pyt
     assert f"b.yaml:{line}:" in err and "artefacts.bar: is a plate, but length-equations needs length standards" in err
 
 
-def test_readings_of_two_balls_exchanged_are_no_metric_or_told(
+def test_a_wrong_reading_of_a_gauge_stands_first_among_residuals(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A gauge's reading that is wrong by 30 mm stands first among the largest residuals."""
