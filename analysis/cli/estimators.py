@@ -79,8 +79,6 @@ def _of_length_equations(options: Namespace, experiment: Experiment, observed: O
     remarks = found.remarks
     if options.sigma is not None:
         remarks += ("--sigma has no effect: uncertainties come from the scatter about the equations",)
-    given = [("--pairs", options.pairs), ("--across-probes", options.across_probes), ("--monomials", options.monomials)]
-    remarks += tuple(f"{name} has no effect with {options.estimator}" for name, value in given if value)
     return Outcome(length_fit_lines(found), length_fit_data(found), complaint, remarks)
 
 

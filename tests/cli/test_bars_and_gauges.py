@@ -200,16 +200,9 @@ def test_length_equations_tell_what_they_pass_over(tmp_path: Path, capsys: pytes
     prior = 'priors: [{parameter: "pivot: origin z", standard_uncertainty: 1 mm}]\n'
     (tmp_path / "g.yaml").write_text(text + prior, encoding="utf-8")
     arguments = ["fit", str(tmp_path / "g.yaml"), KNOWN[1], "--estimator", "length-equations"]
-    assert main([*arguments, "--pairs", "all", "--monomials"]) == 0
+    assert main(arguments) == 0
     err = capsys.readouterr().err
-    for told in (
-        "takes no notice of priors",
-        "whatever the file's error model",
-        "--pairs has no",
-        "--monomials has no",
-    ):
-        assert told in err
-    assert "plates" not in err
+    assert "takes no notice of priors" in err and "whatever the file's error model" in err and "plates" not in err
 
 
 def test_a_bar_that_is_a_plate_is_no_length_standard(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
