@@ -119,7 +119,7 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     rows = [["factor of the metric", *FACTORS], ["1e-6", *(number(1e6 * value) for value in fit.factors)]]
     lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(fit.adjustments)]
     where = [f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm" for name, centre in fit.pivots]
-    lines += [f"pivots: {'; '.join(where)}"] if where else []
+    lines += [f"pivots: {'; '.join(where)}, in scale readings"] if where else []
     return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
 
 
