@@ -328,9 +328,9 @@ def check_size(
             "possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)
-    rows = sum(len(group.balls) * len(group.probes) for one in pivots for group in one.readings)
+    rows = sum(len(group.balls) * len(group.probes) * group.repeats for one in pivots for group in one.readings)
     if rows > MOST_LENGTHS:
-        text = f"Bryan gauges are read in {rows} places; at most {MOST_LENGTHS} lengths are possible"
+        text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
     for i, calibration in calibrations.items():
         name = calibration.artefact

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
 from .checks import (
     check_calibration_read,
@@ -129,8 +130,8 @@ def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | Non
         name=name,
         source=source,
         machine=machine,
-        error_model=sections.get("error_model"),
-        true_machine=sections.get("true_machine"),
+        error_model=with_defaults(sections.get("error_model"), machine.dimension),
+        true_machine=with_defaults(sections.get("true_machine"), machine.dimension),
         probes=probes,
         artefacts=references.artefacts,
         layouts=references.layouts,

@@ -445,6 +445,18 @@ def dimension_of(settings: Settings) -> int | None:
     return ERROR_MODELS[type(settings)][0]
 
 
+def with_defaults(settings: Settings, dimension: int) -> Settings:
+    """Settings of an error model or a true machine, with defaults stated that depend on the number of dimensions.
+
+    >>> with_defaults(MetricSettings(kind="metric"), 3).scale
+    'each'
+    """
+    if isinstance(settings, MetricSettings) and settings.scale is None:
+        return settings.model_copy(update={"scale": "none" if dimension == 2 else "each"})
+    own = getattr(settings, "error_model", None)
+    return settings if own is None else settings.model_copy(update={"error_model": with_defaults(own, dimension)})
+
+
 def build_error_model(settings: Settings, lower: Corner, upper: Corner) -> ErrorModel:
     """The error model that settings describe, for a volume from `lower` to `upper` in metres.
 

@@ -108,13 +108,17 @@ def test_too_much(tmp_path: Path, old: str, new: str, line: str) -> None:
     assert line in refusals(tmp_path, text)
 
 
-def test_gauges_of_too_many_lengths(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("count", "repeats"), [(5, 1), (1, 5)])
+def test_gauges_of_too_many_lengths(tmp_path: Path, count: int, repeats: int) -> None:
     gauge = "  gauge: {kind: bryan_gauge, radius: 300 mm, directions: {random: 5000}}\npositions:\n"
-    places = (f"  - {{name: {k}, artefact: gauge, pose: {{origin: [500 mm, 500 mm, 100 mm]}}}}" for k in range(5))
+    places = (
+        f"  - {{name: {k}, artefact: gauge, repeats: {repeats}, pose: {{origin: [500 mm, 500 mm, 100 mm]}}}}"
+        for k in range(count)
+    )
     text = replaced("positions:", gauge + "\n".join(places)).replace("name: low,", "name: low, artefact: plate,")
     text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
     assert refusals(tmp_path, text) == [
-        "8:1: positions: Bryan gauges are read in 25000 places; at most 20000 lengths are possible"
+        "8:1: positions: Bryan gauges are read 25000 times; at most 20000 lengths are possible"
     ]
 
 
