@@ -52,9 +52,7 @@ RATIO_UNITS: Mapping[str, Fraction] = {
 }
 TEMPERATURE_UNITS: Mapping[str, Fraction] = {"K": Fraction(1), "degC": Fraction(1), "mK": Fraction(1, 10**3)}
 EXPANSION_UNITS: Mapping[str, Fraction] = {
-    f"{ratio}/{degree}": factor
-    for ratio, factor in (("um/m", Fraction(1, 10**6)), ("ppm", Fraction(1, 10**6)), ("mm/m", Fraction(1, 10**3)))
-    for degree in ("K", "degC")
+    f"{ratio}/{degree}": RATIO_UNITS[ratio] for ratio in ("um/m", "ppm", "mm/m", "m/m") for degree in ("K", "degC")
 }
 BENDING_UNITS: Mapping[str, Fraction] = {f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()}
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.
@@ -357,7 +355,7 @@ def _article(kind: str) -> str:
 
 
 # What a number without a unit may have been meant in; to name one alone would lead to errors of a thousand times.
-ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m"}
+ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m", "thermal expansion": "m/m/K"}
 
 
 def _with_unit(number: str, kind: str) -> str:
