@@ -13,16 +13,8 @@ from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
 from ..machines.description import MachineDescription
-from ..machines.settings import (
-    CurvesSettings,
-    MachineFileSettings,
-    MetricSettings,
-    PythonSettings,
-    RandomSettings,
-    TrueMachineFileSettings,
-    build_error_model,
-    dimension_of,
-)
+from ..machines.settings import MachineFileSettings, MetricSettings, PythonSettings, build_error_model, dimension_of
+from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
 from ..quantities import format_length
 from ..settings import listing

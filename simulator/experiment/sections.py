@@ -8,7 +8,8 @@ from pydantic import Field, StringConstraints, Tag
 
 from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name, PairSet
 from ..geometry.positions import Axis
-from ..machines.settings import ErrorModelSettings, TrueMachineSettings, ZeroSettings
+from ..machines.settings import ErrorModelSettings
+from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from ..quantities import Angle, Length, LengthFunction, PositiveLength
 from ..settings import FORM, Settings
 

@@ -8,14 +8,13 @@ from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..settings import Settings, hint
 from .framing import in_frame_of
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
-from .settings import (
+from .settings import Corner, build_error_model
+from .true_machine_settings import (
     CoefficientSettings,
-    Corner,
     CurvesSettings,
     RandomSettings,
     TrueMachineFileSettings,
     ZeroSettings,
-    build_error_model,
 )
 
 _PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}

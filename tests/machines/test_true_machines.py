@@ -8,7 +8,7 @@ import pytest
 from simulator.machines.arrangement import ARRANGEMENTS
 from simulator.machines.kinematic import kinematic_model
 from simulator.machines.metric import MetricModel
-from simulator.machines.settings import CoefficientSettings, RandomSettings, ZeroSettings
+from simulator.machines.true_machine_settings import CoefficientSettings, RandomSettings, ZeroSettings
 from simulator.machines.truth import TruthError, true_machine, true_parameters
 
 MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))

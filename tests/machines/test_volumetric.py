@@ -21,8 +21,8 @@ from simulator.machines.description import (
     fitted_volumetric,
     true_volumetric,
 )
-from simulator.machines.settings import RandomSettings
 from simulator.machines.straightness import Criterion
+from simulator.machines.true_machine_settings import RandomSettings
 from simulator.machines.truth import true_parameters
 from tests.published.rigid_body import tip_error
 

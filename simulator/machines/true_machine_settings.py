@@ -1,0 +1,113 @@
+"""What a file may say about the true machine, which simulated readings come from."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr
+
+from ..quantities import Angle, PositiveLength
+from ..settings import Settings
+from .curves import Interpolation, Points, curves_model
+from .description import MachineDescription, true_volumetric
+from .protocol import ErrorModel, TrueMachine
+from .settings import (
+    ARRANGEMENT,
+    ROTATIONS,
+    ArrangementName,
+    ArrangementSettings,
+    Corner,
+    ErrorModelSettings,
+    arrangement_of,
+)
+
+
+class ZeroSettings(Settings):
+    """A machine without errors."""
+
+    kind: Literal["zero"] = Field(default="zero", description="no errors")
+
+
+OTHER_MODEL = "Error model of the true machine, where it is another than the estimated one."
+
+
+class CoefficientSettings(Settings):
+    """A machine with stated errors."""
+
+    kind: Literal["coefficients"] = Field(description="stated errors")
+    values: dict[str, str] = Field(
+        description="Value with unit of each parameter that is not zero, by its name in the error model or in the "
+        'monomial form, for example "EXX t^2": 3 um.'
+    )
+    error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
+        default=None, description=OTHER_MODEL
+    )
+
+
+class RandomSettings(Settings):
+    """A machine whose errors are drawn at random with stated sizes."""
+
+    kind: Literal["random"] = Field(description="errors drawn at random")
+    position: PositiveLength | None = Field(
+        default=None, description="Root mean square of each positional error along its axis, or in the volume."
+    )
+    rotation: Angle | None = Field(
+        default=None, description="Root mean square of each rotational error along its axis, or in the volume."
+    )
+    seed: int = Field(default=1, ge=0, description="Seed of the draw.")
+    error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
+        default=None, description=OTHER_MODEL
+    )
+
+
+class CurvesSettings(Settings):
+    """A machine with measured error curves."""
+
+    kind: Literal["curves"] = Field(description="measured error curves")
+    files: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
+        description="CSV files, each with the columns position_mm and errors of one axis such as EXX_um and EAX_urad; "
+        "errors that no file has are zero."
+    )
+    interpolation: Interpolation = Field(
+        default="linear", description="Between the points: linear, cubic splines, or monotone cubics."
+    )
+    arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
+
+    # What the files hold, by ISO 230-1 name; filled in when the experiment is loaded.
+    _curves: dict[str, Points] = PrivateAttr(default_factory=dict)
+
+    def of(self, curves: dict[str, Points]) -> None:
+        """Take the curves that the files hold."""
+        self._curves = curves
+
+    def model(self, lower: Corner, upper: Corner) -> ErrorModel:
+        """The curves as an error model, all of whose parameters are one."""
+        return curves_model(
+            self._curves, self.interpolation, arrangement_of(self.arrangement), lower, upper, self.rotations == "full"
+        )
+
+
+class TrueMachineFileSettings(Settings):
+    """The machine that a machine file describes."""
+
+    kind: Literal["machine"] = Field(description="the machine that a file describes")
+    file: str = Field(description="Machine file (YAML), as for ballplate map.")
+
+    # What the file says; filled in when the experiment is loaded.
+    _machine: MachineDescription | None = PrivateAttr(default=None)
+
+    def of(self, machine: MachineDescription) -> None:
+        """Take the machine that the file describes."""
+        self._machine = machine
+
+    def machine(self) -> TrueMachine:
+        """The systematic errors of the machine."""
+        assert self._machine is not None
+        return true_volumetric(self._machine)
+
+
+TrueMachineSettings = Annotated[
+    ZeroSettings | CoefficientSettings | RandomSettings | CurvesSettings | TrueMachineFileSettings,
+    Field(discriminator="kind"),
+]
