@@ -148,7 +148,7 @@ def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subproce
     begun = time.monotonic()
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 130 and time.monotonic() - begun < 20
+    assert process.returncode == 130 and time.monotonic() - begun < 20, err
     assert "the same command goes on from there" in err and "Traceback" not in err
     assert 2 < stored(store) < 80
 
