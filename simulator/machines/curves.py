@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -35,8 +35,32 @@ class Points:
         return Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
 
 
+class SingleFunction:
+    """What a basis of one function, a stated one, has in common; `kind` says where it comes from."""
+
+    kind: ClassVar[str]
+
+    @property
+    def zero_at_one(self) -> bool:
+        return False
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def interior(self) -> Basis:
+        raise TypeError(f"a {self.kind} function is a single one")
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """The function as it is."""
+        return Quoted((f"as {self.kind}",), np.eye(1))
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        raise TypeError(f"a {self.kind} function is a single one")
+
+
 @dataclass(frozen=True)
-class Curve:
+class Curve(SingleFunction):
     """One function, through values at ascending t; beyond its ends it keeps its end values.
 
     >>> Curve((0.0, 1.0), (0.0, 2e-6), "linear").values(np.array([0.5, 1.2]))
@@ -48,13 +72,7 @@ class Curve:
     y: tuple[float, ...]
     interpolation: Interpolation
 
-    @property
-    def zero_at_one(self) -> bool:
-        return False
-
-    @property
-    def size(self) -> int:
-        return 1
+    kind: ClassVar[str] = "measured"
 
     def values(self, t: Array) -> Array:
         """The curve at t (m,), as (m, 1)."""
@@ -65,16 +83,6 @@ class Curve:
 
         through = CubicSpline if self.interpolation == "cubic" else PchipInterpolator
         return np.asarray(through(self.t, self.y)(np.clip(t, self.t[0], self.t[-1])))[:, None]
-
-    def interior(self) -> Basis:
-        raise TypeError("a measured curve is a single function")
-
-    def quoted(self, variable: str = "t") -> Quoted:
-        """The curve as it is."""
-        return Quoted(("as measured",), np.eye(1))
-
-    def quoted_whole(self, variable: str = "t") -> Quoted:
-        raise TypeError("a measured curve is a single function")
 
 
 def curves_model(

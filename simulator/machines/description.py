@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from .arrangement import Arrangement
-from .bases import Basis, Polynomial, Quoted, Spline
-from .curves import Curve, Interpolation, Points
+from .bases import Basis, Polynomial, Spline
+from .curves import Curve, Interpolation, Points, SingleFunction
 from .kinematic import ROTATIONS, TRANSLATIONS, KinematicModel, carried_vectors, error_function
 from .protocol import Array, TrueMachine
 from .straightness import Criterion, reference_line
@@ -54,7 +55,7 @@ class Lever:
 
 
 @dataclass(frozen=True)
-class Combination:
+class Combination(SingleFunction):
     """A single function: a sum of multiples of others, less a straight line; beyond the ends `held` it is constant."""
 
     parts: tuple[tuple[float, PowerSeries | Curve | Combination | Lever], ...]
@@ -62,13 +63,7 @@ class Combination:
     slope: float = 0.0
     held: tuple[float, float] | None = None
 
-    @property
-    def zero_at_one(self) -> bool:
-        return False
-
-    @property
-    def size(self) -> int:
-        return 1
+    kind: ClassVar[str] = "stated"
 
     def values(self, t: Array) -> Array:
         """The function at t (m,), as (m, 1)."""
@@ -81,16 +76,6 @@ class Combination:
     def less(self, intercept: float, slope: float = 0.0) -> Combination:
         """The function less another straight line."""
         return replace(self, intercept=self.intercept + intercept, slope=self.slope + slope)
-
-    def interior(self) -> Basis:
-        raise TypeError("a stated function is a single one")
-
-    def quoted(self, variable: str = "t") -> Quoted:
-        """The function as it is."""
-        return Quoted(("as stated",), np.eye(1))
-
-    def quoted_whole(self, variable: str = "t") -> Quoted:
-        raise TypeError("a stated function is a single one")
 
 
 @dataclass(frozen=True)
