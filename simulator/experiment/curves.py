@@ -11,8 +11,8 @@ from ..machines.kinematic import TRANSLATIONS
 from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from .tables import _cells, refuse_columns, refuse_separators, wrong_count, wrong_number
-from .yamltree import Mark, read_text
+from .tables import _cells, refuse_columns, refuse_separators, table_lines, wrong_count, wrong_number
+from .yamltree import Mark
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
@@ -37,11 +37,7 @@ def read_numbered_curves(path: Path, bandwidths: bool = False) -> tuple[dict[str
     :raises ExperimentError: as `read_curves`.
     """
     file = str(path)
-    lines = [
-        (number, line)
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = table_lines(path)
     if not lines:
         raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")])
     if len(lines) > MOST_POINTS + 1:

@@ -29,6 +29,18 @@ class Row:
     lengths: tuple[float, ...]
 
 
+def table_lines(path: Path) -> list[tuple[int, str]]:
+    """Lines of a CSV file with their numbers, those that are empty or comments left out.
+
+    :raises ExperimentError: the file cannot be read.
+    """
+    return [
+        (number, line)
+        for number, line in enumerate(read_text(path).splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+
+
 def read_table(
     path: Path,
     texts: Sequence[str],
@@ -48,11 +60,7 @@ def read_table(
     """
     file = str(path)
     messages: list[Message] = [] if problems is None else problems
-    lines = [
-        (number, line)
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = table_lines(path)
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:
         raise ExperimentError([Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")])
@@ -114,8 +122,8 @@ def column_names(path: Path) -> tuple[str, ...]:
 
     :raises ExperimentError: the file cannot be read.
     """
-    lines = (line for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    header = next(lines, "")
+    lines = table_lines(path)
+    header = lines[0][1] if lines else ""
     cells = _cells(header) or [] if header.count(",") < MOST_COLUMNS else []
     return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
 

@@ -13,8 +13,16 @@ from typing import Literal
 import numpy as np
 
 from ..experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from ..experiment.tables import MOST_ROWS, _cells, refuse_columns, refuse_separators, wrong_count, wrong_number
-from ..experiment.yamltree import Mark, read_text
+from ..experiment.tables import (
+    MOST_ROWS,
+    _cells,
+    refuse_columns,
+    refuse_separators,
+    table_lines,
+    wrong_count,
+    wrong_number,
+)
+from ..experiment.yamltree import Mark
 from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number, metres_or_radians
 from ..settings import hint, listing, shorten
 from .space import Array
@@ -90,11 +98,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
     if path.suffix.lower() in NO_TABLES:
         text = f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV file that begins"
         raise ExperimentError([Message(file, 0, 0, "", f"{text} with a line such as {EXAMPLE}")])
-    lines = [
-        (number, line)
-        for number, line in enumerate(read_text(path).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = table_lines(path)
     if not lines:
         raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")])
     header = _Header(Mark(file, lines[0][0], 1), lines[0][1])
