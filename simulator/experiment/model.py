@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..quantities import LengthFunction
 from .yamltree import Mark
+
+if TYPE_CHECKING:
+    from .pool import Pool
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -152,7 +155,8 @@ class Experiment:
     ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres. ``layouts``:
     name of an artefact → its balls. ``target_accuracy`` and ``expected_rank_deficiency`` are None where
     nothing was stated. ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
-    by the probe's name, infinite where the offset is unknown; other offsets are as stated.
+    by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
+    may choose from.
     """
 
     title: str
@@ -174,6 +178,7 @@ class Experiment:
     seed: int
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
+    pool: Pool | None = None
 
     @property
     def dimension(self) -> int:
