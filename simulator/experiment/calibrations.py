@@ -17,8 +17,8 @@ from .model import (
     Indices,
     RadiusCalibration,
 )
+from .position_sections import CoordinatesSettings, DistancesSettings, RadiusSettings
 from .references import References, frozen
-from .sections import CoordinatesSettings, DistancesSettings, RadiusSettings
 from .tables import read_table
 from .yamltree import Mark, mark_of
 

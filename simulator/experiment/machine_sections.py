@@ -22,7 +22,8 @@ from ..quantities import (
     TemperatureDifference,
 )
 from ..settings import FORM, Settings
-from .sections import Edges, Line, Text, VolumeSettings
+from .position_sections import Edges, Text
+from .sections import Line, VolumeSettings
 
 # Polynomials go to the tenth order.
 MOST_COEFFICIENTS = 11

@@ -10,8 +10,8 @@ from ..geometry.artefacts import BallLayout
 from ..geometry.positions import IN_PLANE_AXES, Axis, FreePlacement, PlanePlacement, Pose, nominal_pose
 from .messages import Steps
 from .model import Position, ReadingGroup
+from .position_sections import PositionSettings, ReadingSettings
 from .references import References, lengths_per_axis
-from .sections import PositionSettings, ReadingSettings
 
 PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")

@@ -11,8 +11,9 @@ from pydantic import TypeAdapter, ValidationError
 from ..geometry.artefacts import AnyArtefactSettings
 from ..settings import describe, hint, nearest
 from .messages import Steps
+from .position_sections import CalibrationSettings, PositionSettings
 from .problems import Problems
-from .sections import AnyProbe, CalibrationSettings, ExperimentSettings, PositionSettings, PriorSettings
+from .sections import AnyProbe, ExperimentSettings, PriorSettings
 from .wording import explain
 from .yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
 
