@@ -55,6 +55,7 @@ EXPANSION_UNITS: Mapping[str, Fraction] = {
     f"{ratio}/{degree}": RATIO_UNITS[ratio] for ratio in ("um/m", "ppm", "mm/m", "m/m") for degree in ("K", "degC")
 }
 BENDING_UNITS: Mapping[str, Fraction] = {f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()}
+DURATION_UNITS: Mapping[str, Fraction] = {"s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
 BASE_UNITS: Mapping[str, str] = {
@@ -64,6 +65,7 @@ BASE_UNITS: Mapping[str, str] = {
     "temperature difference": "K",
     "thermal expansion": "m/m/K",
     "angle per length": "rad/m",
+    "duration": "s",
 }
 # Kind of quantity → its units and an example for the messages.
 UNITS: Mapping[str, Mapping[str, Fraction]] = {
@@ -73,6 +75,7 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
     "temperature difference": TEMPERATURE_UNITS,
     "thermal expansion": EXPANSION_UNITS,
     "angle per length": BENDING_UNITS,
+    "duration": DURATION_UNITS,
 }
 EXAMPLES: Mapping[str, str] = {
     "length": "750 mm",
@@ -81,6 +84,7 @@ EXAMPLES: Mapping[str, str] = {
     "temperature difference": "1.5 degC",
     "thermal expansion": "11 um/m/degC",
     "angle per length": "5 urad/m",
+    "duration": "20 min",
 }
 LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 
@@ -224,6 +228,40 @@ def parse_ratio(value: object) -> float:
     return _parse(value, "ratio")
 
 
+def parse_duration(value: object) -> float:
+    """Read a duration that is not negative and return it in seconds.
+
+    :raises QuantityError: not a number with s, min or h, or below zero.
+
+    >>> parse_duration("1.5 h"), parse_duration("20 min")
+    (5400.0, 1200.0)
+    """
+    found = _parse(value, "duration")
+    if found < 0:
+        raise QuantityError(f'"{value}" is below zero; write for example "{EXAMPLES["duration"]}"')
+    return found
+
+
+def length_text(length: float) -> str:
+    """Write a length in metres, in millimetres if that reads well, so that reading it gives the same float.
+
+    >>> length_text(0.75), length_text(2e-7), length_text(1 / 3)
+    ('750 mm', '0.2 um', '333.3333333333333 mm')
+    """
+    unit, shift = ("mm", 3) if length == 0 or abs(length) >= 1e-4 else ("um", 6)
+    return f"{Decimal(repr(float(length) + 0.0)).scaleb(shift).normalize():f} {unit}"
+
+
+def format_duration(seconds: float) -> str:
+    """Write a duration with the largest unit in which it is at least one.
+
+    >>> format_duration(5400), format_duration(735), format_duration(0)
+    ('1.5 h', '12.25 min', '0 s')
+    """
+    unit = "h" if seconds >= 3600 else "min" if seconds >= 60 else "s"
+    return f"{seconds / float(DURATION_UNITS[unit]):.9g} {unit}"
+
+
 def format_length(length: float) -> str:
     """Write a length in metres with a unit that reads well.
 
@@ -355,7 +393,7 @@ def _article(kind: str) -> str:
 
 
 # What a number without a unit may have been meant in; to name one alone would lead to errors of a thousand times.
-ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m", "thermal expansion": "m/m/K"}
+ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m", "thermal expansion": "m/m/K", "duration": "h"}
 
 
 def _with_unit(number: str, kind: str) -> str:
@@ -386,3 +424,4 @@ PositiveTemperatureDifference = Annotated[
 Expansion = Annotated[float, PlainValidator(parse_expansion), _schema("thermal expansion", "11 um/m/degC")]
 Bending = Annotated[float, PlainValidator(parse_bending), _schema("angle per length", "5 urad/m")]
 Ratio = Annotated[float, PlainValidator(parse_ratio), _schema("ratio", "5 ppm", "0.1 %", "1.2 um/m")]
+Duration = Annotated[float, PlainValidator(parse_duration), _schema("duration", "20 min", "15 s", "1.5 h")]

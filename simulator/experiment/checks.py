@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -222,14 +222,27 @@ def excess(points: Floats, volume: Volume) -> tuple[Floats, Floats, list[str]]:
     return by_axis[rows, axes], axes, sides
 
 
-def check_use(sections: Sections, positions: dict[int, Position], position_count: int, references: References) -> None:
+def check_use(
+    sections: Sections,
+    positions: dict[int, Position],
+    position_count: int,
+    references: References,
+    candidates: Collection[Position] | None = (),
+    planning: bool = False,
+) -> None:
     """Report artefacts never placed, balls of plates never read, and uncalibrated length standards of many balls.
 
-    Of a ball bar or a Bryan gauge without a certificate the length is a parameter.
+    Of a ball bar or a Bryan gauge without a certificate the length is a parameter. ``candidates`` of a pool, None
+    where some are wrong, may place an artefact; for ``planning`` they may read what no position reads.
     """
     problems = references.problems
     placed: set[str] = set()
     uncertain: set[str] = set()
+    in_pool = set(references.artefact_names) if candidates is None else {one.artefact for one in candidates}
+    readers = [*positions.values(), *(candidates or () if planning else ())]
+    if planning:
+        placed |= in_pool
+        uncertain |= set(references.artefact_names) if candidates is None else set()
     for i in range(position_count):
         name = written_text(problems.root, "positions", i, "artefact")
         if name is None and len(references.artefact_names) == 1:
@@ -240,10 +253,14 @@ def check_use(sections: Sections, positions: dict[int, Position], position_count
         if i not in positions:
             uncertain |= {str(name) for name in names}
     for name in references.artefact_names:
-        if position_count and name not in placed:
+        if not position_count and not readers:
+            continue
+        if name not in placed and name in in_pool:
+            continue
+        if name not in placed:
             problems.add(("artefacts", name), "is never placed; add a position of it, or remove it", of_key=True)
-        elif position_count and name in references.layouts and name not in uncertain:
-            _check_balls_read(name, [one for one in positions.values() if one.artefact == name], references)
+        elif name in references.layouts and name not in uncertain:
+            _check_balls_read(name, [one for one in readers if one.artefact == name], references)
     calibration_count = len(sections.entries("calibration"))
     for name, settings in references.artefacts.items():
         with_one_length = isinstance(settings, TwoSpheresSettings | BryanGaugeSettings)
@@ -320,21 +337,31 @@ def check_size(
             "possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)
+    check_lengths({("calibration", i): one for i, one in calibrations.items()}, positions.values(), references)
+
+
+def check_lengths(
+    calibrations: Mapping[Steps, Calibration], positions: Collection[Position], references: References
+) -> None:
+    """Report length standards and gauges that are read too often."""
+    problems = references.problems
+    gauges = {name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)}
+    pivots = [one for one in positions if one.artefact in gauges]
     rows = sum(len(group.balls) * len(group.probes) * group.repeats for one in pivots for group in one.readings)
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
-    for i, calibration in calibrations.items():
+    for steps, calibration in calibrations.items():
         name = calibration.artefact
         if references.artefacts[name].role == "length_standard" and isinstance(calibration, DistanceCalibration):
-            probes = [{probe for group in one.readings for probe in group.probes} for one in positions.values()]
-            times = sum(len(own) for own, one in zip(probes, positions.values(), strict=True) if one.artefact == name)
+            probes = [{probe for group in one.readings for probe in group.probes} for one in positions]
+            times = sum(len(own) for own, one in zip(probes, positions, strict=True) if one.artefact == name)
             if len(calibration.pairs) * times > MOST_LENGTHS:
                 text = (
                     f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too many; at most '
                     f"{MOST_LENGTHS} lengths are possible"
                 )
-                problems.add(("calibration", i, "pairs"), text)
+                problems.add((*steps, "pairs"), text)
 
 
 def check_points(

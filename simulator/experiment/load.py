@@ -21,6 +21,8 @@ from .machine import resolve_evaluation, resolve_machine
 from .messages import ExperimentError, Message, Steps, format_path
 from .model import Calibration, Experiment
 from .placements import resolve_position
+from .pool import placed_only
+from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .problems import Problems, written, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
@@ -29,11 +31,12 @@ from .variants import in_variants, variant_trees
 from .yamltree import Mapping, Mark, Node, mark_of, read_tree
 
 
-def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
+def load(path: str | os.PathLike[str], planning: bool = False) -> tuple[Experiment, ...]:
     """Load an experiment file.
 
     Returns the experiment, or one per variant in the order of the file. Tables that the file names are read
-    from the folder it is in.
+    from the folder it is in. For ``planning`` an experiment has its pool, and positions may be missing where there is
+    one; otherwise what only the pool places is left out.
 
     :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
     """
@@ -43,14 +46,14 @@ def load(path: str | os.PathLike[str]) -> tuple[Experiment, ...]:
     base_problems = Problems(root)
     trees = variant_trees(root, base_problems)
     if not trees:
-        experiment, messages = build(_without_variants(root), source, None)
+        experiment, messages = build(_without_variants(root), source, None, planning)
         _raise_if_any([*base_problems.messages, *messages], refused, source)
         assert experiment is not None
         return (experiment,)
     experiments = []
     variants_of: dict[Message, list[str]] = {}
     for name, tree in trees.items():
-        experiment, messages = build(tree, source, name)
+        experiment, messages = build(tree, source, name, planning)
         experiments += [experiment] if experiment else []
         for message in messages:
             variants_of.setdefault(message, []).append(name)
@@ -79,17 +82,19 @@ def place_in(source: Path, variant: str | None, steps: Steps) -> Mark:
     return mark_of(root, ("positions",) if variant is None else ("variants", variant), of_key=True)
 
 
-def build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
+def build(
+    root: Node, source: Path, name: str | None, planning: bool = False
+) -> tuple[Experiment | None, list[Message]]:
     """Return the experiment of a tree without variants and no messages, or None and what is wrong."""
     try:
-        return _build(root, source, name)
+        return _build(root, source, name, planning)
     except ExperimentError as too_many:
         return None, list(too_many.messages)
 
 
-def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | None, list[Message]]:
+def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[Experiment | None, list[Message]]:
     problems = Problems(root)
-    sections = validate_sections(root, problems)
+    sections = validate_sections(root, problems, planning)
     references = resolve_references(sections, source.parent, problems)
     machine = resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
     probes = resolve_probes(sections, references)
@@ -109,16 +114,22 @@ def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | Non
             positions[i] = position
             if machine is not None and machine.dimension == references.dimension:
                 check_inside(position, ("positions", i), machine.volume, references)
-    check_use(sections, positions, position_count, references)
+    candidates = resolve_candidates(sections, positions, machine, references)
+    possible = candidates.positions if candidates.complete else None
+    check_use(sections, positions, position_count, references, possible, planning)
+    # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
+    named = dict(enumerate(candidates.positions or positions.values()))
+    readers, reader_count = (named, len(named) + (not candidates.complete)) if planning else (positions, position_count)
     calibrations: dict[int, Calibration] = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
         calibration = resolve_calibration(settings, ("calibration", i), references)
         if calibration is not None:
             calibrations[i] = calibration
-            check_calibration_read(calibration, ("calibration", i), positions, position_count, references)
+            check_calibration_read(calibration, ("calibration", i), readers, reader_count, references)
     check_radii(calibrations, problems)
-    priors = resolve_priors(sections, machine, positions, references)
+    pool = resolve_pool(sections, candidates, positions, calibrations, references)
+    priors = resolve_priors(sections, machine, named, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
     evaluation = resolve_evaluation(sections, machine, references)
@@ -144,8 +155,9 @@ def _build(root: Node, source: Path, name: str | None) -> tuple[Experiment | Non
         seed=sections.get("seed"),
         priors=priors,
         offset_uncertainties=offset_uncertainties,
+        pool=pool if planning else None,
     )
-    return experiment, []
+    return experiment if planning or pool is None else placed_only(experiment), []
 
 
 def _without_variants(root: Node) -> Node:

@@ -64,9 +64,9 @@ def written_keys(root: Node, section: str) -> tuple[str, ...]:
     return tuple(node.items) if isinstance(node, Mapping) else ()
 
 
-def written_count(root: Node, section: str) -> int:
-    """Return the number of entries of a section that is a list, right or wrong."""
-    node = written(root, section)
+def written_count(root: Node, *steps: Step) -> int:
+    """Return the number of entries of a list at a path, right or wrong."""
+    node = written(root, *steps)
     return len(node.items) if isinstance(node, Sequence) else 0
 
 

@@ -103,6 +103,10 @@ class References:
             return self.probes if len(self.probes) == 1 else None
         return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
+    def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
+        """Tell whether names listed at a path are of probes, each once, after saying what is wrong."""
+        return self._known_once("probe", self.probes, names, steps)
+
     def ball_indices(self, names: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
         """Return the indices of listed balls, or None after saying what is wrong."""
         index = {name: i for i, name in enumerate(layout.names)}

@@ -14,7 +14,9 @@ def schema() -> dict[str, Any]:
     found: dict[str, Any] = tidied(ExperimentSettings.model_json_schema())
     # Variants may supply what the file itself leaves out, which no schema can tell.
     required = found.pop("required")
-    found["anyOf"] = [{"required": ["variants"]}, {"required": required}]
+    # Positions may be chosen from a pool.
+    pooled = [key if key != "positions" else "pool" for key in required]
+    found["anyOf"] = [{"required": ["variants"]}, {"required": required}, {"required": pooled}]
     return {"$schema": DRAFT, **found, "title": "ballplate experiment"}
 
 

@@ -11,6 +11,7 @@ from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from ..quantities import Length, LengthFunction
 from ..settings import FORM, Settings
+from .pool_sections import PoolSettings
 from .position_sections import CalibrationSettings, Edges, LengthPerAxis, PositionSettings, Text
 
 # Without control characters, which would reach the terminal.
@@ -124,6 +125,7 @@ class ExperimentSettings(Settings):
     calibration: tuple[CalibrationSettings, ...] = Field(
         (), description="what is known of the artefacts: distances, coordinates, radius; may be empty"
     )
+    pool: PoolSettings | None = Field(None, description="what ballplate plan chooses positions and calibration from")
     priors: Annotated[tuple[PriorSettings, ...], Field(min_length=1)] | None = Field(
         None, description="what is known beforehand of machine errors and poses"
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any
 
@@ -11,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from ..geometry.artefacts import AnyArtefactSettings
 from ..settings import describe, hint, nearest
 from .messages import Steps
+from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import CalibrationSettings, PositionSettings
 from .problems import Problems
 from .sections import AnyProbe, ExperimentSettings, PriorSettings
@@ -42,8 +44,11 @@ class Sections:
         return {steps[1]: value for steps, value in self.values.items() if len(steps) == 2 and steps[0] == section}
 
 
-def validate_sections(root: Node, problems: Problems) -> Sections:
-    """Validate what each section says by itself; what is wrong goes to ``problems``."""
+def validate_sections(root: Node, problems: Problems, planning: bool = False) -> Sections:
+    """Validate what each section says by itself; what is wrong goes to ``problems``.
+
+    For ``planning`` positions may be missing where there is a pool to choose them from.
+    """
     fields = ExperimentSettings.model_fields
     values: dict[Steps, Any] = {}
     if not isinstance(root, Mapping):
@@ -70,12 +75,19 @@ def validate_sections(root: Node, problems: Problems) -> Sections:
         node_or_none = root.items.get(key)
         if node_or_none is None and key in misspelt:
             continue
+        if node_or_none is None and key == "positions" and "pool" in root.items:
+            if not planning:
+                text = "missing; add positions, or choose some from the pool with: ballplate plan FILE"
+                problems.add((key,), text)
+            continue
         if node_or_none is None and field.is_required():
             problems.add((key,), f'missing; add "{key}" ({field.description})')
         elif node_or_none is None:
             values[key,] = field.get_default(call_default_factory=True)  # type: ignore[call-arg,unused-ignore]
         elif key in ENTRIES:
             values |= _validate_entries(key, node_or_none, problems)
+        elif key == "pool":
+            values |= _validate_pool(node_or_none, problems)
         elif key != "variants":
             values |= _validate(_adapter(key), node_or_none, (key,), problems)
     return Sections(values)
@@ -100,11 +112,44 @@ def _validate_entries(key: str, node: Node, problems: Problems) -> dict[Steps, A
     return values
 
 
+def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
+    """Values of the pool's times and limits, and of each of its entries."""
+    if not isinstance(node, Mapping):
+        return _validate(_adapter("pool"), node, ("pool",), problems)
+    values: dict[Steps, Any] = {("pool",): None}
+    rest = {key: item for key, item in node.items.items() if key not in POOL_ENTRIES}
+    whole = _validate(_adapter("pool"), replace(node, items=rest), ("pool",), problems).get(("pool",))
+    whole = whole or PoolSettings.model_validate({})
+    values |= {("pool", "times"): whole.times, ("pool", "limits"): whole.limits}
+    for key, adapter_of in POOL_ENTRIES.items():
+        entries = node.items.get(key)
+        if isinstance(entries, Sequence):
+            for i, item in enumerate(entries.items):
+                values |= _validate(_of_type(adapter_of(item)), item, ("pool", key, i), problems)
+        elif entries is not None and not (isinstance(entries, Scalar) and entries.value is None):
+            found = describe(to_python(entries) if isinstance(entries, Scalar) else {})
+            description = PoolSettings.model_fields[key].description
+            text = f"expected a list, each entry beginning with “- ”, found {found} ({description})"
+            problems.add(("pool", key), text)
+    return values
+
+
+def _kind_of_candidate(node: Node) -> Any:
+    # Of one form only, so that a slip is not answered with keys of the other.
+    return GroupSettings if is_group(node.items if isinstance(node, Mapping) else None) else ListedSettings
+
+
+POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
+    "candidates": _kind_of_candidate,
+    "calibration": lambda _: PricedSettings,
+}
+
+
 def _validate(adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems) -> dict[Steps, Any]:
     try:
         return {steps: adapter.validate_python(to_python(node))}
     except ValidationError as error:
-        for explanation in explain(error.errors(include_url=False), node, _json_schema(steps[0])):
+        for explanation in explain(error.errors(include_url=False), node, _json_schema(adapter)):
             problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)
         return {}
 
@@ -112,12 +157,17 @@ def _validate(adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Pro
 @cache
 def _adapter(key: str) -> TypeAdapter[Any]:
     if key in ENTRIES:
-        return TypeAdapter(ENTRIES[key][1])
+        return _of_type(ENTRIES[key][1])
     field = ExperimentSettings.model_fields[key]
     annotated: Any = Annotated[field.annotation, field]
-    return TypeAdapter(annotated)
+    return _of_type(annotated)
 
 
 @cache
-def _json_schema(key: str | int) -> dict[str, Any]:
-    return _adapter(str(key)).json_schema()
+def _of_type(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+@cache
+def _json_schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
+    return adapter.json_schema()

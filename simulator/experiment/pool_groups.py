@@ -1,0 +1,389 @@
+"""Groups of a pool: candidates that are every combination of planes, levels, places, turns, probes and balls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Literal
+
+import numpy as np
+
+from ..geometry.artefacts import BallLayout, corners
+from ..geometry.positions import (
+    AXIS_INDEX,
+    IN_PLANE_AXES,
+    Axis,
+    PlanePlacement,
+    Pose,
+    ball_coordinates,
+    bounding_rectangle,
+    nominal_pose,
+)
+from ..quantities import format_length, length_text
+from .messages import Steps
+from .model import Floats, Indices, Position, ReadingGroup, Volume
+from .pool_sections import GroupSettings, LengthsByAxisSettings, ProbesByPlaneSettings, RangeSettings, form_of_balls
+from .problems import written
+from .references import References, lengths_per_axis
+from .yamltree import to_python
+
+# Candidates of a pool, those dropped included.
+MOST_CANDIDATES = 20_000
+
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Where balls may be: the volume, the lower and upper ends (2, d) by probe, and what a plate needs around it."""
+
+    volume: Volume
+    reach: Mapping[str, Floats]
+    edge: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Generated:
+    """A candidate of a group that can be read, or with a reason instead of a position why it cannot."""
+
+    name: str
+    position: Position | None
+    plane: str
+    settings: Mapping[str, Any]
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Balls:
+    word: str
+    names: tuple[str, ...]
+    indices: Indices
+    written: Any
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """A group with everything in it resolved, by plane; in two dimensions the only plane is z."""
+
+    artefact: str
+    layout: BallLayout
+    prefix: str
+    planes: tuple[Axis, ...]
+    levels: Mapping[str, tuple[float, ...]]
+    anchor: Literal["corner", "centre"]
+    places: Mapping[str, tuple[tuple[float, float], ...]]
+    turns: tuple[int, ...]
+    probes: Mapping[str, tuple[tuple[str, ...], ...]]
+    balls: tuple[_Balls, ...]
+    repeats: int
+    uncertainty: Floats | None
+    names_artefact: bool
+    names_probes: bool
+    # What a file says of the readings besides probes and balls.
+    written: Mapping[str, Any]
+
+    @property
+    def count(self) -> int:
+        of_planes = (len(self.levels[p]) * len(self.places[p]) * len(self.probes[p]) for p in self.planes)
+        return sum(of_planes) * len(self.turns) * len(self.balls)
+
+
+def generate(
+    settings: GroupSettings, steps: Steps, bounds: Bounds | None, count: int, references: References
+) -> list[Generated] | None:
+    """Return the candidates of a group, or None after saying what is wrong; `count` are there already."""
+    group = _resolve(settings, steps, references)
+    if group is None:
+        return None
+    text = f"there are {count + group.count} candidates up to here; at most {MOST_CANDIDATES} are possible"
+    if not references.require(count + group.count <= MOST_CANDIDATES, steps, text) or bounds is None:
+        return None
+    reasons = {
+        (plane, turn, k): _reasons(group, plane, turn, balls, bounds, references)
+        for plane in dict.fromkeys(group.planes)
+        for turn in dict.fromkeys(group.turns)
+        for k, balls in enumerate(group.balls)
+    }
+    read = sum(
+        sum(reason == "" for reason in reasons[plane, turn, k][probes]) * len(probes) * len(balls.indices)
+        for plane, turn, (k, balls) in product(group.planes, group.turns, enumerate(group.balls))
+        for probes in group.probes[plane]
+    )
+    if not references.count_readings(read * group.repeats, steps):
+        return None
+    return list(_candidates(group, reasons, references.dimension or 3))
+
+
+def extent(points: Floats) -> Floats:
+    """Return the lowest and the highest co-ordinates (2, d) of points (n, d)."""
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
+    """Return the lowest and the highest co-ordinates (2, d) of a plate with so much material beyond its balls."""
+    (left, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
+    around = np.array([(x, y, 0.0) for x in (left, right) for y in (low, high)])
+    return extent(around[:, : len(pose.origin)] @ pose.rotation.T + pose.origin)
+
+
+def is_within(found: Floats, lower: Floats, upper: Floats) -> Any:
+    """Tell whether extents (…, 2, d) are within limits (d,)."""
+    return np.all((found[..., 0, :] >= lower - TOLERANCE) & (found[..., 1, :] <= upper + TOLERANCE), axis=-1)
+
+
+def _reasons(
+    group: _Group, plane: Axis, turn: int, balls: _Balls, bounds: Bounds, references: References
+) -> dict[tuple[str, ...], list[str]]:
+    """By set of probes and for each level and place, why a candidate cannot be read; empty where it can."""
+    d = references.dimension or 3
+    at_zero = nominal_pose(PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn), group.layout, d)
+    shifts = np.zeros((len(group.levels[plane]) * len(group.places[plane]), d))
+    both = list(product(group.levels[plane], group.places[plane]))
+    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
+    shifts[:, [first, second]] = [place for _, place in both]
+    if d == 3:
+        shifts[:, AXIS_INDEX[plane]] = [level for level, _ in both]
+    read = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
+    found = np.full(len(shifts), "", dtype=object)
+    found[~is_within(read, bounds.volume.lower, bounds.volume.upper)] = "outside the volume"
+    if bounds.edge is not None and references.artefacts[group.artefact].role == "plate":
+        around = outline(at_zero, group.layout, bounds.edge) + shifts[:, None, :]
+        beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
+        found[(found == "") & beyond] = "edge outside the volume"
+    by_probes = {}
+    for probes in group.probes[plane]:
+        one = found.copy()
+        for probe in probes:
+            if probe in bounds.reach:
+                one[(one == "") & ~is_within(read, *bounds.reach[probe])] = f"out of reach of probe {probe}"
+        by_probes[probes] = one.tolist()
+    return by_probes
+
+
+def _candidates(
+    group: _Group, reasons: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], list[str]]], d: int
+) -> Iterator[Generated]:
+    readings = {
+        (probes, k): (ReadingGroup(probes, balls.names, balls.indices, group.repeats, group.uncertainty),)
+        for plane in group.planes
+        for probes in group.probes[plane]
+        for k, balls in enumerate(group.balls)
+    }
+    for plane in group.planes:
+        axes = IN_PLANE_AXES[plane]
+        for row, (level, place) in enumerate(product(group.levels[plane], group.places[plane])):
+            at = {axis: length for axis, length in sorted(zip(axes, place, strict=True))}
+            where = f"{'at' if group.anchor == 'corner' else 'about'} {_both(*at.values())}"
+            name = f"{group.prefix}{where}" if d == 2 else f"{group.prefix}{plane} {format_length(level)} {where}"
+            placed: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": length_text(level)}
+            placed[group.anchor] = {axis: length_text(length) for axis, length in at.items()}
+            for turn in group.turns:
+                pose = None
+                turned = f"{name} turn {turn}" if len(set(group.turns)) > 1 else name
+                for probes, (k, balls) in product(group.probes[plane], enumerate(group.balls)):
+                    reason = reasons[plane, turn, k][probes][row]
+                    full = f"{turned} {'+'.join(probes)}" if len(group.probes[plane]) > 1 else turned
+                    full = f"{full} {balls.word}" if len(group.balls) > 1 else full
+                    if reason:
+                        yield Generated(full, None, plane, {}, reason)
+                        continue
+                    pose = pose or _pose(PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d)
+                    position = Position(full, group.artefact, pose, readings[probes, k])
+                    stated: dict[str, Any] = {"name": full}
+                    stated |= {"artefact": group.artefact} if group.names_artefact else {}
+                    stated |= placed
+                    stated |= {"quarter_turns": turn} if turn else {}
+                    stated |= {"probes": list(probes)} if group.names_probes else {}
+                    stated |= {"balls": balls.written} if balls.written != "all" else {}
+                    stated |= group.written
+                    yield Generated(full, position, "" if d == 2 else plane, stated, "")
+
+
+def _pose(placement: PlanePlacement, layout: BallLayout, dimension: int) -> Pose:
+    pose = nominal_pose(placement, layout, dimension)
+    for array in (pose.rotation, pose.origin):
+        array.setflags(write=False)
+    return pose
+
+
+def _both(first: float, second: float) -> str:
+    one, other = format_length(first), format_length(second)
+    number, _, unit = one.partition(" ")
+    return f"{number if other.endswith(f' {unit}') else one}, {other}"
+
+
+def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _Group | None:
+    before = len(references.problems.messages)
+    artefact = references.artefact(settings.artefact, steps)
+    layout = references.layouts.get(artefact) if artefact is not None else None
+    planes = _planes(settings, steps, references)
+    if planes is None:
+        return None
+    levels = _levels(settings, planes, steps, references)
+    anchor: Literal["corner", "centre"] = "centre" if settings.corners is None else "corner"
+    lengths = settings.centres if settings.corners is None else settings.corners
+    assert lengths is not None
+    places = _places(lengths, planes, (*steps, f"{anchor}s"), references)
+    probes = _probes(settings, planes, steps, references)
+    uncertainty, _ = lengths_per_axis(settings.standard_uncertainty, (*steps, "standard_uncertainty"), references)
+    balls = _balls(settings, layout, (*steps, "balls"), references) if layout is not None else ()
+    if artefact is None or layout is None or len(references.problems.messages) > before:
+        return None
+    turns = settings.quarter_turns if isinstance(settings.quarter_turns, tuple) else (settings.quarter_turns,)
+    kept: dict[str, Any] = {"repeats": settings.repeats} if settings.repeats != 1 else {}
+    if uncertainty is not None:
+        node = written(references.problems.root, *steps, "standard_uncertainty")
+        assert node is not None
+        kept["standard_uncertainty"] = to_python(node)
+    prefix = "" if settings.name is None else f"{settings.name} "
+    return _Group(
+        artefact,
+        layout,
+        prefix,
+        planes,
+        levels,
+        anchor,
+        places,
+        tuple(turn % 4 for turn in turns),
+        probes,
+        balls,
+        settings.repeats,
+        uncertainty,
+        len(references.artefact_names) > 1,
+        written(references.problems.root, "probes") is not None,
+        kept,
+    )
+
+
+def _planes(settings: GroupSettings, steps: Steps, references: References) -> tuple[Axis, ...] | None:
+    if references.dimension is None:
+        return None
+    if references.dimension == 2:
+        for key in ("planes", "levels"):
+            if getattr(settings, key) is not None:
+                references.problems.add((*steps, key), "has no meaning in two dimensions; remove it", of_key=True)
+        return ("z",)
+    text = 'missing; add "planes", such as [x, y, z]'
+    if not references.require(settings.planes is not None, (*steps, "planes"), text):
+        return None
+    return settings.planes
+
+
+def _levels(
+    settings: GroupSettings, planes: Sequence[Axis], steps: Steps, references: References
+) -> dict[str, tuple[float, ...]]:
+    if references.dimension == 2:
+        return {"z": (0.0,)}
+    text = 'missing; add "levels", the co-ordinates of the planes'
+    if not references.require(settings.levels is not None, (*steps, "levels"), text):
+        return {}
+    if not isinstance(settings.levels, LengthsByAxisSettings):
+        return dict.fromkeys(planes, _values(settings.levels))
+    return _by_axis(settings.levels, planes, "a plane", (*steps, "levels"), references)
+
+
+def _places(
+    lengths: LengthsByAxisSettings, planes: Sequence[Axis], steps: Steps, references: References
+) -> dict[str, tuple[tuple[float, float], ...]]:
+    axes = sorted({axis for plane in planes for axis in IN_PLANE_AXES[plane]})
+    found = _by_axis(lengths, axes, "an axis of the planes", steps, references)
+    if set(found) != set(axes):
+        return {}
+    result: dict[str, tuple[tuple[float, float], ...]] = {}
+    for plane in planes:
+        first, second = IN_PLANE_AXES[plane]
+        # A grid so fine that it is refused need not be made.
+        count = len(found[first]) * len(found[second])
+        if count > MOST_CANDIDATES:
+            text = f"{count} places are too many; at most {MOST_CANDIDATES} are possible"
+            references.problems.add(steps, text)
+            return {}
+        result[plane] = tuple(product(found[first], found[second]))
+        if first > second:
+            result[plane] = tuple((a, b) for b, a in product(found[second], found[first]))
+    return result
+
+
+def _by_axis(
+    lengths: LengthsByAxisSettings, axes: Sequence[str], what: str, steps: Steps, references: References
+) -> dict[str, tuple[float, ...]]:
+    found = {}
+    for axis in AXIS_INDEX:
+        value = getattr(lengths, axis)
+        if value is not None and axis not in axes:
+            references.problems.add((*steps, axis), f"is not {what}; remove it, or add to planes", of_key=True)
+        elif value is not None:
+            found[axis] = _values(value)
+        elif axis in axes:
+            references.problems.add((*steps, axis), f'missing; add "{axis}"')
+    return found
+
+
+def _values(lengths: Any) -> tuple[float, ...]:
+    if isinstance(lengths, RangeSettings):
+        last, spread = lengths.count - 1, lengths.to - lengths.from_
+        # The ends are exactly as stated, and values between them those that one would write.
+        inner = [float(np.round(lengths.from_ + spread * k / last, 12)) for k in range(1, last)]
+        return (lengths.from_, *inner, lengths.to)
+    return lengths if isinstance(lengths, tuple) else (lengths,)
+
+
+def _probes(
+    settings: GroupSettings, planes: Sequence[Axis], steps: Steps, references: References
+) -> dict[str, tuple[tuple[str, ...], ...]]:
+    stated, where = settings.probes, (*steps, "probes")
+    if stated is None:
+        names = references.probe_names(None, steps)
+        return {} if names is None else dict.fromkeys(planes, (names,))
+    if not isinstance(stated, ProbesByPlaneSettings):
+        return dict.fromkeys(planes, _sets(stated, where, references))
+    if references.dimension == 2:
+        references.problems.add(where, "has no planes in two dimensions; list the probes")
+        return {}
+    found = {}
+    for plane in AXIS_INDEX:
+        value = getattr(stated, plane)
+        if value is not None and plane not in planes:
+            text = "is not among the planes; remove it, or add it to planes"
+            references.problems.add((*where, plane), text, of_key=True)
+        elif value is not None:
+            found[plane] = _sets(value, (*where, plane), references)
+        elif plane in planes:
+            references.problems.add((*where, plane), f'missing; add "{plane}"')
+    return found
+
+
+def _sets(stated: Any, steps: Steps, references: References) -> tuple[tuple[str, ...], ...]:
+    if isinstance(stated[0], str):
+        references.are_probes(stated, steps)
+        return (stated,)
+    for k, names in enumerate(stated):
+        references.are_probes(names, (*steps, k))
+    return tuple(stated)
+
+
+def _balls(settings: GroupSettings, layout: BallLayout, steps: Steps, references: References) -> tuple[_Balls, ...]:
+    stated: Any = settings.balls
+    is_several = form_of_balls(stated) == "<sets>"
+    found = []
+    for k, one in enumerate(stated if is_several else (stated,)):
+        where = (*steps, k) if is_several else steps
+        indices: Indices | None
+        if one == "all":
+            indices = np.arange(len(layout.names))
+        elif one == "corners":
+            try:
+                indices = corners(layout)
+            except ValueError as error:
+                references.problems.add(where, str(error))
+                continue
+        else:
+            indices = references.ball_indices(one, layout, where)
+            if indices is None:
+                continue
+        indices.setflags(write=False)
+        names = tuple(layout.names[i] for i in indices)
+        word = "all balls" if one == "all" else "corners" if one == "corners" else f"set {k + 1}"
+        found.append(_Balls(word, names, indices, "all" if one == "all" else list(names)))
+    return tuple(found)

@@ -1,0 +1,299 @@
+"""What an experiment file says of the pool: candidates to choose from, how long they take, limits on the choice."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from ..geometry.artefacts import Name
+from ..geometry.positions import Axis
+from ..quantities import Duration, Length
+from ..settings import FORM, Settings
+from .position_sections import (
+    BallNames,
+    CoordinatesSettings,
+    Count,
+    DistancesSettings,
+    LengthPerAxis,
+    PositionSettings,
+    ProbeNames,
+    RadiusSettings,
+    Text,
+)
+
+AXES = ("x", "y", "z")
+GROUP_KEYS = ("planes", "levels", "corners", "centres")
+
+Seconds = Duration | None
+
+
+class OwnTimesSettings(Settings):
+    """How long a position takes by itself, where that differs from the other positions."""
+
+    set_up: Seconds = Field(None, description="to set the artefact up and align it")
+    reading: Seconds = Field(None, description="of a reading of a ball")
+
+
+class TimesSettings(OwnTimesSettings):
+    """How long things take."""
+
+    set_up: Seconds = Field(None, description="to set an artefact up and align it; default 20 min")
+    reading: Seconds = Field(None, description="of a reading of a ball; default 15 s")
+    probe_change: Seconds = Field(None, description="to go on with another probe; default 2 min")
+    plane_change: Seconds = Field(
+        None,
+        description="more for a position in another plane, or of another artefact, than the one before; default 30 min",
+    )
+
+
+class RangeSettings(Settings):
+    """Evenly spaced lengths, both ends included."""
+
+    from_: Length = Field(alias="from", description="the first")
+    to: Length = Field(description="the last")
+    count: Annotated[int, Field(ge=2, le=1000)] = Field(description="how many")
+
+
+LengthList = Annotated[tuple[Length, ...], Field(min_length=1, max_length=1000)]
+Lengths = Annotated[
+    Annotated[Length, Tag("<one>")] | Annotated[LengthList, Tag("<list>")] | Annotated[RangeSettings, Tag("<mapping>")],
+    FORM,
+]
+
+
+class LengthsByAxisSettings(Settings):
+    """Lengths along each axis: one, a list, or a range."""
+
+    x: Lengths | None = Field(None, description="along x")
+    y: Lengths | None = Field(None, description="along y")
+    z: Lengths | None = Field(None, description="along z")
+
+
+def _form_of_levels(value: Any) -> str:
+    if isinstance(value, dict):
+        return "<planes>" if set(value) & set(AXES) else "<range>"
+    return "<list>" if isinstance(value, tuple) else "<one>"
+
+
+Levels = Annotated[
+    Annotated[Length, Tag("<one>")]
+    | Annotated[LengthList, Tag("<list>")]
+    | Annotated[RangeSettings, Tag("<range>")]
+    | Annotated[LengthsByAxisSettings, Tag("<planes>")],
+    Discriminator(_form_of_levels),
+]
+
+
+def _form_of_sets(value: Any) -> str:
+    if isinstance(value, dict):
+        return "<planes>"
+    return "<sets>" if isinstance(value, tuple) and any(isinstance(one, tuple) for one in value) else "<list>"
+
+
+ProbeSets = Annotated[
+    Annotated[ProbeNames, Tag("<list>")]
+    | Annotated[Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")]
+    | Annotated[ProbeNames, Tag("<planes>")],
+    Discriminator(_form_of_sets),
+]
+
+
+class ProbesByPlaneSettings(Settings):
+    """Probes, or sets of them to choose from, in each plane."""
+
+    x: ProbeSets | None = Field(None, description="in planes across x")
+    y: ProbeSets | None = Field(None, description="in planes across y")
+    z: ProbeSets | None = Field(None, description="in planes across z")
+
+
+GroupProbes = Annotated[
+    Annotated[ProbeNames, Tag("<list>")]
+    | Annotated[Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")]
+    | Annotated[ProbesByPlaneSettings, Tag("<planes>")],
+    Discriminator(_form_of_sets),
+]
+
+SomeBalls = Annotated[
+    Annotated[Literal["all", "corners"], Tag("<one>")]
+    | Annotated[BallNames, Tag("<list>")]
+    | Annotated[BallNames, Tag("<mapping>")],
+    FORM,
+]
+
+
+def form_of_balls(value: Any) -> str:
+    """Whether balls are stated by a word, as a list of names, or as a list of such sets."""
+    if not isinstance(value, tuple):
+        return "<one>"
+    return "<sets>" if any(isinstance(one, tuple) or one in ("all", "corners") for one in value) else "<list>"
+
+
+GroupBalls = Annotated[
+    Annotated[Literal["all", "corners"], Tag("<one>")]
+    | Annotated[BallNames, Tag("<list>")]
+    | Annotated[Annotated[tuple[SomeBalls, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")],
+    Discriminator(form_of_balls),
+]
+Turns = Annotated[
+    Annotated[int, Tag("<one>")]
+    | Annotated[Annotated[tuple[int, ...], Field(min_length=1, max_length=1000)], Tag("<list>")]
+    | Annotated[int, Tag("<mapping>")],
+    FORM,
+]
+
+
+class GroupSettings(Settings):
+    """Candidates that are every combination of planes, levels, places, turns, probes and balls."""
+
+    name: Name | None = Field(None, description="of the group; the names of its candidates begin with it")
+    artefact: Name | None = Field(None, description="name of the artefact; optional if there is exactly one")
+    planes: Annotated[tuple[Axis, ...], Field(min_length=1)] | None = Field(
+        None, description="axes that the artefact's plane is normal to, such as [x, y, z]; omitted in 2-D"
+    )
+    levels: Levels | None = Field(
+        None,
+        description="co-ordinates of the planes: a list, {from: 0 mm, to: 1 m, count: 5}, or by plane {x: …, z: …}; "
+        "omitted in 2-D",
+    )
+    corners: LengthsByAxisSettings | None = Field(
+        None, description="lower corners of the turned bounding rectangle along each axis, as lists or ranges"
+    )
+    centres: LengthsByAxisSettings | None = Field(
+        None, description="centres of the bounding rectangle along each axis, instead of corners"
+    )
+    quarter_turns: Turns = Field(0, description="one number of turns by 90 degrees, or a list; default 0")
+    probes: GroupProbes | None = Field(
+        None,
+        description="names of probes, or a list of such sets to choose from, [[right, left], [right]]; either for all "
+        "planes or by plane; optional if there is exactly one probe",
+    )
+    balls: GroupBalls = Field(
+        "all", description="all (default), corners, a list of balls, or a list of such sets, [all, corners]"
+    )
+    repeats: Count = Field(1, description="how often every ball is read with every probe; default 1")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None, description="of each reading there, one length or per axis; default: machine.repeatability"
+    )
+    times: OwnTimesSettings | None = Field(None, description="times that are others than in pool.times")
+
+    @model_validator(mode="after")
+    def _one_anchor(self) -> Self:
+        if (self.corners is None) == (self.centres is None):
+            raise ValueError('needs either "corners" or "centres"; give exactly one of them')
+        return self
+
+
+class ListedSettings(PositionSettings):
+    """A candidate by itself, described as a position is."""
+
+    name: Name = Field(description="name of the position, if it is chosen")
+    times: OwnTimesSettings | None = Field(None, description="times that are others than in pool.times")
+
+
+def is_group(value: Any) -> bool:
+    """Whether an entry of the pool's candidates, mapping or settings, stands for many."""
+    return isinstance(value, GroupSettings) or isinstance(value, dict) and bool(set(GROUP_KEYS) & set(value))
+
+
+CandidateSettings = Annotated[
+    Annotated[GroupSettings, Tag("<group>")] | Annotated[ListedSettings, Tag("<listed>")],
+    Discriminator(lambda value: "<group>" if is_group(value) else "<listed>"),
+]
+
+
+class _Priced(Settings):
+    name: Name = Field(description="name of the item, to be told by")
+    price: Duration = Field(0.0, description="what it takes of the budget, such as 3 h; default nothing")
+
+
+class PricedDistancesSettings(_Priced, DistancesSettings):
+    """Calibrated distances that can be had at a price."""
+
+
+class PricedCoordinatesSettings(_Priced, CoordinatesSettings):
+    """Calibrated co-ordinates that can be had at a price."""
+
+
+class PricedRadiusSettings(_Priced, RadiusSettings):
+    """The calibrated radius of a Bryan gauge that can be had at a price."""
+
+
+PricedSettings = Annotated[
+    PricedDistancesSettings | PricedCoordinatesSettings | PricedRadiusSettings, Field(discriminator="kind")
+]
+
+
+class SelectorSettings(Settings):
+    """Which candidates are meant: those to which everything stated applies."""
+
+    name: Text | None = Field(None, description='name, in which * stands for anything, such as "z *"')
+    group: Name | None = Field(None, description="name of their entry in pool.candidates")
+    plane: Axis | None = Field(None, description="axis that the artefact's plane is normal to")
+    artefact: Name | None = Field(None, description="name of the artefact")
+    probe: Name | None = Field(None, description="a probe that they are read with")
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if not self.model_fields_set:
+            raise ValueError("says nothing; give at least one of name, group, plane, artefact, probe")
+        return self
+
+
+class AtMostSettings(Settings):
+    """No more than so many of some candidates."""
+
+    of: SelectorSettings = Field(description="which, such as {plane: x}")
+    count: Annotated[int, Field(ge=0, le=100_000)] = Field(description="how many of them at most")
+
+
+Ends = tuple[Length, Length]
+
+
+class RegionSettings(Settings):
+    """Where the tip of a probe can be; axes that are left out are not limited."""
+
+    x: Ends | None = Field(None, description="lower and upper end along x")
+    y: Ends | None = Field(None, description="lower and upper end along y")
+    z: Ends | None = Field(None, description="lower and upper end along z")
+
+
+Together = Annotated[tuple[Name, ...], Field(min_length=2)]
+
+
+class LimitsSettings(Settings):
+    """What a choice has to comply with."""
+
+    keep: Annotated[
+        Annotated[Literal["all"], Tag("<one>")]
+        | Annotated[tuple[Name, ...], Tag("<list>")]
+        | Annotated[tuple[Name, ...], Tag("<mapping>")],
+        FORM,
+    ] = Field((), description="candidates that must be chosen, by name; all: every position of the file")
+    never_together: tuple[Together, ...] = Field(
+        (), description="lists of names, of each of which at most one is chosen"
+    )
+    at_most: tuple[AtMostSettings, ...] = Field((), description="{of: {plane: x}, count: 2} and the like")
+    reach: dict[Name, RegionSettings] = Field(
+        default_factory=dict, description="name of a probe → where balls can be read with it, {x: [200 mm, 1 m]}"
+    )
+    edge: Length | None = Field(
+        None,
+        description="material of a plate beyond its outermost balls, which has to stay inside the volume; default: "
+        "only balls that are read have to",
+    )
+
+
+class PoolSettings(Settings):
+    """What a plan chooses from, besides the positions of the file."""
+
+    times: TimesSettings = Field(
+        default_factory=lambda: TimesSettings.model_validate({}), description="how long things take"
+    )
+    candidates: tuple[CandidateSettings, ...] = Field(
+        (), description="groups of candidates, and single ones described as a position is"
+    )
+    calibration: tuple[PricedSettings, ...] = Field((), description="items of calibration that can be had at a price")
+    limits: LimitsSettings = Field(
+        default_factory=lambda: LimitsSettings.model_validate({}), description="what a choice has to comply with"
+    )

@@ -1,0 +1,375 @@
+"""From the settings of a pool to candidates, those that stand there twice left out, and limits on choosing them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from ..geometry.positions import AXIS_INDEX, ball_coordinates
+from ..quantities import format_length
+from ..settings import hint, listing
+from .calibrations import resolve_calibration
+from .checks import TOLERANCE, check_inside, check_lengths
+from .messages import Steps, format_path
+from .model import Calibration, Floats, Machine, Position, RadiusCalibration
+from .placements import resolve_position
+from .pool import AtMost, Candidate, ChangeTimes, Pool
+from .pool_groups import Bounds, extent, generate, is_within, outline
+from .pool_sections import LimitsSettings, ListedSettings, OwnTimesSettings, SelectorSettings, TimesSettings, is_group
+from .problems import written, written_count, written_text
+from .references import References, Tally, frozen
+from .structure import Sections
+from .yamltree import to_python
+
+SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
+
+
+@dataclass
+class Candidates:
+    """Positions to choose from as far as they are right; `complete` tells whether all that is written is."""
+
+    found: list[Candidate] = field(default_factory=list)
+    dropped: dict[str, int] = field(default_factory=dict)
+    complete: bool = True
+    names: set[str] = field(default_factory=set)
+    seen: dict[Any, str] = field(default_factory=dict)
+
+    def add(self, candidate: Candidate) -> None:
+        """Add a candidate unless the same stands there already."""
+        key = _identity(candidate.item) if isinstance(candidate.item, Position) else candidate.name
+        if key in self.seen and not candidate.drawn:
+            self.drop("stands there twice")
+            return
+        self.seen.setdefault(key, candidate.name)
+        name, k = candidate.name, 1
+        while name in self.names:
+            k += 1
+            name = f"{candidate.name} ({k})"
+        self.names.add(name)
+        if name != candidate.name:
+            assert isinstance(candidate.item, Position)
+            item = replace(candidate.item, name=name)
+            candidate = replace(candidate, name=name, item=item, settings={**candidate.settings, "name": name})
+        self.found.append(candidate)
+
+    def drop(self, reason: str) -> None:
+        """Count a candidate that is dropped."""
+        self.dropped[reason] = self.dropped.get(reason, 0) + 1
+
+    @property
+    def positions(self) -> tuple[Position, ...]:
+        """The candidates that are positions."""
+        return tuple(one.item for one in self.found if isinstance(one.item, Position))
+
+
+def resolve_candidates(
+    sections: Sections, positions: Mapping[int, Position], machine: Machine | None, references: References
+) -> Candidates:
+    """Return the positions to choose from, none without a pool; what is wrong goes to the problems."""
+    problems = references.problems
+    root, result = problems.root, Candidates()
+    if ("pool", "times") not in sections.values:
+        return result
+    # The candidates have a limit of their own.
+    references = replace(references, tally=Tally())
+    _check_names(references)
+    times: TimesSettings = sections.get("pool", "times")
+    limits: LimitsSettings = sections.get("pool", "limits")
+    reach = _reach(limits, references)
+    bounds = None
+    if machine is not None and machine.dimension == references.dimension:
+        bounds = Bounds(machine.volume, reach, limits.edge)
+    result.complete = len(positions) == written_count(root, "positions")
+    for i, position in positions.items():
+        settings = sections.get("positions", i)
+        stated = to_python(written(root, "positions", i))  # type: ignore[arg-type]
+        result.add(_candidate(position, settings.plane, "", True, stated, times, None, references))
+        references.count_readings(result.found[-1].readings, ("positions", i))
+        if bounds is not None:
+            _check_bounds(position, ("positions", i), bounds, references)
+    count = len(positions)
+    for i in range(written_count(root, "pool", "candidates")):
+        steps: Steps = ("pool", "candidates", i)
+        settings = sections.get(*steps)
+        if settings is None:
+            references.check_written(steps)
+            result.complete = False
+            count += 1
+        elif isinstance(settings, ListedSettings):
+            count += 1
+            listed = resolve_position(settings, steps, references)
+            if listed is None:
+                result.complete = False
+                continue
+            if bounds is not None:
+                before = len(problems.messages)
+                check_inside(listed, steps, bounds.volume, references)
+                if len(problems.messages) == before:
+                    _check_bounds(listed, steps, bounds, references)
+            stated = to_python(written(root, *steps))  # type: ignore[arg-type]
+            result.add(
+                _candidate(listed, settings.plane, settings.name, False, stated, times, settings.times, references)
+            )
+        else:
+            generated = generate(settings, steps, bounds, count, references)
+            if generated is None:
+                result.complete = False
+                continue
+            count += len(generated)
+            group = settings.name or format_path(steps[1:])
+            for one in generated:
+                if one.position is None:
+                    result.drop(one.reason)
+                    continue
+                result.add(
+                    _candidate(one.position, one.plane, group, False, one.settings, times, settings.times, references)
+                )
+    if result.complete and not result.found:
+        why = [f"{number} {reason}" for reason, number in result.dropped.items()]
+        text = f"no candidate is left: {listing(why)}" if why else "there is no candidate; add some, or positions"
+        problems.add(("pool", "candidates"), f"{text}; widen it" if why else text, of_key=True)
+    return result
+
+
+def resolve_pool(
+    sections: Sections,
+    candidates: Candidates,
+    positions: Mapping[int, Position],
+    calibrations: Mapping[int, Calibration],
+    references: References,
+) -> Pool | None:
+    """Return the pool, or None without one; what is wrong goes to the problems."""
+    problems = references.problems
+    root = problems.root
+    if ("pool", "times") not in sections.values:
+        return None
+    found, complete = list(candidates.found), candidates.complete
+    at_most: list[AtMost] = []
+    radii: dict[str, list[int]] = {}
+    fixed = {one.artefact: i for i, one in calibrations.items() if isinstance(one, RadiusCalibration)}
+    by_steps: dict[Steps, Calibration] = {("calibration", i): one for i, one in calibrations.items()}
+    for i in range(written_count(root, "pool", "calibration")):
+        steps: Steps = ("pool", "calibration", i)
+        settings = sections.get(*steps)
+        if settings is None:
+            references.check_written(steps)
+        item = resolve_calibration(settings, steps, references) if settings is not None else None
+        if item is None:
+            complete = False
+            continue
+        by_steps[steps] = item
+        if isinstance(item, RadiusCalibration):
+            if item.artefact in fixed:
+                text = f'the radius of "{item.artefact}" stands in calibration[{fixed[item.artefact]}] already; '
+                problems.add(steps, f"{text}remove one of the two")
+            radii.setdefault(item.artefact, []).append(len(found))
+        stated = to_python(written(root, *steps))  # type: ignore[arg-type]
+        stated = {key: value for key, value in stated.items() if key not in ("name", "price")}
+        found.append(Candidate(settings.name, item, settings.price, "", settings.name, False, stated))
+    if complete:
+        check_lengths(by_steps, candidates.positions, references)
+    at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
+    must, limited = _limits(sections.get("pool", "limits"), found, complete, references)
+    times: TimesSettings = sections.get("pool", "times")
+    changes = ChangeTimes(_or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE))
+    return Pool(tuple(found), changes, must, (*at_most, *limited), candidates.dropped)
+
+
+def _candidate(
+    position: Position,
+    plane: str | None,
+    group: str,
+    drawn: bool,
+    stated: Mapping[str, Any],
+    times: TimesSettings,
+    own: OwnTimesSettings | None,
+    references: References,
+) -> Candidate:
+    set_up, reading = (
+        _or(getattr(own, key, None), _or(getattr(times, key), default))
+        for key, default in (("set_up", SET_UP), ("reading", READING))
+    )
+    readings = sum(len(one.probes) * len(one.balls) * one.repeats for one in position.readings)
+    probes = {probe for one in position.readings for probe in one.probes}
+    seconds = set_up + readings * reading + (len(probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
+    across = "" if plane is None or references.dimension == 2 else plane
+    stated = {key: value for key, value in stated.items() if key != "times"}
+    return Candidate(position.name, position, seconds, across, group, drawn, stated)
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
+def _identity(position: Position) -> Any:
+    """Equal where positions are the same: artefact, pose to a nanometre, and what is read."""
+    pose = np.concatenate([position.pose.rotation.ravel(), position.pose.origin])
+    return (
+        position.artefact,
+        tuple(np.rint(1e9 * pose).tolist()),
+        tuple(
+            (
+                frozenset(one.probes),
+                one.ball_indices.tobytes() if len(one.balls) < 2 else np.sort(one.ball_indices).tobytes(),
+                one.repeats,
+                None if one.standard_uncertainty is None else one.standard_uncertainty.tobytes(),
+            )
+            for one in position.readings
+        ),
+    )
+
+
+def _check_names(references: References) -> None:
+    """Report entries of the pool with the name of another, or of a position."""
+    problems = references.problems
+    first: dict[str, str] = {}
+    for section in (("positions",), ("pool", "candidates"), ("pool", "calibration")):
+        for i in range(written_count(problems.root, *section)):
+            steps: Steps = (*section, i)
+            name = written_text(problems.root, *steps, "name")
+            if name is None:
+                continue
+            if name in first and section != ("positions",):
+                problems.add((*steps, "name"), f'"{name}" is the name of {first[name]} already; names must differ')
+            first.setdefault(name, format_path(steps))
+
+
+def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
+    """Lower and upper ends (2, d) of where balls can be read, by probe."""
+    problems, found = references.problems, {}
+    for name, region in limits.reach.items():
+        steps: Steps = ("pool", "limits", "reach", name)
+        if name not in references.probes:
+            problems.add(steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True)
+            continue
+        ends = np.array([[-np.inf] * 3, [np.inf] * 3])
+        for k, axis in enumerate(AXIS_INDEX):
+            stated = getattr(region, axis)
+            if stated is None:
+                continue
+            if stated[0] >= stated[1]:
+                problems.add((*steps, axis), "the lower end must be below the upper; correct them")
+            if k >= (references.dimension or 3):
+                problems.add((*steps, axis), "has no meaning in two dimensions; remove it", of_key=True)
+            ends[:, k] = stated
+        found[name] = frozen(ends[:, : references.dimension or 3])
+    return found
+
+
+def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: References) -> None:
+    """Report a position whose plate's edge is outside the volume, or that a probe cannot reach."""
+    layout, problems = references.layouts[position.artefact], references.problems
+    lower, upper = bounds.volume.lower, bounds.volume.upper
+    if bounds.edge is not None and references.artefacts[position.artefact].role == "plate":
+        around = outline(position.pose, layout, bounds.edge)
+        if not is_within(around, lower, upper):
+            beyond = format_length(float(np.max([lower - around[0], around[1] - upper])))
+            text = f"with its edge of {format_length(bounds.edge)} the plate is {beyond} outside the volume"
+            problems.add(steps, f"{text}; move it, or correct pool.limits.edge")
+    if not bounds.reach:
+        return
+    coordinates = ball_coordinates(position.pose, layout)
+    for group in position.readings:
+        for probe in group.probes:
+            if probe in bounds.reach:
+                text = _beyond(coordinates[group.ball_indices], bounds.reach[probe])
+                if text:
+                    text = f"probe {probe} does not reach that far: {text}; move it, or correct pool.limits.reach"
+                    problems.add(steps, text)
+
+
+def _beyond(points: Floats, ends: Floats) -> str:
+    lowest, highest = extent(points)
+    for k, axis in enumerate(list(AXIS_INDEX)[: points.shape[1]]):
+        if lowest[k] < ends[0, k] - TOLERANCE:
+            return f"a ball is at {axis} = {format_length(lowest[k])}, below {format_length(ends[0, k])}"
+        if highest[k] > ends[1, k] + TOLERANCE:
+            return f"a ball is at {axis} = {format_length(highest[k])}, above {format_length(ends[1, k])}"
+    return ""
+
+
+def _limits(
+    limits: LimitsSettings, found: Sequence[Candidate], complete: bool, references: References
+) -> tuple[tuple[int, ...], list[AtMost]]:
+    """Indices of what has to be chosen, and limits on numbers."""
+    problems, place = references.problems, ("pool", "limits")
+    index = {one.name: i for i, one in enumerate(found)}
+    before = len(problems.messages)
+
+    def of_names(names: Iterable[str], steps: Steps) -> list[int]:
+        for k, name in enumerate(names):
+            if name not in index and complete:
+                text = f'unknown candidate "{name}"; {hint(name, index)}'
+                problems.add((*steps, k), text)
+        return [index[name] for name in dict.fromkeys(names) if name in index]
+
+    if limits.keep == "all":
+        must = [i for i, one in enumerate(found) if one.drawn]
+    else:
+        must = of_names(limits.keep, (*place, "keep"))
+    at_most = []
+    for k, names in enumerate(limits.never_together):
+        members = of_names(names, (*place, "never_together", k))
+        if len(members) > 1:
+            at_most.append((AtMost(tuple(members), 1), (*place, "never_together", k)))
+    for k, limit in enumerate(limits.at_most):
+        members = _selected(limit.of, found, complete, (*place, "at_most", k, "of"), references)
+        if members:
+            at_most.append((AtMost(tuple(members), limit.count), (*place, "at_most", k)))
+    for one, steps in at_most:
+        kept = [found[i].name for i in sorted(set(must) & set(one.members))]
+        if len(kept) > one.count and len(problems.messages) == before:
+            text = f"at most {one.count} of these are allowed, but {listing(kept)} are to be kept; correct pool.limits"
+            problems.add(steps, text)
+    return tuple(sorted(must)), [one for one, _ in at_most]
+
+
+def _selected(
+    of: SelectorSettings, found: Sequence[Candidate], complete: bool, steps: Steps, references: References
+) -> list[int]:
+    """Indices of the candidates to which everything applies that a selector states."""
+    root = references.problems.root
+    groups = {one.group for one in found if one.group} | set(_group_names(root))
+    known: dict[str, Any] = {"group": groups, "artefact": references.artefact_names, "probe": references.probes}
+    for key, names in known.items():
+        name = getattr(of, key)
+        if name is not None and name not in names:
+            text = f'unknown {key} "{name}"; {hint(name, sorted(names))}'
+            references.problems.add((*steps, key), text)
+            return []
+    tests: list[Callable[[Candidate], bool]] = []
+    if of.name is not None:
+        pattern = of.name
+        tests.append(lambda one: fnmatchcase(one.name, pattern))
+        if complete and not any(fnmatchcase(one.name, pattern) for one in found):
+            references.problems.add((*steps, "name"), f'no candidate has a name such as "{pattern}"; correct it')
+    if of.group is not None:
+        tests.append(lambda one: one.group == of.group)
+    if of.plane is not None:
+        tests.append(lambda one: one.plane == of.plane)
+    if of.artefact is not None:
+        tests.append(lambda one: one.item.artefact == of.artefact)
+    if of.probe is not None:
+        tests.append(lambda one: of.probe in _probes_of(one))
+    return [i for i, one in enumerate(found) if all(test(one) for test in tests)]
+
+
+def _group_names(root: Any) -> list[str]:
+    names = []
+    for i in range(written_count(root, "pool", "candidates")):
+        entry = written(root, "pool", "candidates", i)
+        name = written_text(root, "pool", "candidates", i, "name")
+        if name is None and entry is not None and is_group(getattr(entry, "items", None)):
+            name = f"candidates[{i}]"
+        names += [name] if name is not None else []
+    return names
+
+
+def _probes_of(candidate: Candidate) -> set[str]:
+    if not isinstance(candidate.item, Position):
+        return set()
+    return {probe for group in candidate.item.readings for probe in group.probes}
