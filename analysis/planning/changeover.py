@@ -1,0 +1,200 @@
+"""In which order positions cost least change-over: planes, artefacts and probes are changed as seldom as possible.
+
+Going on to another plane or artefact takes `ChangeTimes.plane`; if the last probe of a position is not the first of
+the next, `ChangeTimes.probe` comes on top. The probes of a position are read one after the other in any order, and
+nothing is changed before the first position. Positions of equal kind stand together, so that the order of kinds is
+what is sought: dynamic programming over sets of kinds (Held and Karp, J. SIAM 10 (1962) 196), with the last probe
+and the last place as what the rest depends on. Up to twelve kinds that is exact; of more, only the `MOST_SETS` cheapest
+sets of each size are followed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from simulator.experiment.model import Position
+from simulator.experiment.pool import Candidate, ChangeTimes
+
+# Sets of kinds that are followed for each size, where there are more than so many kinds.
+MOST_EXACT = 12
+MOST_SETS = 500
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the change-over depends on: positions of equal kind follow one another without any."""
+
+    artefact: str
+    plane: str
+    probes: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A kind in its turn, the first probe that is read with, and the last."""
+
+    kind: Kind
+    first: str
+    last: str
+
+
+def kind_of(candidate: Candidate) -> Kind:
+    """The kind of a candidate that is a position.
+
+    :raises TypeError: it is an item of calibration.
+    """
+    if not isinstance(candidate.item, Position):
+        raise TypeError(f"{candidate.name} is no position")
+    return Kind(candidate.item.artefact, candidate.plane, frozenset(probes_of(candidate.item)))
+
+
+def probes_of(position: Position) -> tuple[str, ...]:
+    """The probes that a position is read with, each once, in the order of the file."""
+    return tuple(dict.fromkeys(probe for group in position.readings for probe in group.probes))
+
+
+def changeover(kinds: Collection[Kind], changes: ChangeTimes) -> float:
+    """Least total change-over, in seconds, of positions of these kinds; one listed twice stands for two positions.
+
+    >>> down, side = (Kind("plate", "z", frozenset({name})) for name in ("down", "side"))
+    >>> changeover([down, side, down], ChangeTimes(probe=120.0, plane=1800.0))
+    120.0
+    """
+    return _least(_counted(kinds), changes)
+
+
+@lru_cache(maxsize=100_000)
+def _least(kinds: frozenset[tuple[Kind, int]], changes: ChangeTimes) -> float:
+    return cheapest(kinds, changes)[0]
+
+
+def _counted(kinds: Iterable[Kind]) -> frozenset[tuple[Kind, int]]:
+    """Kinds with the least number of positions that leaves the same choice of first and last probes.
+
+    A position of two probes ends with the one that it has not begun with, two positions end with that they have begun
+    with, three are like one. Of more probes, two positions can begin and end with any.
+    """
+    found = []
+    for kind, count in Counter(kinds).items():
+        probes = len(kind.probes)
+        found.append((kind, 1 if probes == 1 else 2 - count % 2 if probes == 2 else min(count, 2)))
+    return frozenset(found)
+
+
+# By what has been visited: by the last probe and the last artefact and plane, the cost so far and where it came from.
+_Last = tuple[int, int]
+_Came = tuple[int, _Last, int, int]
+_States = dict[_Last, tuple[float, _Came]]
+
+
+def cheapest(
+    kinds: Iterable[tuple[Kind, int]], changes: ChangeTimes, after: Sequence[Kind] = ()
+) -> tuple[float, tuple[Visit, ...]]:
+    """The cheapest order of kinds with their numbers of positions, and what it costs, in seconds.
+
+    Positions of the kinds `after` have been read before, in that order; their visits come first.
+    """
+    # The order of a set differs from run to run.
+    todo = sorted(kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes), one[1]))
+    every = [(kind, 1) for kind in after] + todo
+    probe_names = sorted({probe for kind, _ in every for probe in kind.probes})
+    places = list(dict.fromkeys((kind.artefact, kind.plane) for kind, _ in every))
+    stops = [
+        _Stop(
+            places.index((kind.artefact, kind.plane)),
+            tuple(probe_names.index(probe) for probe in sorted(kind.probes)),
+            count,
+        )
+        for kind, count in every
+    ]
+    before = len(after)
+    # One layer for each number of kinds visited; of those read before, the order is given.
+    layers: list[dict[int, _States]] = [{0: {}}]
+    for number in range(len(stops)):
+        found: dict[int, _States] = {}
+        for visited, states in layers[-1].items():
+            known = _Known(states) if number else None
+            for i in (number,) if number < before else range(before, len(stops)):
+                if not visited >> i & 1:
+                    _go_on(found.setdefault(visited | 1 << i, {}), stops[i], i, visited, known, changes)
+        if len(todo) > MOST_EXACT and len(found) > MOST_SETS:
+            costs = {visited: min(states.values())[0] for visited, states in found.items()}
+            found = {
+                visited: found[visited] for visited in sorted(found, key=lambda one: (costs[one], one))[:MOST_SETS]
+            }
+        layers.append(found)
+    if not stops:
+        return 0.0, ()
+    ((visited, states),) = layers[-1].items()
+    last, (cost, _) = min(states.items(), key=lambda item: item[1])
+    visits: list[Visit] = []
+    for layer in reversed(layers[1:]):
+        _, (visited, before_that, first, i) = layer[visited][last]
+        visits.append(Visit(every[i][0], probe_names[first], probe_names[last[0]]))
+        last = before_that
+    return cost, tuple(reversed(visits))
+
+
+@dataclass(frozen=True)
+class _Stop:
+    place: int
+    probes: tuple[int, ...]
+    count: int
+
+
+class _Known:
+    """The cheapest states of a set of kinds: of all, by place, by probe, and by both."""
+
+    def __init__(self, states: _States) -> None:
+        self.both = states
+        self.by_place: dict[int, tuple[float, _Last]] = {}
+        self.by_probe: dict[int, tuple[float, _Last]] = {}
+        for last, (cost, _) in states.items():
+            probe, place = last
+            if place not in self.by_place or cost < self.by_place[place][0]:
+                self.by_place[place] = (cost, last)
+            if probe not in self.by_probe or cost < self.by_probe[probe][0]:
+                self.by_probe[probe] = (cost, last)
+        self.cheapest = min(self.by_place.values())
+
+    def with_any_probe(self, place: int, change: float) -> tuple[float, _Last]:
+        """The least cost to be at a place."""
+        cost, last = self.cheapest
+        return min(self.by_place.get(place, (cost + change, last)), (cost + change, last))
+
+    def with_probe(self, probe: int, place: int, change: float) -> tuple[float, _Last] | None:
+        """The least cost to be at a place with a probe, None where that was not the last."""
+        if probe not in self.by_probe:
+            return None
+        cost, last = self.by_probe[probe]
+        here = self.both.get((probe, place))
+        if here is not None and here[0] <= cost + change:
+            return here[0], (probe, place)
+        return cost + change, last
+
+
+def _go_on(states: _States, stop: _Stop, i: int, visited: int, known: _Known | None, changes: ChangeTimes) -> None:
+    """Add what going on to a stop leads to, whichever of its probes comes first and last."""
+    paid, origin = (0.0, (-1, -1)) if known is None else known.with_any_probe(stop.place, changes.plane)
+    for first in stop.probes:
+        arrived = (paid + (0.0 if known is None else changes.probe), origin)
+        if known is not None:
+            free = known.with_probe(first, stop.place, changes.plane)
+            arrived = arrived if free is None or arrived[0] < free[0] else free
+        for last in stop.probes:
+            if _can_end(len(stop.probes), stop.count, first == last):
+                old = states.get((last, stop.place))
+                if old is None or arrived[0] < old[0]:
+                    states[last, stop.place] = (arrived[0], (visited, arrived[1], first, i))
+
+
+def _can_end(probes: int, count: int, where_begun: bool) -> bool:
+    """Whether positions of one kind can end with the probe they have begun with, or with another."""
+    if probes == 1:
+        return where_begun
+    if probes == 2:
+        return where_begun == (count % 2 == 0)
+    return count > 1 or not where_begun

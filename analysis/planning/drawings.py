@@ -1,0 +1,78 @@
+"""A small drawing of where an artefact stands in the volume, as SVG within a page."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from simulator.experiment.messages import in_one_line
+from simulator.experiment.model import Experiment, Position
+from simulator.experiment.pool import Candidate
+from simulator.geometry.positions import AXIS_INDEX, ball_coordinates
+
+SIZE, MARGIN = 170.0, 22.0
+# Of more balls only those at the corners are drawn.
+MOST_BALLS = 400
+# Axis across the drawing, whether it runs to the left, and axis upwards, as seen from the end of the normal.
+VIEWS = {"x": ("y", False, "z"), "y": ("x", True, "z"), "z": ("x", False, "y")}
+
+
+def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
+    """A position seen against its plane's normal: the volume, the balls, filled where they are read, the first named.
+
+    An artefact in a free pose is seen along the axis in which it is thinnest.
+    """
+    position = candidate.item
+    assert isinstance(position, Position)
+    layout = experiment.layouts[position.artefact]
+    balls = ball_coordinates(position.pose, layout)
+    d = experiment.dimension
+    plane = candidate.plane or ("z" if d == 2 else "xyz"[int(np.ptp(balls, axis=0).argmin())])
+    across, to_left, up = VIEWS[plane]
+    columns = [AXIS_INDEX[across], AXIS_INDEX[up]]
+    lower, upper = experiment.machine.volume.lower[columns], experiment.machine.volume.upper[columns]
+    scale = (SIZE - 2 * MARGIN) / float((upper - lower).max())
+    width, height = scale * (upper - lower)
+    left, top = (SIZE - width) / 2, (SIZE - height) / 2
+    points = (balls[:, columns] - lower) * scale
+    if to_left:
+        points[:, 0] = width - points[:, 0]
+    points = np.column_stack([left + points[:, 0], top + height - points[:, 1]])
+    read = np.zeros(len(points), bool)
+    for group in position.readings:
+        read[group.ball_indices] = True
+    shown = np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
+    first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
+    parts = [
+        f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{_text(candidate.name)}" '
+        'font-family="sans-serif" font-size="10">',
+        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" fill="none" stroke="#999"/>',
+        f'<line x1="{first[0]:.1f}" y1="{first[1]:.1f}" x2="{second[0]:.1f}" y2="{second[1]:.1f}" stroke="#222"/>',
+    ]
+    for i in shown:
+        fill = "#222" if read[i] else "white"
+        radius = 3.2 if i == 0 else 1.8
+        parts.append(
+            f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}" stroke="#222"/>'
+        )
+    # The name goes to the side where there is room.
+    side, anchor = (6, "start") if first[0] < SIZE / 2 else (-6, "end")
+    above = -6 if first[1] > SIZE / 2 else 14
+    name = _text(layout.names[0])
+    label = f'<text x="{first[0] + side:.1f}" y="{first[1] + above:.1f}" text-anchor="{anchor}" stroke="white"'
+    parts.append(f'{label} stroke-width="3" paint-order="stroke" fill="#222">{name}</text>')
+    arrow = f"← {across}" if to_left else f"{across} →"
+    parts.append(f'<text x="{SIZE / 2:g}" y="{top + height + 13:.1f}" text-anchor="middle" fill="#555">{arrow}</text>')
+    x, y = left - 6, top + height / 2
+    parts.append(
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#555" transform="rotate(-90 {x:.1f} {y:.1f})">'
+        f"{up} →</text>"
+    )
+    seen = f"seen from +{plane}" if d == 3 else "seen from above"
+    parts.append(f'<text x="{SIZE / 2:g}" y="{top - 6:.1f}" text-anchor="middle" fill="#555">{seen}</text></svg>')
+    return "".join(parts)
+
+
+def _text(text: str) -> str:
+    return escape(in_one_line(text))

@@ -1,0 +1,194 @@
+"""Times of a campaign: the order that costs least change-over, and the run sheet that says what is done when."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from simulator.experiment.model import Position
+from simulator.experiment.pool import Candidate, ChangeTimes
+from simulator.settings import listing
+
+from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of
+
+__all__ = ["Kind", "RunSheet", "Step", "changeover", "kind_of", "ordered", "run_sheet"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A position of a run sheet: what to set up, in words, and what to read, with the probes in order.
+
+    `change` says what is changed before it, in `change_seconds`; `seconds` is what it takes by itself, and `start` when
+    its change-over begins, in seconds from the first position that is to be read. What is `done` has neither.
+    """
+
+    candidate: Candidate
+    place: str
+    probes: tuple[str, ...]
+    balls: str
+    change: str
+    change_seconds: float
+    seconds: float
+    start: float
+    done: bool
+
+    @property
+    def name(self) -> str:
+        return self.candidate.name
+
+    @property
+    def artefact(self) -> str:
+        return self.candidate.item.artefact
+
+    @property
+    def plane(self) -> str:
+        return self.candidate.plane
+
+    @property
+    def readings(self) -> int:
+        return self.candidate.readings
+
+
+@dataclass(frozen=True)
+class RunSheet:
+    """Positions in the order to read them, those done first, and items of calibration with their price in seconds."""
+
+    steps: tuple[Step, ...]
+    calibration: tuple[Candidate, ...]
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """All candidates, positions in the order of the sheet."""
+        return (*(step.candidate for step in self.steps), *self.calibration)
+
+    @property
+    def seconds(self) -> float:
+        """What is yet to be spent: on positions that are not done, changes between them, and calibration."""
+        return sum(step.seconds + step.change_seconds for step in self.steps) + sum(
+            one.seconds for one in self.calibration
+        )
+
+    @property
+    def hours(self) -> float:
+        """The same in hours."""
+        return self.seconds / 3600.0
+
+
+def run_sheet(chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[Candidate] = ()) -> RunSheet:
+    """The run sheet of chosen candidates: the order that costs least, what is done already first and as it was.
+
+    Candidates that are `done` may be among the chosen ones too.
+    """
+    before = [candidate for candidate in done if isinstance(candidate.item, Position)]
+    names = {candidate.name for candidate in before}
+    positions = [one for one in chosen if isinstance(one.item, Position) and one.name not in names]
+    sequence = ordered(positions, changes, before)
+    steps: list[Step] = []
+    elapsed = 0.0
+    for k, (candidate, probes) in enumerate(sequence):
+        is_done = k < len(before)
+        change, words = 0.0, ""
+        if k and not is_done:
+            change, words = _change(sequence[k - 1], sequence[k], changes)
+        seconds = 0.0 if is_done else candidate.seconds
+        place, balls = _place(candidate), _balls(candidate)
+        steps.append(Step(candidate, place, probes, balls, words, change, seconds, elapsed, is_done))
+        elapsed += change + seconds
+    return RunSheet(tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position)))
+
+
+def _change(
+    one: tuple[Candidate, tuple[str, ...]], other: tuple[Candidate, tuple[str, ...]], changes: ChangeTimes
+) -> tuple[float, str]:
+    before, after = kind_of(one[0]), kind_of(other[0])
+    words = []
+    if before.artefact != after.artefact:
+        words.append(f"artefact: {after.artefact}")
+    if before.plane != after.plane:
+        words.append(f"plane: across {after.plane}" if after.plane else "plane: free")
+    seconds = changes.plane if words else 0.0
+    if one[1][-1] != other[1][0]:
+        words.append(f"probe: {other[1][0]}")
+        seconds += changes.probe
+    return seconds, ", ".join(words)
+
+
+def _place(candidate: Candidate) -> str:
+    """How the artefact is set up, in words; lengths are those of the file."""
+    said: Mapping[str, Any] = candidate.settings
+    if said.get("pose") is not None:
+        pose = said["pose"]
+        rotation = pose.get("rotation")
+        turned = "not turned"
+        if rotation is not None:
+            one = isinstance(rotation, str)
+            turned = f"turned by {rotation}" if one else f"turned by {', '.join(rotation)} about x, y, z"
+        return f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))}, {turned}"
+    plane = said.get("plane")
+    words = (
+        []
+        if plane is None
+        else [f"{'flat' if plane == 'z' else 'upright'}, across {plane} at {plane} = {said['level']}"]
+    )
+    anchor = "corner" if said.get("corner") is not None else "centre"
+    words.append(f"{'lower corner' if anchor == 'corner' else 'centre'} at {_at(said[anchor])}")
+    turns = int(said.get("quarter_turns") or 0) % 4
+    words.append(f"turned {90 * turns} deg counter-clockwise seen from +{plane or 'z'}" if turns else "not turned")
+    return "; ".join(words)
+
+
+def _at(lengths: Mapping[str, str]) -> str:
+    return ", ".join(f"{axis} = {lengths[axis]}" for axis in sorted(lengths))
+
+
+def _balls(candidate: Candidate) -> str:
+    """Which balls are read, in words; with several groups of readings, by which probes."""
+    assert isinstance(candidate.item, Position)
+    groups = candidate.item.readings
+    stated: Iterable[Any] = candidate.settings.get("readings") or [candidate.settings]
+    words = []
+    for group, said in zip(groups, stated, strict=True):
+        is_all = said.get("balls") in (None, "all")
+        text = f"all {len(group.balls)}" if is_all else listing(group.balls, 50)
+        text += f", {group.repeats} times each" if group.repeats > 1 else ""
+        words.append(f"{text} with {', '.join(group.probes)}" if len(groups) > 1 else text)
+    return "; ".join(words)
+
+
+def ordered(
+    chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[Candidate] = ()
+) -> tuple[tuple[Candidate, tuple[str, ...]], ...]:
+    """Positions, those `done` first, in the order that costs least change-over, each with the order of its probes.
+
+    Positions of equal kind keep the order they are given in.
+    """
+    own = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
+    before = [kind_of(candidate) for candidate in done]
+    _, visits = cheapest(Counter(map(kind_of, own)).items(), changes, before)
+    found = []
+    for candidate, visit in zip(done, visits, strict=False):
+        found.append((candidate, _sequence(candidate, visit.first, visit.last)))
+    for visit in visits[len(before) :]:
+        members = [candidate for candidate in own if kind_of(candidate) == visit.kind]
+        first = visit.first
+        for k, candidate in enumerate(members):
+            last = visit.last if k == len(members) - 1 else _handed_on(visit, first, len(members) - k)
+            found.append((candidate, _sequence(candidate, first, last)))
+            first = last
+    return tuple(found)
+
+
+def _handed_on(visit: Visit, first: str, left: int) -> str:
+    """The last probe of a position, which the next of the same kind begins with; `left` positions are to come."""
+    others = sorted(visit.kind.probes - {first}) or [first]
+    # The last position must not begin with the probe that it is to end with.
+    suited = [probe for probe in others if probe != visit.last] if left == 2 else others
+    return (suited or others)[0]
+
+
+def _sequence(candidate: Candidate, first: str, last: str) -> tuple[str, ...]:
+    assert isinstance(candidate.item, Position)
+    between = [probe for probe in probes_of(candidate.item) if probe not in (first, last)]
+    return (first,) if first == last and not between else (first, *between, last)
