@@ -121,10 +121,8 @@ def cheapest(
                 if not visited >> i & 1:
                     _go_on(found.setdefault(visited | 1 << i, {}), stops[i], i, visited, known, changes)
         if len(todo) > MOST_EXACT and len(found) > MOST_SETS:
-            costs = {visited: min(states.values())[0] for visited, states in found.items()}
-            found = {
-                visited: found[visited] for visited in sorted(found, key=lambda one: (costs[one], one))[:MOST_SETS]
-            }
+            costs = sorted((min(states.values())[0], visited) for visited, states in found.items())
+            found = {visited: found[visited] for _, visited in costs[:MOST_SETS]}
         layers.append(found)
     if not stops:
         return 0.0, ()

@@ -56,12 +56,10 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         parts.append(
             f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}" stroke="#222"/>'
         )
-    # The name goes to the side where there is room.
-    side, anchor = (6, "start") if first[0] < SIZE / 2 else (-6, "end")
-    above = -6 if first[1] > SIZE / 2 else 14
-    name = _text(layout.names[0])
-    label = f'<text x="{first[0] + side:.1f}" y="{first[1] + above:.1f}" text-anchor="{anchor}" stroke="white"'
-    parts.append(f'{label} stroke-width="3" paint-order="stroke" fill="#222">{name}</text>')
+    # The name goes where there are no balls.
+    y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
+    label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
+    parts.append(f'{label} stroke="white" stroke-width="3" paint-order="stroke">{_text(layout.names[0])}</text>')
     arrow = f"← {across}" if to_left else f"{across} →"
     parts.append(f'<text x="{SIZE / 2:g}" y="{top + height + 13:.1f}" text-anchor="middle" fill="#555">{arrow}</text>')
     x, y = left - 6, top + height / 2

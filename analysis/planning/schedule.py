@@ -66,9 +66,8 @@ class RunSheet:
     @property
     def seconds(self) -> float:
         """What is yet to be spent: on positions that are not done, changes between them, and calibration."""
-        return sum(step.seconds + step.change_seconds for step in self.steps) + sum(
-            one.seconds for one in self.calibration
-        )
+        of_positions = sum(step.seconds + step.change_seconds for step in self.steps)
+        return of_positions + sum(one.seconds for one in self.calibration)
 
     @property
     def hours(self) -> float:
@@ -127,11 +126,9 @@ def _place(candidate: Candidate) -> str:
             turned = f"turned by {rotation}" if one else f"turned by {', '.join(rotation)} about x, y, z"
         return f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))}, {turned}"
     plane = said.get("plane")
-    words = (
-        []
-        if plane is None
-        else [f"{'flat' if plane == 'z' else 'upright'}, across {plane} at {plane} = {said['level']}"]
-    )
+    words = []
+    if plane is not None:
+        words.append(f"{'flat' if plane == 'z' else 'upright'}, across {plane} at {plane} = {said['level']}")
     anchor = "corner" if said.get("corner") is not None else "centre"
     words.append(f"{'lower corner' if anchor == 'corner' else 'centre'} at {_at(said[anchor])}")
     turns = int(said.get("quarter_turns") or 0) % 4

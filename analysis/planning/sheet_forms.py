@@ -152,9 +152,8 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
     for number, step in enumerate(sheet.steps, 1):
         parts.append(_step(number, step, experiment))
     if sheet.calibration:
-        rows = "".join(
-            f"<tr><td>{_text(one.name)}</td><td>{_price(one.seconds)}</td></tr>" for one in sheet.calibration
-        )
+        items = [f"<td>{_text(one.name)}</td><td>{_price(one.seconds)}</td>" for one in sheet.calibration]
+        rows = "".join(f"<tr>{item}</tr>" for item in items)
         parts.append(f"<h2>Calibration</h2><table><tr><th>item</th><th>price</th></tr>{rows}</table>")
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{_text(title)}</title>'
