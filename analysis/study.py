@@ -24,6 +24,7 @@ from simulator.threads import single_threaded
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
+from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, uncertainties
 
 # Residuals that a fit names.
@@ -32,13 +33,14 @@ LARGEST = 10
 
 @dataclass(frozen=True)
 class Plan:
-    """What a design will be worth: the verdict on its rank, and U1 to U6 if they were asked for."""
+    """What a design will be worth: the verdict on its rank, and U1 to U6 and tasks if they were asked for."""
 
     label: str
     title: str
     design: Design
     verdict: Verdict
     quantities: dict[str, Quantity]
+    tasks: tuple[TaskUncertainty, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,7 @@ class Fit:
     largest: tuple[Residual, ...]
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
+    tasks: tuple[TaskUncertainty, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -129,9 +132,11 @@ def _plan(experiment: Experiment, design: Design, with_quantities: bool) -> Plan
     spread = covariance(design, factor, found) if with_quantities or found.deficiency else _nothing_open(design, found)
     judged = verdict(design, layout, found, spread, experiment.expected_rank_deficiency, experiment.target_accuracy)
     quantities: dict[str, Quantity] = {}
+    tasks: tuple[TaskUncertainty, ...] = ()
     if with_quantities:
         quantities = uncertainties(design, layout, state, spread, target=experiment.target_accuracy)
-    return Plan(experiment.label, experiment.title, design, judged, quantities)
+        tasks = task_uncertainties(design, layout, state, spread)
+    return Plan(experiment.label, experiment.title, design, judged, quantities, tasks)
 
 
 def _nothing_open(design: Design, found: Spectrum) -> Covariance:
@@ -180,6 +185,7 @@ def fit(
         _largest(design, solution, observed.x),
         plate_coordinates(experiment, design, solution.state, spread, scale),
         _adjustments(design, layout, solution, spread, scale, freedom if estimated else np.inf),
+        task_uncertainties(design, layout, solution.state, spread, scale),
     )
 
 

@@ -10,6 +10,7 @@ from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates
 from .rank import Verdict
 from .study import Fit, Plan
+from .tasks import TaskUncertainty, is_determined
 from .uncertainty import Quantity
 
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
@@ -100,6 +101,45 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
     return lines
 
 
+def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
+    """Measuring tasks as lines of text."""
+    rows = [["task", "length, mm", "standard uncertainty, um", "expanded (k = 2), um", "target, um", "within target"]]
+    for task in tasks:
+        rows.append(
+            [
+                task.name,
+                number(1e3 * task.length, 6),
+                *(number(1e6 * u) for u in (task.standard_uncertainty, task.expanded_uncertainty)),
+                "" if task.target is None else number(1e6 * task.target),
+                _judged(task),
+            ]
+        )
+    with_target = any(task.target is not None for task in tasks)
+    note = ["(the target is compared with the standard uncertainty)"] if with_target else []
+    return [*aligned(rows, [False, True, True, True, True, False]), *note]
+
+
+def _judged(task: TaskUncertainty) -> str:
+    if not is_determined(task):
+        return "undetermined"
+    return "" if task.is_within is None else "yes" if task.is_within else "no"
+
+
+def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
+    """Measuring tasks as plain data in metres; what is undetermined is None."""
+    return {
+        task.name: {
+            "length": task.length,
+            "standard_uncertainty": finite(task.standard_uncertainty),
+            "expanded_uncertainty": finite(task.expanded_uncertainty),
+            "target": task.target,
+            "within_target": task.is_within,
+            "unit": "m",
+        }
+        for task in tasks
+    }
+
+
 def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
     """A verdict on rank as lines of text."""
     lines = []
@@ -130,7 +170,8 @@ def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
 def plan_lines(plan: Plan) -> list[str]:
     """A plan as lines of text: title, verdict and table."""
     lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True)]
-    return lines + ["", *uncertainty_table(plan.quantities)] if plan.quantities else lines
+    lines += ["", *uncertainty_table(plan.quantities)] if plan.quantities else []
+    return lines + ["", *task_table(plan.tasks)] if plan.tasks else lines
 
 
 def fit_lines(fit: Fit) -> list[str]:
@@ -148,6 +189,7 @@ def fit_lines(fit: Fit) -> list[str]:
     if not fit.converged:
         return lines
     lines += ["", *residual_table(fit), "", *uncertainty_table(fit.quantities), ""]
+    lines += [*task_table(fit.tasks), ""] if fit.tasks else []
     rows = [["parameter", "value", "standard uncertainty", "unit"]]
     machine_and_poses = [
         e for e in fit.estimates if ": origin" not in e.name and not e.name.endswith((": x", ": y", ": z"))
@@ -230,6 +272,7 @@ def plan_data(plan: Plan) -> dict[str, Any]:
         **_verdict_data(plan.verdict),
         "sigma": 1.0,
         "quantities": _quantities_data(plan.quantities),
+        **({"tasks": task_data(plan.tasks)} if plan.tasks else {}),
     }
 
 
@@ -249,6 +292,7 @@ def fit_data(fit: Fit) -> dict[str, Any]:
             {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)} for it in fit.solution.iterations
         ],
         "quantities": _quantities_data(fit.quantities),
+        **({"tasks": task_data(fit.tasks)} if fit.tasks else {}),
         "largest_residuals": [
             {
                 "position": one.position,

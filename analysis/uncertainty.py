@@ -1,21 +1,22 @@
-"""The uncertainties U1 to U6 of NPL Report CISE 15/98, section 6."""
+"""The uncertainties U1 to U6 of NPL Report CISE 15/98, section 6, and those of measuring tasks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simulator.design import Design, State, probe_offsets
+from simulator.design import Design, State
 from simulator.estimation.covariance import Covariance, blank
-from simulator.estimation.observations import offset_sensitivity
 from simulator.estimation.parameters import SharedLayout
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction
 from simulator.threads import single_threaded
 
+from .corrections import corrected_points, correction_rows
 from .pairs import PairSummary, all_pairs
+from .tasks import share_within, task_uncertainties
 
 DESCRIPTIONS = {
     "U1": "ball co-ordinates",
@@ -30,6 +31,7 @@ DESCRIPTIONS = {
     "U4": "error function at the evaluation points",
     "U5": "distances between balls",
     "U6": "distances between corrected points",
+    "tasks": "lengths of measuring tasks",
 }
 
 
@@ -66,12 +68,12 @@ def uncertainties(
     sigma: float = 1.0,
     target: LengthFunction | None = None,
 ) -> dict[str, Quantity]:
-    """U1 to U6 for a design at `state`, with U2 and U3 also split into lengths and angles.
+    """U1 to U6 for a design at `state` and those of its tasks, with U2 and U3 also split into lengths and angles.
 
     `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a fit. U3 is quoted for
     the model's reported parameters, monomials on [0, 1] for a kinematic model, less those that are zero in any
     machine of the model. U5 runs over all pairs of balls of an artefact, U6 over all pairs of evaluation points,
-    compared with the `target` accuracy if there is one.
+    compared with the `target` accuracy if there is one; measuring tasks are compared with their own.
     """
     result: dict[str, Quantity] = {}
 
@@ -123,6 +125,11 @@ def uncertainties(
         if points.count:
             share = None if target is None else points.within / points.count
             result["U6"] = _of_pairs("U6", points, sigma, lambda i: f"point {i + 1}", share)
+    tasks = task_uncertainties(design, layout, state, found, sigma)
+    if tasks:
+        values = np.array([task.standard_uncertainty for task in tasks])
+        quantity = summarise("tasks", values, "m", design.task_names)
+        result["tasks"] = replace(quantity, within_target=share_within(tasks))
     order = list(DESCRIPTIONS)
     return dict(sorted(result.items(), key=lambda item: order.index(item[0])))
 
@@ -169,19 +176,12 @@ def point_pairs(
     limit: LengthFunction | None = None,
 ) -> tuple[Array, PairSummary]:
     """U4 (points, d) and U6 at the design's evaluation points."""
-    probe = design.point_probe
-    offsets = np.broadcast_to(probe_offsets(design, state)[probe], design.points.shape)
-    jacobian = design.model.jacobian(design.points, state.a, offsets)
-    of_shared = np.zeros((*jacobian.shape[:2], len(layout)))
-    of_shared[:, :, layout.model] = jacobian
-    estimated = layout.offset_columns[probe] >= 0
-    if estimated.any():
-        by_offset = offset_sensitivity(design.model, design.points, state.a, offsets)
-        of_shared[:, :, layout.offset_columns[probe][estimated]] = by_offset[:, :, estimated]
+    probes = np.full(len(design.points), design.point_probe)
+    of_shared = correction_rows(design, layout, state, design.points, probes)
     spread, null = of_shared @ found.shared, of_shared @ found.shared_null
     values = np.sqrt((spread**2).sum(axis=2))
     size = np.sqrt(((of_shared * found.scale) ** 2).sum(axis=2))
-    corrected = design.points + design.model.error(design.points, state.a, offsets)
+    corrected = corrected_points(design, state, design.points, probes)
     n, d = design.points.shape
     pairs = all_pairs(corrected, spread, np.zeros((n, d, d)), null, np.arange(n), limit)
     return blank(values, null, size), pairs

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .machines.protocol import Array, ErrorModel
+from .quantities import LengthFunction
 
 Integers = NDArray[np.int64]
 
@@ -153,7 +154,8 @@ class Design:
     artefacts are plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose pivots are:
     the origins of their positions. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none
     is. `length_names` and `drawn_lengths` (in metres) are those of length standards without certificates, which are
-    parameters.
+    parameters. `task_points` (t, 2, d) are what the scales say at the ends of the lengths that the machine is to
+    measure, `task_probes` (t, 2) what measures there, and `task_targets` (t,) the standard uncertainties to be reached.
     """
 
     model: ErrorModel
@@ -183,6 +185,10 @@ class Design:
     is_gauge: NDArray[np.bool_] | None = None
     length_names: tuple[str, ...] = ()
     drawn_lengths: Array = field(default_factory=lambda: np.zeros(0))
+    task_names: tuple[str, ...] = ()
+    task_points: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    task_probes: Integers = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    task_targets: tuple[LengthFunction | None, ...] = ()
 
     @property
     def dimension(self) -> int:

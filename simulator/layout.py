@@ -58,7 +58,7 @@ def lay_out(experiment: Experiment) -> Design:
     )
     coordinates = _coordinates(experiment, first_ball)
     ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
-    points = experiment.evaluation.points
+    points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
         points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
     held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
@@ -94,6 +94,10 @@ def lay_out(experiment: Experiment) -> Design:
         is_gauge=np.array([isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]),
         length_names=length_names,
         drawn_lengths=drawn,
+        task_names=tuple(task.name for task in tasks),
+        task_points=np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
+        task_probes=np.array([[probe_index[name] for name in task.probes] for task in tasks], np.int64).reshape(-1, 2),
+        task_targets=tuple(task.target for task in tasks),
     )
 
 

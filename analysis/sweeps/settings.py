@@ -10,7 +10,7 @@ from simulator.experiment.sections import Line, Seed
 from simulator.geometry.artefacts import Name
 from simulator.settings import FORM, Settings
 
-Quantity = Literal["U1", "U2", "U3", "U4", "U5", "U6"]
+Quantity = Literal["U1", "U2", "U3", "U4", "U5", "U6", "tasks"]
 QUANTITIES: tuple[Quantity, ...] = ("U1", "U2", "U3", "U4", "U5", "U6")
 
 Path = Annotated[str, Field(min_length=1)]
@@ -100,5 +100,5 @@ class SweepSettings(Settings):
     )
     seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
     record: Annotated[tuple[Quantity, ...], Field(min_length=1)] = Field(
-        QUANTITIES, description="quantities that are kept; default: all of U1 to U6"
+        QUANTITIES, description="quantities that are kept, U1 to U6 and tasks; default: all of U1 to U6"
     )

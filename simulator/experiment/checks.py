@@ -365,9 +365,17 @@ def check_lengths(
 
 
 def check_points(
-    points: Floats, steps: Steps, volume: Volume, problems: Problems, marks: Sequence[Mark] | None = None
+    points: Floats,
+    steps: Steps,
+    volume: Volume,
+    problems: Problems,
+    marks: Sequence[Mark] | None = None,
+    of_one: bool = False,
 ) -> None:
-    """Report points outside the volume: listed ones one by one, of a table (with ``marks``) the first."""
+    """Report points outside the volume: listed ones one by one, of a table (with ``marks``) the first.
+
+    ``of_one``: the path is that of a single point, not of a list.
+    """
     by_how_much, axes, sides = excess(points, volume)
     outside = np.flatnonzero(by_how_much > TOLERANCE)
     for i in outside if marks is None else outside[:1]:
@@ -378,7 +386,7 @@ def check_points(
             f"the measuring volume{others}; move the point inside"
         )
         if marks is None:
-            problems.add((*steps, int(i)), text)
+            problems.add(steps if of_one else (*steps, int(i)), text)
         else:
             problems.add_at(marks[int(i)], steps, text)
 

@@ -132,7 +132,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
     priors = resolve_priors(sections, machine, named, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
-    evaluation = resolve_evaluation(sections, machine, references)
+    evaluation = resolve_evaluation(sections, machine, probes, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
     experiment = Experiment(

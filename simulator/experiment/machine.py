@@ -1,19 +1,20 @@
-"""From the settings of the machine and of its evaluation to volume, repeatability and points."""
+"""From the settings of the machine and of its evaluation to volume, repeatability, points and tasks."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ..quantities import format_length
 from ..settings import hint
-from .checks import check_points
+from .checks import TOLERANCE, check_points
 from .messages import ExperimentError, Steps
-from .model import Evaluation, Floats, Machine, Volume
+from .model import Evaluation, Floats, Machine, Task, Volume
 from .problems import Problems
 from .references import References, frozen
-from .sections import MOST_POINTS, MachineSettings, PointsSettings
+from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 from .tables import read_table
 
@@ -56,18 +57,69 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     return Machine(Volume(frozen(lower_corner), frozen(upper_corner)), frozen(list(by_axis.values())))
 
 
-def resolve_evaluation(sections: Sections, machine: Machine | None, references: References) -> Evaluation | None:
-    """Return where to evaluate, or None after saying what is wrong."""
+def resolve_evaluation(
+    sections: Sections, machine: Machine | None, offsets: Mapping[str, Floats], references: References
+) -> Evaluation | None:
+    """Return where to evaluate, or None after saying what is wrong; ``offsets`` (d,) are those of the probes."""
     settings = sections.get("evaluation")
     probe = references.probes[0] if references.probes else ""
+    nowhere = frozen(np.zeros((0, references.dimension or 0)))
     if settings is None:
-        return Evaluation(frozen(np.zeros((0, references.dimension or 0))), probe)
+        return Evaluation(nowhere, probe)
     if settings.probe is not None:
         probe = settings.probe
-        text = f'unknown probe "{probe}"; {hint(probe, references.probes)}'
-        references.require(probe in references.probes, ("evaluation", "probe"), text)
-    points = _points(settings.points, machine, references)
-    return None if points is None else Evaluation(frozen(points), probe)
+        references.require(probe in references.probes, ("evaluation", "probe"), _unknown(probe, references))
+    if settings.points is None and settings.tasks is None:
+        text = 'gives nothing to evaluate; add "points", such as {random: 200, seed: 1}, or "tasks"'
+        references.problems.add(("evaluation",), text)
+        return None
+    tasks = [_task(i, one, probe, machine, offsets, sections, references) for i, one in enumerate(settings.tasks or ())]
+    points = nowhere if settings.points is None else _points(settings.points, machine, references)
+    found = tuple(task for task in tasks if task is not None)
+    return None if points is None or len(found) < len(tasks) else Evaluation(frozen(points), probe, found)
+
+
+def _task(
+    i: int,
+    settings: TaskSettings,
+    probe: str,
+    machine: Machine | None,
+    offsets: Mapping[str, Floats],
+    sections: Sections,
+    references: References,
+) -> Task | None:
+    """Return a task, or None after saying what is wrong."""
+    steps: Steps = ("evaluation", "tasks", i)
+    problems, dimension = references.problems, references.dimension
+    before = len(problems.messages)
+    names = [one.name for one in sections.get("evaluation").tasks]
+    if settings.name in names[:i]:
+        text = f'"{settings.name}" is the name of tasks[{names.index(settings.name)}] already; names must differ'
+        problems.add((*steps, "name"), text)
+    if settings.probe is not None and settings.probes is not None:
+        problems.add((*steps, "probe"), 'does not go with "probes"; remove one of the two', of_key=True)
+    probes = settings.probes or (settings.probe or probe,) * 2
+    if settings.probe is not None or settings.probes is not None:
+        for k, name in enumerate(probes):
+            where = ("probe",) if settings.probes is None else ("probes", k)
+            references.require(name in references.probes, (*steps, *where), _unknown(name, references))
+    for key, point in (("from", settings.start), ("to", settings.to)):
+        text = f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}"
+        is_right = references.require(dimension in (None, len(point)), (*steps, key), text)
+        if is_right and machine is not None and machine.dimension == len(point):
+            check_points(np.array([point]), (*steps, key), machine.volume, problems, of_one=True)
+    if len(problems.messages) > before or dimension is None or not set(probes) <= set(offsets):
+        return None
+    points = np.array([settings.start, settings.to])
+    if np.linalg.norm(np.diff(points + [offsets[name] for name in probes], axis=0)) <= TOLERANCE:
+        problems.add((*steps, "to"), "is where the length begins; give two points")
+        return None
+    target = settings.target_accuracy or sections.get("target_accuracy")
+    return Task(settings.name, frozen(points), probes, target)
+
+
+def _unknown(probe: str, references: References) -> str:
+    return f'unknown probe "{probe}"; {hint(probe, references.probes)}'
 
 
 def _points(settings: Any, machine: Machine | None, references: References) -> Floats | None:

@@ -141,11 +141,25 @@ class Prior:
 
 
 @dataclass(frozen=True, eq=False)
+class Task:
+    """A length that the machine is to measure: ``points`` (2, d) in metres, and the probes of its ends.
+
+    ``target``: the standard uncertainty to be reached, None where neither the task nor the file states one.
+    """
+
+    name: str
+    points: Floats
+    probes: tuple[str, str]
+    target: LengthFunction | None
+
+
+@dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, and the probe."""
+    """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, the probe, and tasks."""
 
     points: Floats
     probe: str
+    tasks: tuple[Task, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,8 @@ from .position_sections import CalibrationSettings, Edges, LengthPerAxis, Positi
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 # U6 follows every pair of points.
 MOST_POINTS = 40_000
+# Measuring tasks, each a row over the shared parameters.
+MOST_TASKS = 1000
 Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
@@ -87,16 +89,39 @@ class PointsSettings(Settings):
     file: Text | None = Field(None, description="CSV file with columns x_mm, y_mm, z_mm")
 
 
+class TaskSettings(Settings):
+    """A measuring task: a length that the corrected machine is to measure."""
+
+    name: Name = Field(description="name of the task, used in tables and messages")
+    start: Coordinates = Field(alias="from", description="where the length begins: co-ordinates as those of points")
+    to: Coordinates = Field(description="where the length ends")
+    probe: Name | None = Field(None, description="probe that both ends are measured with; default: evaluation.probe")
+    probes: tuple[Name, Name] | None = Field(None, description="probes of the two ends, instead of probe")
+    target_accuracy: LengthFunction | None = Field(
+        None, description="standard uncertainty to be reached; default: target_accuracy of the file"
+    )
+
+
 class EvaluationSettings(Settings):
     """Where the uncertainty of the machine is evaluated."""
 
-    points: Annotated[
-        Annotated[PointsSettings, Tag("<mapping>")]
-        | Annotated[Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)], Tag("<list>")]
-        | Annotated[PointsSettings, Tag("<one>")],
-        FORM,
-    ] = Field(description="{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates")
+    points: (
+        Annotated[
+            Annotated[PointsSettings, Tag("<mapping>")]
+            | Annotated[Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)], Tag("<list>")]
+            | Annotated[PointsSettings, Tag("<one>")],
+            FORM,
+        ]
+        | None
+    ) = Field(
+        None,
+        description="{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates; optional where tasks are "
+        "given",
+    )
     probe: Name | None = Field(None, description="probe that the points are measured with; default: the first")
+    tasks: Annotated[tuple[TaskSettings, ...], Field(min_length=1, max_length=MOST_TASKS)] | None = Field(
+        None, description="list of lengths that the machine is to measure, {name: …, from: …, to: …}"
+    )
 
 
 class ExperimentSettings(Settings):

@@ -1,0 +1,119 @@
+"""Measuring tasks: their uncertainty is that of U6 for the same two points, with estimated probe offsets counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.study import plan
+from analysis.tables import plan_data, plan_lines
+from analysis.tasks import share_within, task_differences, task_rows
+from simulator.design import Design, State, nominal_state, probe_offsets
+from simulator.estimation.parameters import SharedLayout, shared_layout
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+from simulator.layout import lay_out
+from tests.analysis.test_invariants import judged, small_design
+
+QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+TASKS = """\
+evaluation:
+  probe: down
+  tasks:
+    - {name: bore distance, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_accuracy: 0.1 um}
+    - {name: from side to side, from: [0 mm, 300 mm, 400 mm], to: [900 mm, 400 mm, 450 mm], probes: [right, left]}
+    - {name: height, from: [0 mm, 0 mm, 0 mm], to: [0 mm, 0 mm, 1 m], probe: front}
+"""
+
+
+def with_tasks(tmp_path: Path, tasks: str = TASKS, text: str = QUICKSTART) -> Experiment:
+    before, _, after = text.partition("evaluation:\n")
+    rest = after.partition("\n\n")[2]
+    file = tmp_path / "tasks.yaml"
+    file.write_text(f"{before}{tasks}\n{rest}", encoding="utf-8")
+    return load(file)[0]
+
+
+def test_a_task_is_as_uncertain_as_the_distance_between_the_same_points(tmp_path: Path) -> None:
+    found = plan(with_tasks(tmp_path)).tasks[0]
+    points = "evaluation:\n  points: [[100 mm, 200 mm, 0 mm], [600 mm, 200 mm, 50 mm]]\n  probe: down\n"
+    expected = plan(with_tasks(tmp_path, points)).quantities["U6"]
+    assert expected.count == 1
+    assert found.standard_uncertainty == pytest.approx(expected.maximum, rel=1e-9)
+    assert found.length == pytest.approx(np.hypot(0.5, 0.05))
+    assert found.expanded_uncertainty == 2.0 * found.standard_uncertainty
+
+
+def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path) -> None:
+    planned = plan(with_tasks(tmp_path))
+    bore, side, height = planned.tasks
+    assert bore.target == 1e-7 and bore.is_within is False
+    assert side.length == pytest.approx(np.linalg.norm([0.9 - 0.1, 0.1, 0.05]))
+    assert side.target == pytest.approx(0.5e-6 + side.length * 1e-6) and side.is_within
+    told = planned.quantities["tasks"]
+    values = [task.standard_uncertainty for task in planned.tasks]
+    assert (told.count, told.largest) == (3, planned.tasks[int(np.argmax(values))].name)
+    assert told.average == pytest.approx(np.mean(values)) and told.maximum == max(values)
+    assert told.within_target == pytest.approx(2 / 3)
+    data = plan_data(planned)
+    assert data["tasks"]["height"]["standard_uncertainty"] == height.standard_uncertainty
+    assert data["tasks"]["bore distance"]["within_target"] is False
+    lines = plan_lines(planned)
+    assert any(line.startswith("bore distance") and line.endswith("no") for line in lines)
+    assert len(planned.design.points) == 200
+
+
+def changed(design: Design, layout: SharedLayout, state: State, step: np.ndarray) -> State:
+    """The state with the machine's parameters and estimated offsets changed by a step (s,)."""
+    offsets = probe_offsets(design, state).copy()
+    free = layout.offset_columns >= 0
+    offsets[free] += step[layout.offset_columns[free]]
+    return replace(state, a=state.a + step[layout.model], probes=offsets)
+
+
+def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> None:
+    free = QUICKSTART.replace("right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}")
+    free = free.replace("front: [0 mm, -50 mm, 0 mm]", "front: {offset: [0 mm, -50 mm, 0 mm], unknown: true}")
+    design = lay_out(with_tasks(tmp_path, text=free))
+    layout = shared_layout(design)
+    state = replace(nominal_state(design), a=np.random.default_rng(3).normal(0, 1e-5, len(design.model.parameters)))
+    rows = task_rows(design, layout, state)
+    assert rows.shape == (3, len(layout))
+    # The fixed tip has no part in it, a tip of one end all, a tip of both only what rotations make of it.
+    by_offset = np.abs(rows[:, layout.offsets]).max(axis=1)
+    assert by_offset[0] == 0.0 and by_offset[1] > 0.9 and 0.0 < by_offset[2] < 1e-3
+    generator = np.random.default_rng(4)
+    for _ in range(4):
+        step = 1e-5 * generator.standard_normal(len(layout))
+        lengths = [
+            np.linalg.norm(task_differences(design, changed(design, layout, state, sign * step)), axis=1)
+            for sign in (1, -1)
+        ]
+        np.testing.assert_allclose(rows @ step, (lengths[0] - lengths[1]) / 2.0, atol=1e-14, rtol=1e-6)
+
+
+def test_undetermined_tasks_are_told_as_such() -> None:
+    """Without a calibrated distance no length is known, whatever the task."""
+    design = small_design()
+    design = replace(
+        design,
+        distances=replace(design.distances, **{name: v[:0] for name, v in vars(design.distances).items()}),
+        probes=np.zeros_like(design.probes),
+        task_names=("edge", "none"),
+        task_points=np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]]]),
+        task_probes=np.zeros((2, 2), int),
+        task_targets=(None, None),
+    )
+    quantity = judged(design)[0]["tasks"]
+    assert (quantity.count, quantity.undetermined, quantity.within_target) == (2, 2, None)
+    assert np.isnan(quantity.maximum)
+
+
+def test_share_within_counts_only_tasks_with_a_target(tmp_path: Path) -> None:
+    tasks = plan(with_tasks(tmp_path)).tasks
+    assert share_within(tasks[:1]) == 0.0
+    assert share_within([replace(one, target=None) for one in tasks]) is None
+    assert share_within([replace(tasks[0], standard_uncertainty=float("nan")), tasks[1]]) == 0.5
