@@ -232,8 +232,11 @@ def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Ar
     return white.whitened(found.length - length_values(design, state)), found, white
 
 
-def length_deviations(design: Design, state: State, x: Array) -> tuple[Array, Array]:
-    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself, in metres."""
+def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
+    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself, in metres.
+
+    Without scale readings x the machine is taken to read without error.
+    """
     if not len(design.lengths):
         return np.zeros(0), np.ones(0)
     found = _measured_lengths(design, state, x)

@@ -1,0 +1,229 @@
+"""What no selection can do better than: the convex relaxation in which candidates may count in part.
+
+The reciprocal square of the criterion is a concave function of the information, which is linear in the weights of
+candidates. Its tangent at any weights is a linear function that no selection exceeds; the largest value of the tangent
+within the limits, a linear programme, bounds all selections. The weights are improved until bound and criterion of
+the relaxation meet: each solution of the linear programme is a vertex, and the best mixture of the vertices met so far
+gives the next tangent. The last bound is made sharper by asking for whole candidates in the linear programme.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from simulator.machines.protocol import Array
+from simulator.threads import single_threaded
+
+from .search import Problem, counted_root, fill, full_root, square_root
+
+# Relative distance of bound and relaxation at which the weights are good enough, and steps at most.
+CLOSE = 1e-3
+MOST_STEPS = 200
+
+# Powers of the means that stand for largest values, one after the other.
+POWERS = (8.0, 24.0, 72.0)
+
+# Vertices to start with, and at most until one of their mixtures determines everything.
+FEWEST_STARTS, MOST_STARTS = 4, 64
+
+# Steps of the inner solver, and the share of the largest below which a vertex is dropped from the mixture.
+MOST_INNER = 12
+DROPPED = 1e-7
+
+# Branches of the search for whole candidates.
+MOST_NODES = 2000
+
+Limits = tuple[Any, Array, Array, Array]
+
+# What solvers of linear programmes leave, relatively.
+TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A `value` that the criterion of no selection falls below, and the weights (n,) of the relaxation that gave it.
+
+    `relaxed` is the criterion with these weights; the best bound of the relaxation lies between the two.
+    """
+
+    value: float
+    relaxed: float
+    weights: Array
+
+
+@dataclass(frozen=True)
+class _Tangent:
+    """Tangent of the reciprocal square at some weights: `constant` + `slope` (n,) v.
+
+    `smooth` is what is made small: the criterion, or for a largest value a mean of high power. `value` is the mean
+    that the tangent touches.
+    """
+
+    constant: float
+    slope: Array
+    smooth: float
+    value: float
+
+    def at(self, weights: Array) -> float:
+        """The bound of the criterion that the tangent gives at other weights."""
+        return float((self.constant + self.slope @ weights) ** -0.5)
+
+
+@single_threaded
+def bound(problem: Problem, start: Collection[int] | None = None, steps: int = MOST_STEPS) -> Bound | None:
+    """Bound of all selections within the limits.
+
+    None where the criterion has no relaxation, or no mixture of selections determines what it is about. `start` is a
+    selection to begin with, a good one saves steps.
+    """
+    if not problem.criterion.is_bounded:
+        return None
+    mixture = _first(problem, start)
+    if mixture is None:
+        return None
+    limits = problem.constraints.linear()
+    powers = list(POWERS if problem.criterion.is_sharp else POWERS[-1:])
+    best = Bound(0.0, np.inf, mixture.weights)
+    for _ in range(steps):
+        tangent = _tangent(problem, mixture.weights, powers[0])
+        if tangent is None:
+            break
+        vertex = _largest(limits, tangent.slope, problem.constraints.count)
+        if vertex is None:
+            break
+        reached = tangent.at(vertex)
+        if reached > best.value:
+            best = Bound(reached, tangent.value, mixture.weights)
+        if reached > tangent.value * (1 - CLOSE):
+            powers = powers[1:]
+            if not powers:
+                break
+        mixture = _improved(problem, mixture.with_vertex(vertex), powers[0])
+    if best.value == 0.0:
+        return None
+    tangent = _tangent(problem, best.weights, POWERS[-1])
+    if tangent is not None:
+        best = replace(best, value=max(best.value, _whole(limits, tangent)))
+    return replace(best, value=best.value * (1 - TOLERANCE))
+
+
+@dataclass(frozen=True)
+class _Mixture:
+    """Vertices (k, n) and the share (k,) of each."""
+
+    vertices: Array
+    shares: Array
+
+    @property
+    def weights(self) -> Array:
+        return np.asarray(self.shares @ self.vertices)
+
+    def with_vertex(self, vertex: Array) -> _Mixture:
+        share = 1.0 / (len(self.shares) + 2)
+        shares = np.append(self.shares * (1 - share), share)
+        return _Mixture(np.concatenate([self.vertices, vertex[None]]), shares)
+
+
+def _first(problem: Problem, start: Collection[int] | None) -> _Mixture | None:
+    """A mixture of vertices that leaves nothing undetermined; None where none is found."""
+    n = problem.constraints.count
+    limits = problem.constraints.linear()
+    generator = np.random.default_rng(np.random.SeedSequence(0))
+    selection = fill(problem, problem.constraints.must) if start is None else start
+    vertices = [np.isin(np.arange(n), list(selection)).astype(float)]
+    for _ in range(MOST_STARTS):
+        found = _largest(limits, generator.random(n), n)
+        if found is None:
+            return None
+        vertices.append(found)
+        mixture = _Mixture(np.array(vertices), np.full(len(vertices), 1.0 / len(vertices)))
+        if len(vertices) >= FEWEST_STARTS and _tangent(problem, mixture.weights, POWERS[0]) is not None:
+            return mixture
+    return None
+
+
+def _tangent(problem: Problem, weights: Array, power: float) -> _Tangent | None:
+    """Tangent at some weights (n,); None where they leave something undetermined."""
+    information = problem.information
+    root = full_root(information.weighted(weights))
+    if root is None:
+        return None
+    own = slice(None) if problem.criterion.about_balls else information.shared
+    smooth, value, weight = problem.criterion.tangent(counted_root(problem, root), power)
+    half = root @ (root[own].T @ square_root(weight))
+    # By the covariance C the derivative is W, and by the information -C W C.
+    squared = 2.0 * value**-3 * (half @ half.T)
+    slope = np.tensordot(information.matrices, squared, axes=2)
+    return _Tangent(float((information.base * squared).sum()), slope, smooth, value)
+
+
+def _improved(problem: Problem, mixture: _Mixture, power: float) -> _Mixture:
+    """The mixture of the same vertices that makes the criterion smallest, without those that have no share in it."""
+    from scipy.optimize import minimize
+
+    information = problem.information
+    used = np.flatnonzero(mixture.vertices.any(axis=0))
+    matrices = np.tensordot(mixture.vertices[:, used], information.matrices[used], axes=1)
+    own = slice(None) if problem.criterion.about_balls else information.shared
+    held = information.frames.held(used.tolist())
+
+    def logarithm(shares: Array) -> tuple[float, Array]:
+        root = full_root(information.base + held + np.tensordot(shares, matrices, axes=1))
+        if root is None:
+            return 1e3, np.zeros(len(shares))
+        smooth, value, weight = problem.criterion.tangent(counted_root(problem, root), power)
+        half = root @ (root[own].T @ square_root(weight))
+        return float(np.log(smooth)), -np.tensordot(matrices, half @ half.T, axes=2) / value
+
+    found = minimize(
+        logarithm,
+        mixture.shares,
+        jac=True,
+        method="SLSQP",
+        bounds=[(0.0, 1.0)] * len(mixture.shares),
+        constraints={"type": "eq", "fun": lambda s: s.sum() - 1.0, "jac": np.ones_like},
+        options={"maxiter": MOST_INNER, "ftol": 1e-7},
+    )
+    shares = np.maximum(found.x, 0.0)
+    if not np.isfinite(shares).all() or logarithm(shares / shares.sum())[0] > logarithm(mixture.shares)[0]:
+        shares = mixture.shares
+    kept = shares > DROPPED * shares.max()
+    return _Mixture(mixture.vertices[kept], shares[kept] / shares[kept].sum())
+
+
+def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
+    """The weights (count,) within the limits for which slope (count,) . weights is largest; None if there are none."""
+    from scipy.optimize import linprog
+
+    matrix, most, low, high = limits
+    cost = np.zeros(matrix.shape[1])
+    cost[:count] = -slope / np.abs(slope).max()
+    found = linprog(cost, A_ub=matrix, b_ub=most, bounds=np.stack([low, high], axis=1), method="highs")
+    if found.status != 0:
+        return None
+    return np.clip(np.asarray(found.x[:count], float), 0.0, 1.0)
+
+
+def _whole(limits: Limits, tangent: _Tangent) -> float:
+    """The bound of a tangent where candidates count wholly or not at all; 0 if it was not found."""
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
+    matrix, most, low, high = limits
+    count = len(tangent.slope)
+    scale = np.abs(tangent.slope).max()
+    cost = np.zeros(matrix.shape[1])
+    cost[:count] = -tangent.slope / scale
+    found = milp(
+        cost,
+        integrality=np.ones(len(cost)),
+        bounds=Bounds(low, high),
+        constraints=LinearConstraint(matrix, -np.inf, most),
+        options={"node_limit": MOST_NODES},
+    )
+    if found.mip_dual_bound is None or not np.isfinite(found.mip_dual_bound):
+        return 0.0
+    return float((tangent.constant - found.mip_dual_bound * scale) ** -0.5)

@@ -1,0 +1,283 @@
+"""The plan of a campaign: what to choose from a pool, how near it is to the best possible, what each choice gains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Experiment
+from simulator.experiment.pool import Candidate, Pool, with_chosen
+from simulator.threads import single_threaded
+
+from ..processes import in_processes
+from ..study import Plan, plan
+from .bound import Bound, bound
+from .constraints import Budget, Constraints, Spent, constraints
+from .criteria import CriterionName, criterion, is_about_balls
+from .information import pool_information
+from .search import Found, Problem, improve, ranked_additions, starts, value
+
+# Random starts of the search, in a large pool and in a small one.
+FEW_STARTS, MANY_STARTS = 2, 8
+SMALL_POOL = 64
+
+# Candidates left out that are told of.
+LEFT_OUT = 10
+
+# Points of a curve.
+CURVE_POINTS = 8
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of a plan; `curve` asks for smaller and larger budgets as well."""
+
+    criterion: CriterionName = "U6"
+    budget: Budget | None = None
+    curve: bool = False
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something is undetermined."""
+
+    candidate: Candidate
+    without: float
+    with_: float
+
+    @property
+    def relative(self) -> float:
+        """How much larger the criterion is without it."""
+        return self.without / self.with_ - 1.0
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The best selection found for a budget; `bound` is NaN where there is none."""
+
+    budget: Budget
+    spent: Spent
+    chosen: tuple[Candidate, ...]
+    value: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A selection and what is to be said of it; values in metres, those of `condition` ratios.
+
+    `chosen` in the order of the pool, `done` those of them that have been read already. `value` is infinite where the
+    selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
+    `drawn` is the criterion of the positions of the experiment itself, where these keep to the limits or not, None
+    without any. `plan` judges the experiment with the chosen candidates in full.
+    """
+
+    experiment: Experiment
+    pool: Pool
+    criterion: CriterionName
+    unit: str
+    excluded: int
+    budget: Budget
+    chosen: tuple[Candidate, ...]
+    done: tuple[Candidate, ...]
+    spent: Spent
+    value: float
+    bound: float
+    drawn: float | None
+    drawn_spent: Spent | None
+    target: float | None
+    gains: tuple[Gain, ...]
+    left_out: tuple[Gain, ...]
+    plan: Plan
+    curve: tuple[CurvePoint, ...] = ()
+
+    @property
+    def efficiency(self) -> float:
+        """Bound over value: the selection is at most this far from the best possible."""
+        return self.bound / self.value
+
+    @property
+    def is_determined(self) -> bool:
+        return bool(np.isfinite(self.value))
+
+
+def campaign(
+    experiment: Experiment,
+    request: Request,
+    done: Mapping[int, Candidate] | None = None,
+    workers: int = 1,
+    report: Callable[[str], None] = lambda step: None,
+) -> Campaign:
+    """Choose from the pool of an experiment.
+
+    `done` are candidates that have been read already, by index, with the readings that were taken: they are kept and
+    cost nothing more. Without a budget the choice may cost what the experiment's own positions do, less what is done.
+    The result does not depend on the number of `workers`; `report` is told what is being done.
+
+    :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
+    """
+    pool, read = experiment.pool, dict(done or {})
+    if pool is None:
+        raise _impossible(
+            experiment, "pool", "missing; add candidates to choose from, or see what check --suggest tells"
+        )
+    candidates = [read.get(k, candidate) for k, candidate in enumerate(pool.candidates)]
+    report(f"information of {len(candidates)} candidates")
+    information = pool_information(experiment, candidates, is_about_balls(request.criterion))
+    wanted = criterion(information, experiment, request.criterion)
+    drawn = [k for k, candidate in enumerate(candidates) if candidate.drawn]
+    free = constraints(candidates, pool.changes, Budget(), pool.must, pool.at_most, list(read))
+    reference = sorted({*drawn, *free.must})
+    budget = request.budget or _as_drawn(experiment, free, drawn, reference)
+    limits = replace(free, budget=budget)
+    _refuse_impossible(experiment, limits, candidates)
+    problem = Problem(information, wanted, limits)
+
+    report("searching")
+    best, relaxed = _search(problem, drawn, request.seed, workers)
+    if relaxed is not None and relaxed.value > best.value:
+        raise AssertionError(f"bound {relaxed.value} above {best.value}")
+    chosen = [candidates[k] for k in best.chosen]
+    unlimited = replace(problem, constraints=free)
+    report("gains")
+    return Campaign(
+        experiment,
+        pool,
+        request.criterion,
+        wanted.unit,
+        wanted.excluded,
+        budget,
+        tuple(chosen),
+        tuple(candidates[k] for k in sorted(read)),
+        limits.spent(best.chosen),
+        best.value,
+        np.nan if relaxed is None else relaxed.value,
+        value(problem, reference) if drawn else None,
+        limits.spent(reference) if drawn else None,
+        wanted.target,
+        _gains(problem, best, candidates),
+        _left_out(unlimited, best, candidates),
+        plan(with_chosen(experiment, chosen)),
+        tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
+    )
+
+
+def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
+    return ExperimentError([Message(str(experiment.source), 0, 0, path, text)])
+
+
+def _as_drawn(experiment: Experiment, free: Constraints, drawn: Sequence[int], reference: Sequence[int]) -> Budget:
+    """The budget that the experiment's own positions need."""
+    if not drawn:
+        raise _impossible(
+            experiment, "positions", "there are none to take the budget from; say --hours, or --positions"
+        )
+    spent = free.spent(reference)
+    return Budget(spent.seconds, spent.readings, spent.positions)
+
+
+def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: Sequence[Candidate]) -> None:
+    must = limits.must
+    if limits.allows(must):
+        return
+    for limit in limits.at_most:
+        members = sorted(must.intersection(limit.members))
+        if len(members) > limit.count:
+            names = ", ".join(f'"{candidates[k].name}"' for k in members)
+            text = f"{names} have to be chosen, but no more than {limit.count} of them may be; change one of the two"
+            raise _impossible(experiment, "pool.limits", text)
+    spent = limits.spent(must)
+    needed = Budget(spent.seconds, spent.readings, spent.positions)
+    text = f"what has to be chosen takes {needed}, more than {limits.budget}; allow more, or keep fewer"
+    raise _impossible(experiment, "pool.limits.keep", text)
+
+
+def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> tuple[Found, Bound | None]:
+    """The best selection found, and the bound of all."""
+    is_small = problem.constraints.count <= SMALL_POOL
+    first = starts(problem, drawn, MANY_STARTS if is_small else FEW_STARTS, seed)
+    tasks: list[tuple[object, ...]] = [(problem, None, False)]
+    tasks += [(problem, start, is_small) for start in first]
+    relaxed, *found = in_processes(_task, tasks, workers)
+    if isinstance(relaxed, Bound):
+        by_weight = np.argsort(-relaxed.weights, kind="stable").tolist()
+        found.append(_task(problem, starts(problem, by_weight, 0, seed)[-1], is_small))
+    selections = sorted({one for one in found if isinstance(one, Found)}, key=lambda one: (one.value, one.chosen))
+    if not is_small:
+        deeper = in_processes(_task, [(problem, one.chosen, True) for one in selections[:2]], workers)
+        selections += [one for one in deeper if isinstance(one, Found)]
+    best = min(selections, key=lambda one: (one.value, one.chosen))
+    return best, relaxed if isinstance(relaxed, Bound) else None
+
+
+@single_threaded
+def _task(problem: Problem, start: Collection[int] | None, deep: bool) -> Found | Bound | None:
+    return bound(problem) if start is None else improve(problem, start, deep)
+
+
+def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
+    """What each chosen candidate gains, those first that gain most."""
+    gains = [
+        Gain(candidates[k], value(problem, set(best.chosen) - {k}), best.value)
+        for k in best.chosen
+        if k not in problem.constraints.done
+    ]
+    return tuple(sorted(gains, key=lambda gain: -gain.without))
+
+
+def _left_out(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
+    """What candidates would gain on top of the selection, those first that would gain most."""
+    ranked = ranked_additions(problem, best.chosen)
+    return tuple(Gain(candidates[k], best.value, after) for k, after in ranked[:LEFT_OUT])
+
+
+def _curve(
+    problem: Problem,
+    best: Found,
+    candidates: Sequence[Candidate],
+    workers: int,
+    report: Callable[[str], None],
+) -> list[CurvePoint]:
+    """The best selections found for smaller and larger budgets, with their bounds, from the smallest on."""
+    budgets = _budgets(problem)
+    report(f"curve of {len(budgets)} budgets")
+    tasks = [(replace(problem, constraints=replace(problem.constraints, budget=b)), best) for b in budgets]
+    points = []
+    for budget, result in zip(budgets, in_processes(_curve_point, tasks, workers), strict=True):
+        if result is None:
+            continue
+        found, relaxed = result
+        if np.isfinite(found.value):
+            names = tuple(candidates[k] for k in found.chosen)
+            points.append(CurvePoint(budget, problem.constraints.spent(found.chosen), names, found.value, relaxed))
+    return points
+
+
+@single_threaded
+def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
+    if not problem.constraints.allows(problem.constraints.must):
+        return None
+    generous = sorted(best.chosen, key=lambda k: value(problem, set(best.chosen) - {k}), reverse=True)
+    selections = [improve(problem, start, False) for start in starts(problem, generous, 0, 1)]
+    found = min(selections, key=lambda one: (one.value, one.chosen))
+    relaxed = bound(problem) if np.isfinite(found.value) else None
+    return found, np.nan if relaxed is None else relaxed.value
+
+
+def _budgets(problem: Problem) -> list[Budget]:
+    """Budgets from small to somewhat more than the one asked for."""
+    budget = problem.constraints.budget
+    factors = np.linspace(0.25, 1.5, CURVE_POINTS)
+    if budget.positions is not None and budget.seconds is None and budget.readings is None:
+        most = max(budget.positions + 2, round(1.5 * budget.positions))
+        return [Budget(positions=k) for k in range(1, most + 1)]
+    found = []
+    for factor in factors:
+        positions = None if budget.positions is None else max(round(budget.positions * factor), 1)
+        readings = None if budget.readings is None else round(budget.readings * factor)
+        found.append(Budget(None if budget.seconds is None else budget.seconds * factor, readings, positions))
+    return list(dict.fromkeys([*found, budget]))

@@ -1,0 +1,195 @@
+"""What a selection may cost and contain."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.experiment.model import Position
+from simulator.experiment.pool import AtMost, Candidate, ChangeTimes
+from simulator.machines.protocol import Array
+
+from .schedule import Kind, changeover, kind_of
+
+HOUR = 3600.0
+
+# Rounding of sums of times.
+SLACK = 1e-6
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What may be spent: seconds of laboratory time, readings, positions; None where there is no limit."""
+
+    seconds: float | None = None
+    readings: int | None = None
+    positions: int | None = None
+
+    def __str__(self) -> str:
+        words = []
+        if self.seconds is not None:
+            words.append(f"{self.seconds / HOUR:.4g} h")
+        for value, word in ((self.readings, "reading"), (self.positions, "position")):
+            if value is not None:
+                words.append(f"{value} {word}{'' if value == 1 else 's'}")
+        return ", ".join(words)
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What a selection costs: seconds with changes between positions, readings and positions."""
+
+    seconds: float
+    readings: int
+    positions: int
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Costs of candidates and limits on them.
+
+    `seconds`, `readings` and `positions` (n,) are each candidate's own, `kinds` what changes between positions depend
+    on, None of calibration items, `must` what has to be chosen. Candidates that are `done` have taken their time
+    already: they cost nothing any more, and the budget is for the rest.
+    """
+
+    budget: Budget
+    seconds: Array
+    readings: NDArray[np.int64]
+    positions: NDArray[np.int64]
+    kinds: tuple[Kind | None, ...]
+    changes: ChangeTimes
+    must: frozenset[int]
+    at_most: tuple[AtMost, ...]
+    done: frozenset[int] = frozenset()
+
+    @property
+    def count(self) -> int:
+        return len(self.seconds)
+
+    def spent(self, chosen: Collection[int]) -> Spent:
+        """Cost of a selection, less what is done."""
+        own = sorted(set(chosen) - self.done)
+        seconds = float(self.seconds[own].sum()) + changeover(self._kinds(own), self.changes)
+        return Spent(seconds, int(self.readings[own].sum()), int(self.positions[own].sum()))
+
+    def _kinds(self, own: Iterable[int]) -> list[Kind]:
+        return [kind for k in own if (kind := self.kinds[k]) is not None]
+
+    def allows(self, chosen: Collection[int]) -> bool:
+        """Whether a selection keeps to all limits."""
+        members = set(chosen)
+        return (
+            self.must <= members
+            and all(len(members.intersection(limit.members)) <= limit.count for limit in self.at_most)
+            and self._affords(self.spent(members))
+        )
+
+    def _affords(self, spent: Spent) -> bool:
+        budget = self.budget
+        return (
+            (budget.seconds is None or spent.seconds <= budget.seconds + SLACK)
+            and (budget.readings is None or spent.readings <= budget.readings)
+            and (budget.positions is None or spent.positions <= budget.positions)
+        )
+
+    def additions(self, chosen: Collection[int]) -> NDArray[np.int64]:
+        """Candidates that a selection, which keeps to the limits itself, may be extended by, one at a time."""
+        members = set(chosen)
+        allowed = np.ones(self.count, bool)
+        allowed[list(members)] = False
+        for limit in self.at_most:
+            if len(members.intersection(limit.members)) >= limit.count:
+                allowed[list(limit.members)] = False
+        spent, budget = self.spent(members), self.budget
+        if budget.readings is not None:
+            allowed &= self.readings <= budget.readings - spent.readings
+        if budget.positions is not None:
+            allowed &= self.positions <= budget.positions - spent.positions
+        if budget.seconds is not None:
+            own = sorted(members - self.done)
+            left = budget.seconds + SLACK - float(self.seconds[own].sum())
+            kinds = self._kinds(own)
+            for kind in dict.fromkeys(self.kinds):
+                within = left - changeover(kinds if kind is None else [*kinds, kind], self.changes)
+                too_long = np.array([other == kind for other in self.kinds]) & (self.seconds > within)
+                allowed &= ~too_long
+        return np.flatnonzero(allowed)
+
+    def linear(self) -> tuple[Any, Array, Array, Array]:
+        """Limits as rows A v <= b with bounds low <= v <= high; every selection that keeps to the limits fulfils them.
+
+        Variables are the candidates, then the groups of positions between which the plane or artefact changes,
+        each at least as large as any of its members. Changes of probe between positions are left out.
+        """
+        from scipy.sparse import csr_array
+
+        n = self.count
+        groups = sorted({(k.artefact, k.plane) for k in self.kinds if k is not None})
+        timed = self.budget.seconds is not None and self.changes.plane > 0 and len(groups) > 1
+        size = n + (len(groups) if timed else 0)
+        rows: list[Array] = []
+        limits: list[float] = []
+        of_done = np.isin(np.arange(n), list(self.done))
+        for cost, limit in (
+            (self.seconds, self.budget.seconds),
+            (self.readings, self.budget.readings),
+            (self.positions, self.budget.positions),
+        ):
+            if limit is None:
+                continue
+            row = np.zeros(size)
+            row[:n] = np.where(of_done, 0, cost)
+            rows.append(row)
+            limits.append(float(limit))
+        if timed:
+            rows[0][n:] = self.changes.plane
+            # The first position needs no change.
+            limits[0] += self.changes.plane + SLACK
+        for one in self.at_most:
+            row = np.zeros(size)
+            row[list(one.members)] = 1.0
+            rows.append(row)
+            limits.append(float(one.count))
+        matrix = csr_array(np.array(rows).reshape(len(rows), size))
+        if timed:
+            place = {group: n + i for i, group in enumerate(groups)}
+            members = [k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done]
+            group = [place[kind.artefact, kind.plane] for k in members if (kind := self.kinds[k]) is not None]
+            at = np.arange(len(members))
+            entries = np.concatenate([np.ones(len(members)), -np.ones(len(members))])
+            columns = np.concatenate([members, group])
+            linked = csr_array((entries, (np.concatenate([at, at]), columns)), shape=(len(members), size))
+            from scipy.sparse import vstack
+
+            matrix = vstack([matrix, linked], format="csr")
+            limits += [0.0] * len(members)
+        low = np.zeros(size)
+        low[list(self.must)] = 1.0
+        return matrix, np.array(limits), low, np.ones(size)
+
+
+def constraints(
+    candidates: Sequence[Candidate],
+    changes: ChangeTimes,
+    budget: Budget,
+    must: Collection[int] = (),
+    at_most: Sequence[AtMost] = (),
+    done: Collection[int] = (),
+) -> Constraints:
+    """Constraints of a pool's candidates."""
+    return Constraints(
+        budget,
+        np.array([one.seconds for one in candidates], float),
+        np.array([one.readings for one in candidates], np.int64),
+        np.array([isinstance(one.item, Position) for one in candidates], np.int64),
+        tuple(kind_of(one) if isinstance(one.item, Position) else None for one in candidates),
+        changes,
+        frozenset(must) | frozenset(done),
+        tuple(at_most),
+        frozenset(done),
+    )

@@ -1,0 +1,352 @@
+"""The information of every candidate on what all positions share, as one fixed matrix each.
+
+Information adds: that of a selection is the sum of its candidates' matrices. Two changes of basis keep the matrices
+small and the sums accurate. The first leaves out combinations of balls that no position ties to machine errors: on a
+plate read as a whole some sixty combinations matter, however many balls there are. The second makes the information
+of the whole pool the identity, by a triangular factor obtained from orthogonal transformations, so that nothing is
+lost where products of rows are formed; what the pool does not determine at all is left out of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from simulator.design import Design
+from simulator.estimation.covariance import EXACT
+from simulator.estimation.observations import rotation_sensitivity
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Experiment, Position
+from simulator.experiment.pool import Candidate
+from simulator.machines.protocol import Array
+from simulator.threads import single_threaded
+
+from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_rows
+
+# Ball combinations below this fraction of the largest are rounding.
+ROUNDING = 1e-10
+
+# Kinds of reading (which balls, how often) beyond which all combinations of balls are kept.
+MOST_KINDS = 24
+
+# Matrices of all candidates together, in bytes.
+MOST_BYTES = 4 << 30
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Coordinates z in which a plan computes.
+
+    `balls` (n, d, y) are the combinations of ball co-ordinates that count. In terms of their amounts u (y,) and of
+    shared columns s (c,): u = `ball_root` z - `ball_shared` s, where z starts with those of the balls, and s =
+    `shared_root` z for the rest of z. `ball_open` (y, open) are combinations that nothing in the pool shows.
+    """
+
+    balls: Array
+    ball_root: Array
+    ball_shared: Array
+    shared_root: Array
+    ball_open: Array
+
+    @property
+    def of_balls(self) -> int:
+        """Number of z that stand for balls."""
+        return int(self.ball_root.shape[1])
+
+    @property
+    def size(self) -> int:
+        return self.of_balls + int(self.shared_root.shape[1])
+
+    def rows(self, by_amount: Array, by_shared: Array) -> Array:
+        """Rows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m, c)."""
+        shared = (by_shared - by_amount @ self.ball_shared) @ self.shared_root
+        return np.concatenate([by_amount @ self.ball_root, shared], axis=1)
+
+
+@dataclass(frozen=True)
+class Information:
+    """Matrices of candidates in the basis of a pool.
+
+    `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z) what each adds.
+    `deficiency` counts shared directions (c, deficiency), `open_` in micrometres, that even all candidates together
+    leave undetermined. `frames` (candidates that calibrate co-ordinates) hold what each fixes of its plate's frame.
+    """
+
+    drawn: Drawn
+    candidates: tuple[Candidate, ...]
+    basis: Basis
+    base: Array
+    matrices: Array
+    open_: Array
+    frames: Frames
+
+    @property
+    def deficiency(self) -> int:
+        return int(self.open_.shape[1])
+
+    @cached_property
+    def shared(self) -> slice:
+        """The last z, those of shared parameters."""
+        return slice(self.basis.of_balls, self.basis.size)
+
+    def of(self, chosen: Collection[int]) -> Array:
+        """Information (z, z) of a selection; a frame that nothing fixes is held, which changes no distance."""
+        members = sorted(chosen)
+        return self.base + self.matrices[members].sum(axis=0) + self.frames.held(members)
+
+    def weighted(self, weights: Array) -> Array:
+        """Information (z, z) of candidates that count in part, by `weights` (candidates,)."""
+        members = np.flatnonzero(weights > 0)
+        total = np.tensordot(weights[members], self.matrices[members], axes=1)
+        return np.asarray(self.base + total + self.frames.held(members.tolist()))
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What calibrated co-ordinates fix of the plates' frames, in which distances do not depend on the frame.
+
+    `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the motions of the plates (m,
+    motions), `base` the same for the experiment's own certificates. `rows` (motions, z) are the motions' rows.
+    """
+
+    fixed: dict[int, Array]
+    base: Array
+    rows: Array
+
+    def held(self, members: Iterable[int]) -> Array:
+        """Information (z, z) that holds the motions that no member fixes."""
+        if not self.fixed:
+            return np.zeros((self.rows.shape[1],) * 2)
+        told = np.concatenate([self.base, *(self.fixed[k] for k in members if k in self.fixed)])
+        _, values, directions = np.linalg.svd(np.concatenate([told, np.zeros((1, told.shape[1]))]))
+        rank = int((values > 1e-9 * values.max(initial=0.0)).sum())
+        left = directions[rank:] @ self.rows
+        size = np.sqrt((left**2).sum(axis=1))
+        left = left[size > 1e-9] / size[size > 1e-9, None]
+        return np.asarray(left.T @ left)
+
+
+@single_threaded
+def pool_information(experiment: Experiment, candidates: Sequence[Candidate], all_balls: bool = False) -> Information:
+    """Information of every candidate of a pool.
+
+    With `all_balls` no combination of balls is left out, for criteria that are about balls.
+
+    :raises ExperimentError: no candidate is a position, the matrices are too large, or what cannot be planned is asked.
+    """
+    positions = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
+    if not positions:
+        text = "has no position to choose; add candidates"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
+    drawn = draw(experiment, positions)
+    some = replace(experiment, positions=tuple(positions[:1]))
+    items: dict[int, list[Rows]] = {
+        k: calibration_rows(drawn, some, candidate.item, candidate.name)
+        for k, candidate in enumerate(candidates)
+        if not isinstance(candidate.item, Position)
+    }
+    known = always(drawn)
+    certificates = [*known, *(rows for item in items.values() for rows in item)]
+    balls = _combinations(drawn, certificates, all_balls)
+    size = balls.shape[2] + drawn.shared
+    if len(candidates) * size**2 * 8 > MOST_BYTES:
+        limit = f"more than {MOST_BYTES >> 30} GB"
+        text = f"{len(candidates)} candidates with {size} parameters each take {limit}; offer fewer"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
+
+    base = np.concatenate([_in_amounts(rows, balls) for rows in known])
+    of_positions = (_reduced(_in_amounts(rows, balls)) for rows in position_rows(drawn))
+    own: list[Array] = []
+    for k in range(len(candidates)):
+        own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]) if k in items else next(of_positions))
+    basis, open_ = _basis(balls, drawn.shared, [base, *own])
+
+    def in_basis(rows: Array) -> Array:
+        return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
+
+    matrices = np.zeros((len(candidates), basis.size, basis.size))
+    for k, rows in enumerate(own):
+        transformed = in_basis(rows)
+        matrices[k] = transformed.T @ transformed
+    transformed = in_basis(base)
+    frames = _frames(drawn, known, items, basis)
+    return Information(drawn, tuple(candidates), basis, transformed.T @ transformed, matrices, open_, frames)
+
+
+def _in_amounts(rows: Rows, balls: Array) -> Array:
+    """Rows (m, y + c) by amounts of ball combinations and shared columns, the pose projected out."""
+    y = balls.shape[2]
+    found = np.zeros((len(rows.ball), y + rows.by_shared.shape[1]))
+    found[:, y:] = rows.by_shared
+    for sign, ball in ((1.0, rows.ball), (-1.0, rows.other)):
+        of_ball = np.flatnonzero(ball >= 0)
+        if len(of_ball):
+            found[of_ball, :y] += sign * np.einsum("md,mdy->my", rows.by_ball[of_ball], balls[ball[of_ball]])
+    if rows.by_pose.shape[1]:
+        along = _range(rows.by_pose)
+        found -= along @ (along.T @ found)
+    return found
+
+
+def _range(columns: Array) -> Array:
+    """Orthonormal basis of what columns span."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    used = columns[:, size > 0] / size[size > 0]
+    vectors, values, _ = np.linalg.svd(used, full_matrices=False)
+    return np.asarray(vectors[:, values > ROUNDING * values.max(initial=0.0)])
+
+
+def _reduced(rows: Array) -> Array:
+    """Rows of the same information, no more of them than columns."""
+    return rows if len(rows) <= rows.shape[1] else np.asarray(np.linalg.qr(rows, mode="r"))
+
+
+def _motions(design: Design) -> Array:
+    """Small motions of each plate: orthonormal displacements (n, d, motions) of its balls."""
+    n, d = design.balls.shape
+    parts = []
+    for artefact in np.flatnonzero(design.is_plate):
+        own = np.flatnonzero(design.ball_artefact == artefact)
+        places = design.balls[own]
+        shifts = np.broadcast_to(np.eye(d), (len(own), d, d))
+        turns = rotation_sensitivity(places - places.mean(axis=0))
+        moved = _range(np.concatenate([shifts, turns], axis=2).reshape(len(own) * d, -1))
+        parts.append(np.zeros((n, d, moved.shape[1])))
+        parts[-1][own] = moved.reshape(len(own), d, -1)
+    return np.concatenate([np.zeros((n, d, 0)), *parts], axis=2)
+
+
+def _combinations(drawn: Drawn, certificates: list[Rows], all_balls: bool) -> Array:
+    """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything that is shared.
+
+    They span a space that the information of no position leads out of, so that what is left out of it has no bearing.
+    Motions of a plate as a whole, which only calibrated co-ordinates show, are part of it where there are any.
+    """
+    n, d = drawn.design.balls.shape
+    of_plates = np.repeat(np.isin(np.arange(n), drawn.design.plate_balls), d)
+    every, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
+    found = _Span(_motions(drawn.design).reshape(n * d, -1), keeps=any(_is_framed(rows) for rows in certificates))
+    if all_balls:
+        found.add(every)
+    for rows in certificates:
+        found.add(_by_balls(rows, np.eye(len(rows.ball)), n) if len(rows.ball) <= n * d else every)
+    kinds: dict[bytes, Array] = {}
+    for rows in position_rows(drawn):
+        if found.rank >= most:
+            break
+        found.add(_by_balls(rows, np.concatenate([rows.by_shared, STEP * rows.by_pose], axis=1), n))
+        kind = _kind(rows, n)
+        kinds.setdefault(kind.round(9).tobytes(), kind)
+        if len(kinds) > MOST_KINDS:
+            found.add(every)
+    grown = -1
+    while grown != found.rank and found.rank < most:
+        grown = found.rank
+        for kind in kinds.values():
+            found.add(np.einsum("nij,njy->niy", kind, found.vectors.reshape(n, d, -1)).reshape(n * d, -1))
+    return found.vectors.reshape(n, d, -1)
+
+
+def _is_framed(rows: Rows) -> bool:
+    """Whether rows are of calibrated co-ordinates."""
+    return len(rows.ball) > 0 and bool((rows.ball >= 0).any() and (rows.other < 0).any())
+
+
+def _by_balls(rows: Rows, columns: Array, n: int) -> Array:
+    """Products (n * d, columns) of rows' derivatives by balls with other columns (m, columns)."""
+    d = rows.by_ball.shape[1]
+    total = np.zeros((n, d, columns.shape[1]))
+    for sign, ball in ((1.0, rows.ball), (-1.0, rows.other)):
+        chosen = np.flatnonzero(ball >= 0)
+        np.add.at(total, ball[chosen], sign * rows.by_ball[chosen][:, :, None] * columns[chosen][:, None, :])
+    return total.reshape(n * d, -1)
+
+
+def _kind(rows: Rows, n: int) -> Array:
+    """Information (n, d, d) of readings on each ball, were all else known, the largest entry being 1."""
+    d = rows.by_ball.shape[1]
+    total = np.zeros((n, d, d))
+    chosen = np.flatnonzero(rows.ball >= 0)
+    some = rows.by_ball[chosen]
+    np.add.at(total, rows.ball[chosen], some[:, :, None] * some[:, None, :])
+    return total / (np.abs(total).max(initial=0.0) or 1.0)
+
+
+class _Span:
+    """An orthonormal basis that grows by what is new in the columns added to it."""
+
+    def __init__(self, motions: Array, keeps: bool) -> None:
+        none = motions[:, :0]
+        self._without: Array = none if keeps else motions
+        self.vectors: Array = motions if keeps else none
+        self._largest = 0.0
+
+    @property
+    def rank(self) -> int:
+        """Dimension, with that of what is taken out."""
+        return int(self.vectors.shape[1] + self._without.shape[1])
+
+    def add(self, columns: Array) -> None:
+        self._largest = max(self._largest, float(np.sqrt((columns**2).sum(axis=0)).max(initial=0.0)))
+        columns = self._new(columns)
+        size = np.sqrt((columns**2).sum(axis=0))
+        columns = columns[:, size > ROUNDING * self._largest]
+        if not columns.shape[1]:
+            return
+        vectors, values, _ = np.linalg.svd(columns, full_matrices=False)
+        found = self._new(vectors[:, values > ROUNDING * self._largest])
+        if found.shape[1]:
+            self.vectors = np.concatenate([self.vectors, np.linalg.qr(found)[0]], axis=1)
+
+    def _new(self, columns: Array) -> Array:
+        for known in (self._without, self.vectors, self._without, self.vectors):
+            columns = columns - known @ (known.T @ columns)
+        return columns
+
+
+def _basis(balls: Array, shared: int, every: list[Array]) -> tuple[Basis, Array]:
+    """Basis in which the information of all rows together is the identity, and what is left out (shared, open)."""
+    y = balls.shape[2]
+    triangle = np.zeros((0, y + shared))
+    for some in _batches(every, 4 * (y + shared)):
+        triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *some]), mode="r"))
+    triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
+    left, values, right = np.linalg.svd(triangle[:y, :y])
+    kept = values > EXACT * values.max(initial=0.0)
+    ball_open = right[~kept].T
+    ball_root = right[kept].T / values[kept]
+    ball_shared = ball_root @ left[:, kept].T @ triangle[:y, y:]
+    # What balls leave of the rows above belongs to shared columns.
+    below = np.concatenate([left[:, ~kept].T @ triangle[:y, y:], triangle[y:, y:]])
+    _, values, right = np.linalg.svd(below, full_matrices=True)
+    values = np.concatenate([values, np.zeros(shared - len(values))])
+    kept = values > EXACT * values.max(initial=0.0)
+    return Basis(balls, ball_root, ball_shared, right[kept].T / values[kept], ball_open), right[~kept].T
+
+
+def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
+    some: list[Array] = []
+    for rows in every:
+        some.append(rows)
+        if sum(map(len, some)) > size:
+            yield some
+            some = []
+    yield some
+
+
+def _frames(drawn: Drawn, known: list[Rows], items: dict[int, list[Rows]], basis: Basis) -> Frames:
+    """How calibrated co-ordinates fix the frames of plates."""
+    motions = _motions(drawn.design)
+
+    def fixed(rows: list[Rows]) -> Array:
+        framed = [r for r in rows if _is_framed(r)]
+        parts = [np.einsum("md,mdk->mk", r.by_ball, motions[r.ball]) for r in framed]
+        return np.concatenate([np.zeros((0, motions.shape[2])), *parts])
+
+    told = {k: found for k, rows in items.items() if len(found := fixed(rows))}
+    amounts = np.einsum("ndk,ndy->ky", motions, basis.balls)
+    rows = basis.rows(amounts, np.zeros((len(amounts), drawn.shared)))
+    return Frames(told, fixed(known), rows)

@@ -1,0 +1,210 @@
+"""Selections by local search: a greedy start, then exchanges of one candidate or two while any makes the criterion
+smaller.
+
+An exchange adds one matrix to that of the remaining selection and factors the sum. A position read with a whole plate
+changes nearly every direction that counts, so that an update of low rank would cost as much as the factor anew; what
+keeps a step cheap are the small matrices and the sieve: of all candidates that could come in, those are evaluated in
+full that do best by the tangent of the criterion at the present selection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from simulator.design import Integers
+from simulator.machines.protocol import Array
+from simulator.threads import scipy_linalg, single_threaded
+
+from .constraints import Constraints
+from .criteria import Criterion
+from .information import Information
+
+# Below this fraction of the whole pool's information a direction counts as undetermined.
+UNDETERMINED = 1e-10
+
+# What is added to the information of selections while they are compared, so that deficient ones compare as well.
+RIDGE = 1e-13
+
+# Candidates that are evaluated in full at each exchange, all of them in pools no larger than this.
+SIEVED = 8
+SMALL_POOL = 24
+
+# Matrices factored at once.
+AT_ONCE = 64
+
+# A relative gain below this is rounding.
+GAIN = 1e-9
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be chosen from, by which criterion, within which limits."""
+
+    information: Information
+    criterion: Criterion
+    constraints: Constraints
+
+
+@dataclass(frozen=True)
+class Found:
+    """A selection: indices of candidates, sorted, and the criterion, infinite where the selection is deficient."""
+
+    chosen: tuple[int, ...]
+    value: float
+
+
+def full_root(information: Array) -> Array | None:
+    """Root R of the covariance R R' of all z, upper triangular, from their information (z, z); None if deficient."""
+    try:
+        factor = np.asarray(np.linalg.cholesky(information), float)
+    except np.linalg.LinAlgError:
+        return None
+    if (np.diagonal(factor) ** 2).min() < UNDETERMINED:
+        return None
+    return _inverse(factor).T
+
+
+def counted_root(problem: Problem, root: Array) -> Array:
+    """The part of a root of all z that the criterion is about: what is left of the last z when balls are eliminated."""
+    if problem.criterion.about_balls:
+        return root
+    own = problem.information.shared
+    return root[own, own]
+
+
+def value(problem: Problem, chosen: Collection[int]) -> float:
+    """Criterion of a selection, infinite if it leaves something undetermined."""
+    root = full_root(problem.information.of(chosen))
+    return np.inf if root is None else problem.criterion.value(counted_root(problem, root))
+
+
+def square_root(weight: Array) -> Array:
+    """H with H H' the semidefinite `weight` (z, z)."""
+    scale, directions = np.linalg.eigh(weight)
+    return np.asarray(directions * np.sqrt(np.maximum(scale, 0.0)))
+
+
+def _counted(problem: Problem, factor: Array) -> Array:
+    """The part of Cholesky factors (..., z, z) that the criterion is about."""
+    if problem.criterion.about_balls:
+        return factor
+    own = problem.information.shared
+    return factor[..., own, own]
+
+
+def _inverse(triangle: Array) -> Array:
+    found: Array = scipy_linalg().lapack.dtrtri(triangle, lower=1)[0]
+    return found
+
+
+def _loss(problem: Problem, information: Array) -> float:
+    """Criterion that deficient selections have as well, larger than any other."""
+    factor = np.asarray(np.linalg.cholesky(information + RIDGE * np.eye(len(information))), float)
+    return problem.criterion.value(_inverse(_counted(problem, factor)).T)
+
+
+def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
+    """Tangent of the criterion (added,) for each candidate that is added to `information`, smaller being better."""
+    size = len(information)
+    ridge = RIDGE * np.eye(size)
+    matrices = problem.information.matrices
+    about: Array = np.linalg.cholesky(information + ridge + matrices[added].mean(axis=0))
+    now = _inverse(_counted(problem, about)).T
+    half = square_root(problem.criterion.tangent(now)[2])
+    found = np.zeros(len(added))
+    for start in range(0, len(added), AT_ONCE):
+        some = added[start : start + AT_ONCE]
+        factor = np.asarray(np.linalg.cholesky(information + ridge + matrices[some]), float)
+        solved = np.asarray(np.linalg.solve(_counted(problem, factor), half))
+        found[start : start + len(some)] = (solved**2).sum(axis=(1, 2))
+    return found
+
+
+def best_addition(problem: Problem, chosen: Collection[int], per_second: bool = False) -> tuple[int, float] | None:
+    """The candidate that lowers the criterion most within the limits, and the criterion with it; None if none may be
+    added.
+
+    With `per_second` the gain is divided by what a candidate takes.
+    """
+    members = set(chosen)
+    added = problem.constraints.additions(members)
+    if not len(added):
+        return None
+    framed = np.isin(added, list(problem.information.frames.fixed))
+    information = problem.information.of(members)
+    weigh = problem.constraints.seconds[added] if per_second else np.ones(len(added))
+    if len(added) > SMALL_POOL and not framed.any():
+        gone = _sieve(problem, information, added)
+        order = np.argsort(gone * weigh if per_second else gone, kind="stable")
+        added, weigh = added[order[:SIEVED]], weigh[order[:SIEVED]]
+    losses = np.array([_loss(problem, problem.information.of({*members, int(k)})) for k in added])
+    if per_second:
+        before = _loss(problem, information)
+        best = int(((losses - before) / np.maximum(weigh, 1.0)).argmin())
+    else:
+        best = int(losses.argmin())
+    return int(added[best]), float(losses[best])
+
+
+def fill(problem: Problem, chosen: Collection[int], per_second: bool = False) -> frozenset[int]:
+    """Add candidates, the best first, as long as the limits allow one and it gains anything."""
+    members = frozenset(chosen)
+    now = _loss(problem, problem.information.of(members))
+    while (found := best_addition(problem, members, per_second)) is not None:
+        addition, after = found
+        if after >= now * (1 - GAIN):
+            break
+        members, now = members | {addition}, after
+    return members
+
+
+@single_threaded
+def improve(problem: Problem, start: Collection[int], pairs: bool = True, per_second: bool = False) -> Found:
+    """The best selection that exchanges lead to from a start within the limits.
+
+    One candidate is exchanged at a time until none gains, then, with `pairs`, two are taken out and the gap is filled
+    anew.
+    """
+    members = fill(problem, start, per_second)
+    now = _loss(problem, problem.information.of(members))
+    sizes = (1, 2) if pairs else (1,)
+    size = 1
+    while size <= len(sizes):
+        free = sorted(members - problem.constraints.must)
+        for gone in combinations(free, size):
+            if not members.issuperset(gone):
+                continue
+            found = fill(problem, members.difference(gone))
+            after = _loss(problem, problem.information.of(found))
+            if after < now * (1 - GAIN):
+                members, now, size = found, after, 0
+                if pairs and len(gone) > 1:
+                    break
+        size += 1
+    return Found(tuple(sorted(members)), value(problem, members))
+
+
+def ranked_additions(problem: Problem, chosen: Collection[int]) -> list[tuple[int, float]]:
+    """Candidates that may be added to a selection, with the criterion that each would give, smallest first."""
+    added = problem.constraints.additions(chosen)
+    losses = [(int(k), value(problem, {*chosen, int(k)})) for k in added]
+    return sorted(losses, key=lambda item: (item[1], item[0]))
+
+
+def starts(problem: Problem, ranked: Sequence[int], count: int, seed: int) -> list[frozenset[int]]:
+    """Selections to start from: what has to be chosen alone, filled by rank, and `count` filled in random order."""
+    must = problem.constraints.must
+    found = [must]
+    generator = np.random.default_rng(np.random.SeedSequence(seed))
+    orders = [list(ranked), *(generator.permutation(problem.constraints.count).tolist() for _ in range(count))]
+    for order in orders:
+        members = must
+        for k in order:
+            if k not in members and problem.constraints.allows(members | {k}):
+                members |= {k}
+        found.append(members)
+    return list(dict.fromkeys(found))
