@@ -18,7 +18,7 @@ import numpy as np
 from simulator.machines.protocol import Array
 from simulator.threads import single_threaded
 
-from .search import Problem, counted_root, fill, full_root, square_root
+from .search import Losses, Problem, counted_root, fill, full_root, square_root
 
 # Relative distance of bound and relaxation at which the weights are good enough, and steps at most.
 CLOSE = 1e-3
@@ -133,7 +133,7 @@ def _first(problem: Problem, start: Collection[int] | None) -> _Mixture | None:
     n = problem.constraints.count
     limits = problem.constraints.linear()
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    selection = fill(problem, problem.constraints.must) if start is None else start
+    selection = fill(problem, problem.constraints.must, Losses(problem)) if start is None else start
     vertices = [np.isin(np.arange(n), list(selection)).astype(float)]
     for _ in range(MOST_STARTS):
         found = _largest(limits, generator.random(n), n)

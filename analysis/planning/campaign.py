@@ -18,7 +18,7 @@ from .bound import Bound, bound
 from .constraints import Budget, Constraints, Spent, constraints
 from .criteria import CriterionName, criterion, is_about_balls
 from .information import pool_information
-from .search import Found, Problem, improve, ranked_additions, starts, value
+from .search import Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
 FEW_STARTS, MANY_STARTS = 2, 8
@@ -200,23 +200,31 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     """The best selection found, and the bound of all."""
     is_small = problem.constraints.count <= SMALL_POOL
     first = starts(problem, drawn, MANY_STARTS if is_small else FEW_STARTS, seed)
-    tasks: list[tuple[object, ...]] = [(problem, None, False)]
-    tasks += [(problem, start, is_small) for start in first]
+    # In a small pool most selections are met again and again, and one process remembers them.
+    shares = [first] if is_small else [[start] for start in first]
+    tasks: list[tuple[object, ...]] = [(problem, None, False), *((problem, share, is_small) for share in shares)]
     relaxed, *found = in_processes(_task, tasks, workers)
+    selections = [one for some in found if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-relaxed.weights, kind="stable").tolist()
-        found.append(_task(problem, starts(problem, by_weight, 0, seed)[-1], is_small))
-    selections = sorted({one for one in found if isinstance(one, Found)}, key=lambda one: (one.value, one.chosen))
+        selections.append(improve(problem, starts(problem, by_weight, 0, seed)[-1], Losses(problem), is_small))
+    selections = sorted(set(selections), key=lambda one: (one.value, one.chosen))
     if not is_small:
-        deeper = in_processes(_task, [(problem, one.chosen, True) for one in selections[:2]], workers)
-        selections += [one for one in deeper if isinstance(one, Found)]
+        again = in_processes(_task, [(problem, [one.chosen], True) for one in selections[:2]], workers)
+        selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: (one.value, one.chosen))
     return best, relaxed if isinstance(relaxed, Bound) else None
 
 
 @single_threaded
-def _task(problem: Problem, start: Collection[int] | None, deep: bool) -> Found | Bound | None:
-    return bound(problem) if start is None else improve(problem, start, deep)
+def _task(problem: Problem, from_: Sequence[Collection[int]] | None, deep: bool) -> list[Found] | Bound | None:
+    if from_ is None:
+        return bound(problem)
+    losses = Losses(problem)
+    found = [improve(problem, start, losses, deep) for start in from_]
+    timed = problem.constraints.budget.seconds is not None
+    # Where time is short, what is cheap may be better than what gains most.
+    return found + ([improve(problem, from_[0], losses, deep, per_second=True)] if timed else [])
 
 
 def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
@@ -262,7 +270,8 @@ def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
     if not problem.constraints.allows(problem.constraints.must):
         return None
     generous = sorted(best.chosen, key=lambda k: value(problem, set(best.chosen) - {k}), reverse=True)
-    selections = [improve(problem, start, False) for start in starts(problem, generous, 0, 1)]
+    losses = Losses(problem)
+    selections = [improve(problem, start, losses, False) for start in starts(problem, generous, 0, 1)]
     found = min(selections, key=lambda one: (one.value, one.chosen))
     relaxed = bound(problem) if np.isfinite(found.value) else None
     return found, np.nan if relaxed is None else relaxed.value

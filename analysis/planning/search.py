@@ -101,18 +101,28 @@ def _inverse(triangle: Array) -> Array:
     return found
 
 
-def _loss(problem: Problem, information: Array) -> float:
-    """Criterion that deficient selections have as well, larger than any other."""
-    factor = np.asarray(np.linalg.cholesky(information + RIDGE * np.eye(len(information))), float)
-    return problem.criterion.value(_inverse(_counted(problem, factor)).T)
+class Losses:
+    """Criterion of selections, each computed once; deficient ones have it as well, larger than any other."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._known: dict[frozenset[int], float] = {}
+
+    def of(self, members: frozenset[int]) -> float:
+        found = self._known.get(members)
+        if found is None:
+            information = self._problem.information.of(members)
+            factor = np.asarray(np.linalg.cholesky(information + RIDGE * np.eye(len(information))), float)
+            found = self._problem.criterion.value(_inverse(_counted(self._problem, factor)).T)
+            self._known[members] = found
+        return found
 
 
 def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
     """Tangent of the criterion (added,) for each candidate that is added to `information`, smaller being better."""
-    size = len(information)
-    ridge = RIDGE * np.eye(size)
+    ridge = RIDGE * np.eye(len(information))
     matrices = problem.information.matrices
-    about: Array = np.linalg.cholesky(information + ridge + matrices[added].mean(axis=0))
+    about = np.asarray(np.linalg.cholesky(information + ridge + matrices[added].mean(axis=0)), float)
     now = _inverse(_counted(problem, about)).T
     half = square_root(problem.criterion.tangent(now)[2])
     found = np.zeros(len(added))
@@ -124,67 +134,59 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
     return found
 
 
-def best_addition(problem: Problem, chosen: Collection[int], per_second: bool = False) -> tuple[int, float] | None:
-    """The candidate that lowers the criterion most within the limits, and the criterion with it; None if none may be
-    added.
+def best_addition(
+    problem: Problem, members: frozenset[int], losses: Losses, per_second: bool = False
+) -> tuple[int, float] | None:
+    """The candidate that lowers the criterion most within the limits, and the criterion with it.
 
-    With `per_second` the gain is divided by what a candidate takes.
+    None if none may be added. With `per_second` the gain is divided by what a candidate takes.
     """
-    members = set(chosen)
     added = problem.constraints.additions(members)
     if not len(added):
         return None
+    seconds = np.maximum(problem.constraints.seconds, 1.0)
     framed = np.isin(added, list(problem.information.frames.fixed))
-    information = problem.information.of(members)
-    weigh = problem.constraints.seconds[added] if per_second else np.ones(len(added))
     if len(added) > SMALL_POOL and not framed.any():
-        gone = _sieve(problem, information, added)
-        order = np.argsort(gone * weigh if per_second else gone, kind="stable")
-        added, weigh = added[order[:SIEVED]], weigh[order[:SIEVED]]
-    losses = np.array([_loss(problem, problem.information.of({*members, int(k)})) for k in added])
-    if per_second:
-        before = _loss(problem, information)
-        best = int(((losses - before) / np.maximum(weigh, 1.0)).argmin())
-    else:
-        best = int(losses.argmin())
-    return int(added[best]), float(losses[best])
+        left = _sieve(problem, problem.information.of(members), added)
+        if per_second:
+            left = (left - left.max()) / seconds[added]
+        added = added[np.argsort(left, kind="stable")[:SIEVED]]
+    after = np.array([losses.of(members | {int(k)}) for k in added])
+    gain = after - losses.of(members)
+    best = int((gain / seconds[added] if per_second else gain).argmin())
+    return int(added[best]), float(after[best])
 
 
-def fill(problem: Problem, chosen: Collection[int], per_second: bool = False) -> frozenset[int]:
+def fill(problem: Problem, chosen: Collection[int], losses: Losses, per_second: bool = False) -> frozenset[int]:
     """Add candidates, the best first, as long as the limits allow one and it gains anything."""
     members = frozenset(chosen)
-    now = _loss(problem, problem.information.of(members))
-    while (found := best_addition(problem, members, per_second)) is not None:
+    while (found := best_addition(problem, members, losses, per_second)) is not None:
         addition, after = found
-        if after >= now * (1 - GAIN):
+        if after >= losses.of(members) * (1 - GAIN):
             break
-        members, now = members | {addition}, after
+        members |= {addition}
     return members
 
 
 @single_threaded
-def improve(problem: Problem, start: Collection[int], pairs: bool = True, per_second: bool = False) -> Found:
+def improve(
+    problem: Problem, start: Collection[int], losses: Losses, pairs: bool = True, per_second: bool = False
+) -> Found:
     """The best selection that exchanges lead to from a start within the limits.
 
     One candidate is exchanged at a time until none gains, then, with `pairs`, two are taken out and the gap is filled
-    anew.
+    anew. With `per_second` the start is filled up by what candidates gain for the time they take.
     """
-    members = fill(problem, start, per_second)
-    now = _loss(problem, problem.information.of(members))
-    sizes = (1, 2) if pairs else (1,)
+    members = fill(problem, start, losses, per_second)
     size = 1
-    while size <= len(sizes):
-        free = sorted(members - problem.constraints.must)
-        for gone in combinations(free, size):
-            if not members.issuperset(gone):
-                continue
-            found = fill(problem, members.difference(gone))
-            after = _loss(problem, problem.information.of(found))
-            if after < now * (1 - GAIN):
-                members, now, size = found, after, 0
-                if pairs and len(gone) > 1:
-                    break
-        size += 1
+    while size <= (2 if pairs else 1):
+        before = members
+        for gone in combinations(sorted(members - problem.constraints.must), size):
+            if members.issuperset(gone):
+                found = fill(problem, members.difference(gone), losses)
+                if losses.of(found) < losses.of(members) * (1 - GAIN):
+                    members = found
+        size = size + 1 if members == before else 1
     return Found(tuple(sorted(members)), value(problem, members))
 
 
