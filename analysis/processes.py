@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
@@ -24,19 +25,43 @@ def in_processes(
 
     kind = "generator" if ordered else "generator_unordered"
     parallel = Parallel(n_jobs=workers, return_as=kind, pre_dispatch="2*n_jobs", batch_size=batch_size)
-    results = parallel(delayed(_deaf)(function, own) for own in arguments)
+    results: Generator[Result, None, None] | None = None
     finished = False
     try:
+        with _interruptions_held():
+            results = parallel(delayed(_deaf)(function, own) for own in arguments)
         # Not `yield from`, which would end the workers before the warning below is silenced.
         for result in results:  # noqa: UP028
             yield result
         finished = True
     finally:
-        if not finished:
+        if not finished and results is not None:
             # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)
                 results.close()
+
+
+@contextmanager
+def _interruptions_held() -> Iterator[None]:
+    """Answer an interruption from the keyboard at the end; processes started meanwhile never see one.
+
+    It reaches every process of the terminal, also those that have only begun to load what `_deaf` needs.
+    """
+    import signal
+
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    # Its start, which comes with that of the first process, would let interruptions in again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _deaf(function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:

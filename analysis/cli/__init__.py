@@ -5,15 +5,18 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from . import check, compare, export, fit, init, map, report, reproduce, run, schema, simulate, spline, sweep
+from .interruption import interruptions
 
-AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE = 0, 1, 2, 3
+AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
+    # Loaded only now, so that hardly anything is when an interruption begins to be answered.
+    from . import check, compare, export, fit, init, map, report, reproduce, run, schema, simulate, spline, sweep
+
     top = argparse.ArgumentParser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
@@ -28,9 +31,19 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
+    try:
+        with interruptions() as answer:
+            return _main(arguments, answer)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], None]) -> int:
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     options = parser().parse_args(arguments)
+    options.answer_interruption = answer_interruption
     # Loaded only now, so that --help and wrong usage answer at once.
     from simulator.experiment.messages import ExperimentError
 
@@ -49,9 +62,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BAD_FILE
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
 
 
 class _Version(argparse.Action):

@@ -91,29 +91,18 @@ def run(options: Namespace) -> int:
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
-    import signal
-
     from ..montecarlo.study import trials
     from ..montecarlo.trials import MOST_TRIALS, Progress
     from ..processes import processors
     from .progress import ProgressBar
 
     bar = ProgressBar("data sets")
-    asked_to_end = False
-
-    def interrupt(*_: object) -> None:
-        nonlocal asked_to_end
-        asked_to_end = True
-        raise KeyboardInterrupt
 
     def report(progress: Progress) -> None:
-        # Where an interruption came in a place that lets no exception out, it is answered here.
-        if asked_to_end:
-            raise KeyboardInterrupt
+        options.answer_interruption()
         remark = f"accurate to {100 * progress.accuracy:.2g} %" if progress.accuracy < 1.0 else ""
         bar.show(progress.done, progress.wanted, remark)
 
-    before = signal.signal(signal.SIGINT, interrupt)
     try:
         return trials(
             experiment,
@@ -124,5 +113,4 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
             report,
         )
     finally:
-        signal.signal(signal.SIGINT, before)
         bar.close()

@@ -97,6 +97,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     bar = ProgressBar("cells")
 
     def report(summary: Summary) -> None:
+        options.answer_interruption()
         remark = ", ".join(
             ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
             + ([f"{summary.failed} failed"] if summary.failed else [])
@@ -106,6 +107,8 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     try:
         with _runner(sweep, bundle, options) as runner:
             summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
+        if summary.left:
+            options.answer_interruption()
     except ChangedError:
         bar.close()
         text = "the files of the sweep have been changed while it ran; what is done is stored, start it again"

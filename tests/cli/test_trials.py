@@ -14,6 +14,7 @@ import pytest
 
 from analysis.cli import main
 from analysis.cli.progress import ProgressBar
+from tests.sweeps.support import hearing_interruptions
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -117,6 +118,7 @@ def test_an_interruption_reports_what_is_done(workers: str) -> None:
         text=True,
         start_new_session=True,
         env={**os.environ, "PYTHONPATH": os.getcwd()},
+        preexec_fn=hearing_interruptions,
     )
     assert process.stderr is not None
     # The first line of progress says that something is done.

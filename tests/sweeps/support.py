@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -36,6 +37,11 @@ def small_sweep(folder: Path, count: int, more: str = "") -> Path:
 
 def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "analysis.cli", *map(str, arguments)]
+
+
+def hearing_interruptions() -> None:
+    """For `preexec_fn`: what shells start in the background ignores interruptions, and so does all that it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def run(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:

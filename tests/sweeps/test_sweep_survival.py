@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from .support import ROOT, assert_same, command, rows, run, small_sweep, stored
+from .support import ROOT, assert_same, command, hearing_interruptions, rows, run, small_sweep, stored
 
 Change = Callable[[], None]
 
@@ -143,7 +143,7 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
 
 def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
     path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
-    process = started(path)
+    process = started(path, preexec_fn=hearing_interruptions)
     assert wait_until(lambda: stored(store) > 2, process)
     begun = time.monotonic()
     process.send_signal(signal.SIGINT)
@@ -151,6 +151,17 @@ def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subproce
     assert process.returncode == 130 and time.monotonic() - begun < 20, err
     assert "the same command goes on from there" in err and "Traceback" not in err
     assert 2 < stored(store) < 80
+
+
+def test_interrupted_while_workers_start(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+    """The keyboard reaches the workers too, which are still loading modules."""
+    process = started(small_sweep(tmp_path, 40), preexec_fn=hearing_interruptions, start_new_session=True)
+    assert wait_until(lambda: len(children(process.pid)) == 2, process)
+    time.sleep(0.1)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.startswith("interrupted; what is done is in") and err.count("\n") == 1, err
 
 
 def test_one_writer_at_a_time(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:

@@ -1,0 +1,111 @@
+"""Interruptions from the keyboard (SIGINT) at awkward moments: status 130, one line, no traceback."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from analysis.cli import main
+from analysis.cli.interruption import interruptions
+from analysis.sweeps import execute
+from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
+
+
+@pytest.fixture(autouse=True)
+def heard() -> Iterator[None]:
+    """Interruptions are heard here too if the tests run in the background, where shells have them ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def swallowed() -> None:
+    """An interruption in a place that lets no exception out."""
+    with suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_one_that_was_swallowed_ends_a_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, store = small_sweep(tmp_path, 3), tmp_path / "small.sqlite"
+    add_rows = execute.add_rows
+
+    def interrupted_once(*arguments: Any) -> None:
+        add_rows(*arguments)
+        if stored(store) == 2:
+            swallowed()
+
+    monkeypatch.setattr(execute, "add_rows", interrupted_once)
+    assert main(["sweep", str(path), "--workers", "1"]) == 130
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("interrupted; what is done is in") and err.count("\n") == 1
+    assert stored(store) == 2
+    assert main(["sweep", str(path), "--workers", "1"]) == 1
+    assert "6 cells, 4 done, 2 failed (2 of them before)" in capsys.readouterr().out
+
+
+def test_one_that_was_swallowed_ends_monte_carlo(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from analysis.montecarlo import trials
+
+    accuracy_of = trials.accuracy_of
+
+    def interrupted(*arguments: Any) -> float:
+        swallowed()
+        return accuracy_of(*arguments)
+
+    monkeypatch.setattr(trials, "accuracy_of", interrupted)
+    quickstart = str(ROOT / "designs" / "quickstart.yaml")
+    assert main(["run", quickstart, "--trials", "1000000", "--workers", "1"]) == 130
+    assert "interrupted: the figures are those of the data sets done so far" in capsys.readouterr().err
+
+
+def test_they_are_remembered() -> None:
+    with interruptions() as answer:
+        answer()
+        swallowed()
+        with pytest.raises(KeyboardInterrupt):
+            answer()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ignored_ones_stay_ignored() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with interruptions() as answer:
+        signal.raise_signal(signal.SIGINT)
+        answer()
+
+
+@pytest.mark.parametrize("module", ["analysis.cli.common", "simulator.experiment.messages", "numpy", "joblib"])
+def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
+    """The first second of every command is this."""
+    path = small_sweep(tmp_path, 3)
+    code = (
+        "import signal, sys\n"
+        "class Interrupting:\n"
+        "    def find_spec(self, name, *_):\n"
+        f"        if name == {module!r}:\n"
+        "            signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupting())\n"
+        "from analysis.cli import main\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "sweep", path, "--workers", "2"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        preexec_fn=hearing_interruptions,
+    )
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.startswith("interrupted") and done.stderr.count("\n") == 1
