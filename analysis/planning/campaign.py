@@ -22,7 +22,7 @@ from .search import Found, Losses, Problem, improve, ranked_additions, starts, v
 
 # Random starts of the search, in a large pool and in a small one.
 FEW_STARTS, MANY_STARTS = 2, 8
-SMALL_POOL = 64
+SMALL_POOL, VERY_SMALL_POOL = 64, 24
 
 # Candidates left out that are told of.
 LEFT_OUT = 10
@@ -202,29 +202,27 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     first = starts(problem, drawn, MANY_STARTS if is_small else FEW_STARTS, seed)
     # In a small pool most selections are met again and again, and one process remembers them.
     shares = [first] if is_small else [[start] for start in first]
-    tasks: list[tuple[object, ...]] = [(problem, None, False), *((problem, share, is_small) for share in shares)]
+    depth = 3 if problem.constraints.count <= VERY_SMALL_POOL else 2 if is_small else 1
+    tasks: list[tuple[object, ...]] = [(problem, None, 0), *((problem, share, depth) for share in shares)]
     relaxed, *found = in_processes(_task, tasks, workers)
     selections = [one for some in found if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-relaxed.weights, kind="stable").tolist()
-        selections.append(improve(problem, starts(problem, by_weight, 0, seed)[-1], Losses(problem), is_small))
+        selections.append(improve(problem, starts(problem, by_weight, 0, seed)[-1], Losses(problem), depth))
     selections = sorted(set(selections), key=lambda one: (one.value, one.chosen))
     if not is_small:
-        again = in_processes(_task, [(problem, [one.chosen], True) for one in selections[:2]], workers)
+        again = in_processes(_task, [(problem, [one.chosen], 2) for one in selections[:2]], workers)
         selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: (one.value, one.chosen))
     return best, relaxed if isinstance(relaxed, Bound) else None
 
 
 @single_threaded
-def _task(problem: Problem, from_: Sequence[Collection[int]] | None, deep: bool) -> list[Found] | Bound | None:
+def _task(problem: Problem, from_: Sequence[Collection[int]] | None, at_once: int) -> list[Found] | Bound | None:
     if from_ is None:
         return bound(problem)
     losses = Losses(problem)
-    found = [improve(problem, start, losses, deep) for start in from_]
-    timed = problem.constraints.budget.seconds is not None
-    # Where time is short, what is cheap may be better than what gains most.
-    return found + ([improve(problem, from_[0], losses, deep, per_second=True)] if timed else [])
+    return [improve(problem, start, losses, at_once) for start in from_]
 
 
 def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
@@ -271,7 +269,7 @@ def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
         return None
     generous = sorted(best.chosen, key=lambda k: value(problem, set(best.chosen) - {k}), reverse=True)
     losses = Losses(problem)
-    selections = [improve(problem, start, losses, False) for start in starts(problem, generous, 0, 1)]
+    selections = [improve(problem, start, losses, 1) for start in starts(problem, generous, 0, 1)]
     found = min(selections, key=lambda one: (one.value, one.chosen))
     relaxed = bound(problem) if np.isfinite(found.value) else None
     return found, np.nan if relaxed is None else relaxed.value

@@ -29,6 +29,9 @@ UNDETERMINED = 1e-10
 # What is added to the information of selections while they are compared, so that deficient ones compare as well.
 RIDGE = 1e-13
 
+# Above every criterion.
+LARGE = 1e12
+
 # Candidates that are evaluated in full at each exchange, all of them in pools no larger than this.
 SIEVED = 8
 SMALL_POOL = 24
@@ -102,7 +105,7 @@ def _inverse(triangle: Array) -> Array:
 
 
 class Losses:
-    """Criterion of selections, each computed once; deficient ones have it as well, larger than any other."""
+    """What is made small, of selections, each computed once: the criterion, or for deficient ones something larger."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
@@ -113,9 +116,21 @@ class Losses:
         if found is None:
             information = self._problem.information.of(members)
             factor = np.asarray(np.linalg.cholesky(information + RIDGE * np.eye(len(information))), float)
-            found = self._problem.criterion.value(_inverse(_counted(self._problem, factor)).T)
+            found = float(_deficient(factor))
+            if found == 0.0:
+                found = self._problem.criterion.value(_inverse(_counted(self._problem, factor)).T)
             self._known[members] = found
         return found
+
+
+def _deficient(factor: Array) -> Array:
+    """What is made small in place of a criterion that Cholesky factors (..., z, z) leave undetermined; otherwise 0.
+
+    It falls with the determinant, so that what determines most directions, and those best, is chosen first.
+    """
+    pivots = np.diagonal(factor, axis1=-2, axis2=-1) ** 2
+    missing = -np.log(pivots).mean(axis=-1) / -np.log(RIDGE)
+    return np.where(pivots.min(axis=-1) < UNDETERMINED, LARGE * (1.0 + missing), 0.0)
 
 
 def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
@@ -130,7 +145,8 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
         some = added[start : start + AT_ONCE]
         factor = np.asarray(np.linalg.cholesky(information + ridge + matrices[some]), float)
         solved = np.asarray(np.linalg.solve(_counted(problem, factor), half))
-        found[start : start + len(some)] = (solved**2).sum(axis=(1, 2))
+        deficient = _deficient(factor)
+        found[start : start + len(some)] = np.where(deficient > 0.0, deficient, (solved**2).sum(axis=(1, 2)))
     return found
 
 
@@ -157,9 +173,17 @@ def best_addition(
     return int(added[best]), float(after[best])
 
 
-def fill(problem: Problem, chosen: Collection[int], losses: Losses, per_second: bool = False) -> frozenset[int]:
-    """Add candidates, the best first, as long as the limits allow one and it gains anything."""
-    members = frozenset(chosen)
+def fill(problem: Problem, chosen: Collection[int], losses: Losses) -> frozenset[int]:
+    """Add candidates, the best first, as long as the limits allow one and it gains anything.
+
+    Where time is limited, what is best may also be what gains most for the time it takes, whichever ends better.
+    """
+    timed = problem.constraints.budget.seconds is not None
+    ways = (False, True) if timed else (False,)
+    return min((_filled(problem, frozenset(chosen), losses, per_second) for per_second in ways), key=losses.of)
+
+
+def _filled(problem: Problem, members: frozenset[int], losses: Losses, per_second: bool) -> frozenset[int]:
     while (found := best_addition(problem, members, losses, per_second)) is not None:
         addition, after = found
         if after >= losses.of(members) * (1 - GAIN):
@@ -169,17 +193,15 @@ def fill(problem: Problem, chosen: Collection[int], losses: Losses, per_second: 
 
 
 @single_threaded
-def improve(
-    problem: Problem, start: Collection[int], losses: Losses, pairs: bool = True, per_second: bool = False
-) -> Found:
+def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: int) -> Found:
     """The best selection that exchanges lead to from a start within the limits.
 
-    One candidate is exchanged at a time until none gains, then, with `pairs`, two are taken out and the gap is filled
-    anew. With `per_second` the start is filled up by what candidates gain for the time they take.
+    One candidate is taken out at a time and the gap filled anew until that gains nothing, then two, and so on up to
+    `at_once`.
     """
-    members = fill(problem, start, losses, per_second)
+    members = fill(problem, start, losses)
     size = 1
-    while size <= (2 if pairs else 1):
+    while size <= at_once:
         before = members
         for gone in combinations(sorted(members - problem.constraints.must), size):
             if members.issuperset(gone):

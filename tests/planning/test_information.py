@@ -1,0 +1,176 @@
+"""What a plan computes step by step is what a full computation of the chosen design gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.planning.constraints import Budget, constraints
+from analysis.planning.criteria import CriterionName, criterion, is_about_balls
+from analysis.planning.information import pool_information
+from analysis.planning.search import Losses, Problem, value
+from analysis.study import Plan, plan
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment, Position
+from simulator.experiment.pool import with_chosen
+
+from .small_pool import TEXT
+
+CAMPAIGN = Path("designs/planning/campaign.yaml")
+
+# A plate in two dimensions whose probes have offsets that are estimated, some balls of it read, and more often.
+FLAT = """
+title: a plate on a table
+machine: {volume: [600 mm, 500 mm], repeatability: [1 um, 2 um]}
+error_model: {kind: metric}
+probes: {one: [0 mm, 0 mm], two: {offset: [30 mm, 0 mm], standard_uncertainty: 5 um}}
+artefacts: {plate: {kind: grid, balls: [3, 3], size: [200 mm, 300 mm]}}
+evaluation: {points: {random: 15, seed: 2}, probe: two}
+pool:
+  candidates:
+    - {name: straight, corner: {x: 50 mm, y: 50 mm}, probes: [one]}
+    - {name: turned, corner: {x: 150 mm, y: 100 mm}, quarter_turns: 1, probes: [one, two]}
+    - {name: slanting, pose: {origin: [300 mm, 50 mm], rotation: 30 deg}, probes: [two], repeats: 3}
+    - {name: some, corner: {x: 250 mm, y: 150 mm}, balls: [r1c1, r1c3, r3c1, r2c2], probes: [one]}
+    - {name: precise, corner: {x: 50 mm, y: 100 mm}, standard_uncertainty: 0.3 um, probes: [one]}
+  calibration:
+    - {name: sides, kind: distances, pairs: corner sides, standard_uncertainty: 0.4 um, price: 1 h}
+    - {name: corners, kind: coordinates, balls: corners, standard_uncertainty: 0.5 um, price: 1 h}
+"""
+
+
+def problem_of(experiment: Experiment, name: CriterionName) -> Problem:
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    information = pool_information(experiment, candidates, is_about_balls(name))
+    limits = constraints(candidates, experiment.pool.changes, Budget())
+    return Problem(information, criterion(information, experiment, name), limits)
+
+
+def in_full(found: Plan, name: CriterionName) -> float:
+    kind, _, largest = name.partition("-")
+    return getattr(found.quantities[kind], "maximum" if largest else "average")
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "pool.yaml"
+    path.write_text(text)
+    return path
+
+
+def selections(experiment: Experiment, count: int, size: int, seed: int) -> list[list[int]]:
+    assert experiment.pool is not None
+    generator = np.random.default_rng(seed)
+    n = len(experiment.pool.candidates)
+    return [sorted(generator.choice(n, min(size, n), replace=False).tolist()) for _ in range(count)]
+
+
+NAMES: tuple[CriterionName, ...] = ("U6", "U6-maximum", "U5", "U5-maximum", "tasks", "tasks-maximum")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> None:
+    (experiment,) = load(written(tmp_path, TEXT), planning=True)
+    assert experiment.pool is not None
+    problem = problem_of(experiment, name)
+    compared = 0
+    for chosen in selections(experiment, 30, 7, 3):
+        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        found = value(problem, chosen)
+        assert np.isfinite(found) == (full.verdict.deficiency == 0)
+        if np.isfinite(found):
+            compared += 1
+            assert found == pytest.approx(in_full(full, name), rel=1e-9)
+            # So are the figures that exchanges compare.
+            assert Losses(problem).of(frozenset(chosen)) == pytest.approx(found, rel=1e-8)
+    assert compared > 10
+
+
+@pytest.mark.parametrize("name", ["U6", "U5"])
+def test_equal_for_estimated_offsets_and_parts_of_a_plate(tmp_path: Path, name: CriterionName) -> None:
+    (experiment,) = load(written(tmp_path, FLAT), planning=True)
+    assert experiment.pool is not None
+    problem = problem_of(experiment, name)
+    compared = 0
+    for chosen in selections(experiment, 25, 4, 4):
+        items = [experiment.pool.candidates[k] for k in chosen]
+        if not any(isinstance(one.item, Position) for one in items):
+            continue
+        full = plan(with_chosen(experiment, items))
+        found = value(problem, chosen)
+        if np.isfinite(found) and full.verdict.deficiency == 0:
+            compared += 1
+            assert found == pytest.approx(in_full(full, name), rel=1e-9)
+    assert compared > 5
+
+
+def test_equal_for_a_bar_and_better_certificates() -> None:
+    (experiment,) = load(CAMPAIGN, planning=True)
+    assert experiment.pool is not None
+    problem = problem_of(experiment, "U6")
+    names = [candidate.name for candidate in experiment.pool.candidates]
+    last = list(range(len(names) - 4, len(names)))
+    assert names[last[0]].startswith("bar") and names[last[-1]] == "better sides"
+    compared = 0
+    for chosen in selections(experiment, 10, 9, 5):
+        members = sorted({*chosen, *last})
+        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in members]))
+        found = value(problem, members)
+        assert np.isfinite(found) == (full.verdict.deficiency == 0)
+        if np.isfinite(found):
+            compared += 1
+            assert found == pytest.approx(full.quantities["U6"].average, rel=1e-9)
+    assert compared > 3
+
+
+def test_combinations_of_balls_change_nothing() -> None:
+    (experiment,) = load(CAMPAIGN, planning=True)
+    assert experiment.pool is not None
+    some = pool_information(experiment, experiment.pool.candidates)
+    every = pool_information(experiment, experiment.pool.candidates, all_balls=True)
+    assert some.basis.size < every.basis.size
+    chosen = [0, 1, 8, 17, 30, 40, 50]
+    limits = constraints(experiment.pool.candidates, experiment.pool.changes, Budget())
+    found = [value(Problem(one, criterion(one, experiment, "U6"), limits), chosen) for one in (some, every)]
+    assert found[0] == pytest.approx(found[1], rel=1e-12)
+
+
+def test_all_candidates_together_have_the_identity() -> None:
+    (experiment,) = load(CAMPAIGN, planning=True)
+    assert experiment.pool is not None
+    information = pool_information(experiment, experiment.pool.candidates)
+    total = information.of(range(len(experiment.pool.candidates)))
+    np.testing.assert_allclose(total, np.eye(len(total)), atol=1e-11)
+
+
+def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
+    # With one probe, rotations cannot be told from straightness.
+    text = TEXT.replace("[[right, down]]", "[down]").replace("[[back, down]]", "[down]").replace(", probe: right", "")
+    (experiment,) = load(written(tmp_path, text), planning=True)
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    full = plan(with_chosen(experiment, candidates))
+    information = pool_information(experiment, candidates)
+    assert information.deficiency == full.verdict.deficiency > 0
+    assert full.quantities["U6"].undetermined == full.quantities["U6"].count
+    with pytest.raises(ExperimentError, match="no selection determines any"):
+        criterion(information, experiment, "U6")
+    with pytest.raises(ExperimentError, match="undetermined"):
+        criterion(information, experiment, "A")
+    problem = problem_of(experiment, "U5")
+    assert problem.criterion.excluded == full.quantities["U5"].undetermined
+    assert value(problem, range(len(candidates))) == pytest.approx(full.quantities["U5"].average, rel=1e-9)
+
+
+def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
+    drawn = (
+        "positions: [{name: low, artefact: plate, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}]"
+    )
+    prior = 'priors: [{parameter: "low: origin x", standard_uncertainty: 1 um}]'
+    (experiment,) = load(written(tmp_path, f"{TEXT}{drawn}\n{prior}\n"), planning=True)
+    assert experiment.pool is not None
+    with pytest.raises(ExperimentError, match="which a plan cannot weigh"):
+        pool_information(experiment, experiment.pool.candidates)

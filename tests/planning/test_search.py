@@ -1,0 +1,197 @@
+"""Selections against the best of all that there are, and bounds that none of them breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import chain, combinations
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from analysis.planning.bound import bound
+from analysis.planning.campaign import Request, campaign
+from analysis.planning.constraints import HOUR, Budget, Constraints, constraints
+from analysis.planning.criteria import CriterionName, criterion, is_about_balls
+from analysis.planning.information import pool_information
+from analysis.planning.search import Losses, Problem, improve, starts, value
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment
+from simulator.experiment.pool import AtMost
+from simulator.machines.protocol import Array
+
+from .small_pool import TEXT
+
+CRITERIA: tuple[CriterionName, ...] = ("U6", "U6-maximum", "U5", "tasks", "A", "D", "E", "condition")
+SIZE = 13
+
+
+@cache
+def small() -> Experiment:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "small.yaml"
+        path.write_text(TEXT)
+        return load(path, planning=True)[0]
+
+
+@cache
+def problem_of(name: CriterionName) -> Problem:
+    pool = small().pool
+    assert pool is not None and len(pool.candidates) == SIZE
+    information = pool_information(small(), pool.candidates, is_about_balls(name))
+    limits = constraints(pool.candidates, pool.changes, Budget())
+    return Problem(information, criterion(information, small(), name), limits)
+
+
+@cache
+def every() -> tuple[tuple[int, ...], ...]:
+    """All selections but the empty one."""
+    return tuple(chain.from_iterable(combinations(range(SIZE), k) for k in range(1, SIZE + 1)))
+
+
+@cache
+def values(name: CriterionName) -> Array:
+    return np.array([value(problem_of(name), chosen) for chosen in every()])
+
+
+@st.composite
+def limits(draw: Callable[[st.SearchStrategy], object]) -> Constraints:  # type: ignore[type-arg]
+    """Budgets and limits of all kinds, some of which no selection keeps to."""
+    base = problem_of("U6").constraints
+    members = st.lists(st.integers(0, SIZE - 1), min_size=2, max_size=6, unique=True)
+    budget = draw(
+        st.builds(
+            Budget,
+            st.one_of(st.none(), st.floats(1.5, 9.0).map(lambda hours: hours * HOUR)),
+            st.one_of(st.none(), st.integers(30, 160)),
+            st.one_of(st.none(), st.integers(2, 9)),
+        )
+    )
+    at_most = draw(st.lists(st.builds(lambda m, k: AtMost(tuple(m), k), members, st.integers(1, 3)), max_size=2))
+    must = draw(st.frozensets(st.integers(0, SIZE - 1), max_size=2))
+    return replace(base, budget=budget, at_most=tuple(at_most), must=must)  # type: ignore[arg-type]
+
+
+def test_there_are_enough_selections() -> None:
+    assert len(every()) == 8191
+    assert np.isfinite(values("U6")).sum() > 2000
+
+
+@pytest.mark.parametrize("name", CRITERIA)
+@settings(
+    max_examples=12,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=True,
+    phases=[Phase.explicit, Phase.generate],
+)
+@given(limited=limits())
+def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limited: Constraints) -> None:
+    problem = replace(problem_of(name), constraints=limited)
+    allowed = np.array([limited.allows(chosen) for chosen in every()])
+    if not allowed.any():
+        return
+    best = values(name)[allowed].min()
+    losses = Losses(problem)
+    found = [improve(problem, start, losses, 3) for start in starts(problem, (), 8, 1) if limited.allows(start)]
+    if np.isfinite(best):
+        assert min(one.value for one in found) <= 1.01 * best
+        below = bound(problem)
+        if below is not None:
+            assert 0.0 < below.value <= best
+
+
+@pytest.mark.parametrize("name", ["U6", "U6-maximum", "E"])
+def test_the_bound_is_near_for_some_positions(name: CriterionName) -> None:
+    limited = replace(problem_of(name).constraints, budget=Budget(positions=4))
+    found = bound(replace(problem_of(name), constraints=limited))
+    best = values(name)[[limited.allows(chosen) for chosen in every()]].min()
+    assert found is not None
+    assert 0.9 * best < found.value <= best
+
+
+@pytest.mark.parametrize("name", CRITERIA[:-1])
+def test_the_bound_is_tight_where_everything_may_be_chosen(name: CriterionName) -> None:
+    problem = problem_of(name)
+    found = bound(problem)
+    assert found is not None
+    assert found.value == pytest.approx(values(name).min(), rel=0.03 if problem.criterion.is_sharp else 2e-3)
+    assert found.value <= values(name).min()
+
+
+@pytest.mark.parametrize("name", CRITERIA)
+def test_derivatives_are_those_of_finite_differences(name: CriterionName) -> None:
+    if name == "condition":
+        return
+    problem = problem_of(name)
+    information = problem.information.of(range(SIZE))
+    own = slice(None) if problem.criterion.about_balls else problem.information.shared
+    generator = np.random.default_rng(5)
+    covariance = np.linalg.inv(information)[own, own]
+    half = generator.normal(size=covariance.shape)
+    change = half @ half.T
+
+    def smooth(step: float) -> float:
+        return problem.criterion.tangent(np.linalg.cholesky(covariance + step * change), 8.0)[0]
+
+    now, mean, weight = problem.criterion.tangent(np.linalg.cholesky(covariance), 8.0)
+    assert mean <= problem.criterion.value(np.linalg.cholesky(covariance)) * (1 + 1e-12)
+    step = 1e-6 * np.trace(covariance) / np.trace(change)
+    numeric = (np.log(smooth(step)) - np.log(smooth(-step))) / (2 * step)
+    assert (weight * change).sum() / mean == pytest.approx(numeric, rel=1e-5)
+    assert now > 0
+
+
+def test_criteria_of_parameters_by_their_definitions() -> None:
+    problem = problem_of("A")
+    chosen = tuple(range(SIZE))
+    scaled = problem.criterion.scaled
+    own = problem.information.shared
+    covariance = scaled @ np.linalg.inv(problem.information.of(chosen))[own, own] @ scaled.T
+    sizes = np.sqrt(np.linalg.eigvalsh(covariance))
+    expected = {
+        "A": np.sqrt(np.trace(covariance) / len(covariance)),
+        "D": np.exp(np.linalg.slogdet(covariance)[1] / (2 * len(covariance))),
+        "E": sizes[-1],
+        "condition": sizes[-1] / sizes[0],
+    }
+    for name, number in expected.items():
+        assert value(problem_of(name), chosen) == pytest.approx(number, rel=1e-8)  # type: ignore[arg-type]
+
+
+def test_the_number_of_workers_changes_nothing() -> None:
+    request = Request("U6", Budget(seconds=4 * HOUR))
+    one, two = (campaign(small(), request, workers=workers) for workers in (1, 2))
+    assert [c.name for c in one.chosen] == [c.name for c in two.chosen]
+    assert (one.value, one.bound) == (two.value, two.bound)
+    assert one.plan.quantities["U6"].average == pytest.approx(one.value, rel=1e-9)
+
+
+def test_gains_are_what_a_selection_is_without_and_with() -> None:
+    found = campaign(small(), Request("U6", Budget(positions=5)))
+    assert found.bound <= found.value
+    for gain in found.gains:
+        assert gain.without >= gain.with_ == found.value
+    after = [gain.with_ for gain in found.left_out]
+    assert after == sorted(after) and all(gain.without == found.value >= gain.with_ for gain in found.left_out)
+
+
+def test_limits_that_nothing_keeps_to_are_told() -> None:
+    pool = small().pool
+    assert pool is not None
+    kept = replace(small(), pool=replace(pool, must=(0, 1, 2)))
+    with pytest.raises(ExperimentError, match="what has to be chosen takes .* more than 1 position; allow more"):
+        campaign(kept, Request("U6", Budget(positions=1)))
+    both = replace(small(), pool=replace(pool, must=(0, 1), at_most=(AtMost((0, 1), 1),)))
+    with pytest.raises(ExperimentError, match="no more than 1 of them"):
+        campaign(both, Request("U6", Budget(positions=3)))
+    with pytest.raises(ExperimentError, match="--hours"):
+        campaign(small(), Request("U6"))
+    with pytest.raises(ExperimentError, match="missing"):
+        campaign(replace(small(), pool=None), Request("U6"))
