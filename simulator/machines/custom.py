@@ -77,7 +77,7 @@ def _named(name: str, folder: Path | None) -> Callable[..., Any]:
 
 
 def _imported(name: str, folder: Path | None) -> Any:
-    beside = None if folder is None else _file_in(folder.resolve(), name)
+    beside = None if folder is None else module_file(folder.resolve(), name)
     if beside is not None:
         # For other processes too, which are given this process's path; last, so that nothing else is hidden.
         own = str(folder.resolve()) if folder is not None else ""
@@ -98,7 +98,8 @@ def _imported(name: str, folder: Path | None) -> Any:
     return module
 
 
-def _file_in(folder: Path, name: str) -> Path | None:
+def module_file(folder: Path, name: str) -> Path | None:
+    """The file of a module in a folder, None where it is not there."""
     path = folder.joinpath(*name.split("."))
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):
         if candidate.is_file():

@@ -272,12 +272,16 @@ class PythonSettings(Settings):
         default={}, description="Keyword arguments of the function; quantities arrive in SI units."
     )
 
-    # Where the experiment file is; its modules are looked for there.
+    folder: str | None = Field(
+        default=None, description="Folder of the module, as it is found from this file; default: that of this file."
+    )
+
+    # Where modules are looked for besides where Python finds them.
     _folder: Path | None = PrivateAttr(default=None)
 
     def beside(self, folder: Path) -> None:
-        """Look for modules in the folder too."""
-        self._folder = folder
+        """Look for modules in the folder of the experiment file too, or in that named from there."""
+        self._folder = folder if self.folder is None else folder / self.folder
 
 
 class MachineFileSettings(Settings):

@@ -1,0 +1,229 @@
+"""The chosen design as an experiment file of its own: what its source says, with other positions and no pool.
+
+Sections that stay as they are keep their text and comments. What is composed is read again and compared with what it
+should say, so that a file of unusual form is written anew as a whole, rather than wrongly.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from simulator.experiment.messages import ExperimentError, in_one_line
+from simulator.experiment.model import Experiment, Position
+from simulator.experiment.pool import Candidate
+from simulator.experiment.problems import Problems
+from simulator.experiment.sections import ExperimentSettings
+from simulator.experiment.variants import variant_trees
+from simulator.experiment.yamltree import (
+    LOADER,
+    parse_tree,
+    read_text,
+    resolve_scalar,
+    to_python,
+)
+from simulator.experiment.yamltree import (
+    Mapping as MappingNode,
+)
+from simulator.machines.custom import module_file
+
+LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
+SCHEMA_LINE = "# yaml-language-server:"
+
+
+def experiment_text(
+    experiment: Experiment,
+    chosen: Sequence[Candidate],
+    header: str,
+    folder: Path,
+    title: str | None = None,
+    expected_rank_deficiency: int | None = None,
+) -> str:
+    """The text of an experiment file, to stand in a folder, with the chosen candidates, positions in their order.
+
+    `experiment` is the source, loaded for planning; of one with variants the overrides are applied. `header` becomes
+    comments at the top. Names of files lead from `folder` to the same files. A stated rank deficiency is left out
+    unless one is given, and so are artefacts that no chosen position places, what is known of them, and priors about
+    other positions.
+
+    :raises ExperimentError: the source cannot be read any more.
+    """
+    source = experiment.source
+    text = read_text(source)
+    root = parse_tree(text, str(source))
+    assert isinstance(root, MappingNode)
+    tree = root if experiment.name is None else variant_trees(root, Problems(root))[experiment.name]
+    assert isinstance(tree, MappingNode)
+    content = _content(tree, experiment, chosen)
+    if title is not None:
+        content["title"] = title
+    if expected_rank_deficiency is not None:
+        content["expected_rank_deficiency"] = expected_rank_deficiency
+    if folder.resolve() != source.parent.resolve():
+        content = _moved(content, source.parent, folder)
+    chunks = _chunks(text, root)
+    is_same = {
+        key: tree.items.get(key) is root.items[key] and to_list(to_python(root.items[key])) == content.get(key)
+        for key in root.items
+    }
+    kept = {key: chunk for key, chunk in chunks.items() if is_same[key]}
+    first = text.split("\n", 1)[0]
+    head = [first] if first.startswith(SCHEMA_LINE) and folder.resolve() == source.parent.resolve() else []
+    head += [f"# {in_one_line(line)}".rstrip() for line in header.splitlines()]
+    for parts in (kept, {}):
+        written = "\n".join(
+            ["\n".join(head), "", *(parts[key] if key in parts else _section(key, content[key]) for key in content)]
+        )
+        try:
+            if to_list(to_python(parse_tree(written, "written"))) == content:
+                break
+        except ExperimentError:
+            # A text that is no YAML any more; without the parts kept it is.
+            if not parts:
+                raise
+    return written
+
+
+def to_list(value: Any) -> Any:
+    """The same with lists for tuples, as plain data has them."""
+    if isinstance(value, Mapping):
+        return {key: to_list(item) for key, item in value.items()}
+    return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
+
+
+def _content(tree: MappingNode, experiment: Experiment, chosen: Sequence[Candidate]) -> dict[str, Any]:
+    said: dict[str, Any] = to_list(to_python(tree))
+    positions = [one for one in chosen if isinstance(one.item, Position)]
+    placed = {one.item.artefact for one in positions}
+    names = {one.name for one in positions}
+    others = {one.name for one in experiment.pool.candidates} - names if experiment.pool is not None else set()
+    # Where there is one artefact, nothing says which.
+    only = next(iter(said["artefacts"]))
+    items = [one for one in said.get("calibration", []) if str(one.get("artefact", only)) in placed]
+    items += [to_list(one.settings) for one in chosen if not isinstance(one.item, Position)]
+    said["artefacts"] = {name: one for name, one in said["artefacts"].items() if name in placed}
+    said["positions"] = [to_list(one.settings) for one in positions]
+    said["calibration"] = items
+    if "priors" in said:
+        said["priors"] = [
+            one for one in said["priors"] if not any(str(one["parameter"]).startswith(f"{name}: ") for name in others)
+        ]
+    # What a choice adds goes where it belongs.
+    known = [key for key in ExperimentSettings.model_fields if key in said]
+    order = sorted(said, key=known.index) if {"positions", "calibration"} - set(tree.items) else list(said)
+    return {key: said[key] for key in order if key not in LEFT_OUT and (said[key] != [] or key == "positions")}
+
+
+def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, Any]:
+    """The same with names of files, and places of modules, that lead there from another folder."""
+
+    def there(name: Any) -> Any:
+        if not isinstance(name, str) or Path(name).is_absolute():
+            return name
+        return Path(os.path.relpath((source / name).resolve(), folder.resolve())).as_posix()
+
+    def model(settings: Any) -> Any:
+        settings = _with(settings, "file", there)
+        if settings.get("kind") != "python":
+            return settings
+        beside = source / settings.get("folder", ".")
+        if module_file(beside.resolve(), str(settings["object"]).partition(":")[0]) is None:
+            return settings
+        return {**settings, "folder": there(settings.get("folder", "."))}
+
+    found = dict(content)
+    found["error_model"] = model(found["error_model"])
+    truth = _with(found.get("true_machine"), "file", there)
+    truth = _with(truth, "files", lambda names: [there(name) for name in names])
+    truth = _with(truth, "error_model", model)
+    found |= {"true_machine": truth} if truth is not None else {}
+    found["artefacts"] = {name: _with(one, "file", there) for name, one in found["artefacts"].items()}
+    if "calibration" in found:
+        found["calibration"] = [_with(one, "values", there) for one in found["calibration"]]
+    if "evaluation" in found:
+        found["evaluation"] = _with(found["evaluation"], "points", lambda points: _with(points, "file", there))
+    return found
+
+
+def _with(settings: Any, key: str, change: Callable[[Any], Any]) -> Any:
+    if not isinstance(settings, dict) or key not in settings:
+        return settings
+    return {**settings, key: change(settings[key])}
+
+
+def _chunks(text: str, root: MappingNode) -> dict[str, str]:
+    """The text of each section with the comments above it, none where the file is not one of plain blocks."""
+    lines = text.lstrip("\ufeff").splitlines()
+    starts = {mark.line - 1: key for key, mark in root.key_marks.items() if mark.column == 1}
+    is_marked = any(line.startswith(("---", "...", "%")) for line in lines)
+    has_anchors = any(getattr(event, "anchor", None) for event in yaml.parse(text, Loader=LOADER))
+    if len(starts) < len(root.items) or is_marked or has_anchors:
+        return {}
+    first = min(starts)
+    chunks: dict[str, list[str]] = {}
+    key, above = "", list[str]()
+    for number, line in enumerate(lines[first:], first):
+        if number in starts:
+            key = starts[number]
+            chunks[key] = [*above, line]
+            above = []
+        elif not line.strip() or line.startswith("#"):
+            above.append(line)
+        else:
+            chunks[key] += [*above, line]
+            above = []
+    # Empty lines above a section stay; those of sections left out go with them.
+    return {key: "\n".join(chunk) for key, chunk in chunks.items()}
+
+
+class _Flow(dict[str, Any]):
+    """A mapping that is written in one line, or as few as there are."""
+
+
+class _FlowList(list[Any]):
+    """A list that is written in one line, or as few as there are."""
+
+
+class _Dumper(yaml.SafeDumper):
+    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
+        super().increase_indent(flow, False)
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    try:
+        is_text = resolve_scalar(text) is text
+    except ValueError:
+        is_text = False
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if is_text else '"')
+
+
+_Dumper.add_representer(str, _represent_text)
+_Dumper.add_representer(
+    _Flow, lambda dumper, data: dumper.represent_mapping("tag:yaml.org,2002:map", data.items(), flow_style=True)
+)
+_Dumper.add_representer(
+    _FlowList, lambda dumper, data: dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=True)
+)
+
+
+def _section(key: str, value: Any) -> str:
+    """A section written anew, each of its entries in one line where it fits."""
+    if isinstance(value, dict):
+        value = {name: _in_line(one) for name, one in value.items()}
+    elif isinstance(value, list):
+        value = [_in_line(one) for one in value]
+    text = yaml.dump(
+        {key: value}, Dumper=_Dumper, default_flow_style=False, sort_keys=False, allow_unicode=True, width=200
+    )
+    return f"\n{text}".rstrip("\n") if isinstance(value, dict | list) else text.rstrip("\n")
+
+
+def _in_line(value: Any) -> Any:
+    return _Flow(value) if isinstance(value, dict) else _FlowList(value) if isinstance(value, list) else value

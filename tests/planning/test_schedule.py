@@ -1,0 +1,150 @@
+"""The cheapest order against every order there is, and run sheets against adding up by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import permutations, product
+from time import process_time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.planning.changeover import MOST_EXACT, Kind, changeover, cheapest
+from analysis.planning.schedule import ordered, run_sheet
+from simulator.experiment.load import load
+from simulator.experiment.model import Position, ReadingGroup
+from simulator.experiment.pool import Candidate, ChangeTimes
+from simulator.geometry.positions import Pose
+
+CHANGES = ChangeTimes(probe=120.0, plane=1800.0)
+
+kinds = st.builds(
+    Kind,
+    st.sampled_from(["plate", "bar"]),
+    st.sampled_from("xyz"),
+    st.frozensets(st.sampled_from(["down", "left", "right"]), min_size=1),
+)
+change_times = st.builds(ChangeTimes, st.sampled_from([0.0, 120.0, 4000.0]), st.sampled_from([0.0, 100.0, 1800.0]))
+
+
+def position(kind: Kind, name: str, seconds: float = 600.0) -> Candidate:
+    balls = np.arange(1)
+    group = ReadingGroup(tuple(sorted(kind.probes)), ("1",), balls, 1)
+    item = Position(name, kind.artefact, Pose(np.eye(3), np.zeros(3)), (group,))
+    said = {"name": name, "plane": kind.plane, "level": "0 mm", "corner": {"x": "0 mm", "y": "0 mm"}}
+    return Candidate(name, item, seconds, kind.plane, "", False, said)
+
+
+def cost(sequence: Sequence[tuple[Candidate, Sequence[str]]], changes: ChangeTimes) -> float:
+    total = 0.0
+    for (one, probes), (other, next_probes) in zip(sequence, sequence[1:], strict=False):
+        if (one.item.artefact, one.plane) != (other.item.artefact, other.plane):
+            total += changes.plane
+        if probes[-1] != next_probes[0]:
+            total += changes.probe
+    return total
+
+
+def every_order(members: Sequence[Kind]) -> Iterator[list[tuple[Kind, tuple[str, ...]]]]:
+    """Every order of positions and of probes within them, positions of equal kind together."""
+    for order in permutations(dict.fromkeys(members)):
+        sequence = [kind for kind in order for _ in range(members.count(kind))]
+        for probes in product(*(permutations(sorted(kind.probes)) for kind in sequence)):
+            yield list(zip(sequence, probes, strict=True))
+
+
+def least_of_all(members: Sequence[Kind], changes: ChangeTimes, before: Sequence[Kind] = ()) -> float:
+    found = float("inf")
+    for start in product(*(permutations(sorted(kind.probes)) for kind in before)):
+        read = list(zip(before, start, strict=True))
+        for order in every_order(members):
+            sequence = [(position(kind, "p"), probes) for kind, probes in (*read, *order)]
+            found = min(found, cost(sequence, changes))
+    return found
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(kinds, min_size=1, max_size=4), change_times)
+def test_least_change_over_of_all_orders(members: list[Kind], changes: ChangeTimes) -> None:
+    least = least_of_all(members, changes)
+    assert changeover(members, changes) == least
+    sequence = ordered([position(kind, str(k)) for k, kind in enumerate(members)], changes)
+    assert cost(sequence, changes) == least
+    assert sorted(one.name for one, _ in sequence) == [str(k) for k in range(len(members))]
+    for one, probes in sequence:
+        assert sorted(probes) == sorted({name for group in one.item.readings for name in group.probes})
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(kinds, min_size=1, max_size=2), st.lists(kinds, min_size=1, max_size=2), change_times)
+def test_what_is_done_comes_first_as_it_was(before: list[Kind], members: list[Kind], changes: ChangeTimes) -> None:
+    done = [position(kind, f"done {k}") for k, kind in enumerate(before)]
+    sequence = ordered([position(kind, str(k)) for k, kind in enumerate(members)], changes, done)
+    assert [one.name for one, _ in sequence][: len(done)] == [one.name for one in done]
+    assert cost(sequence, changes) == least_of_all(members, changes, before)
+
+
+def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
+    some = [Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])]
+    assert len({changeover(order, CHANGES) for order in (some, some[::-1], frozenset(some), tuple(some))}) == 1
+    assert changeover([], CHANGES) == 0.0
+
+
+def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
+    # Six places with three kinds each that share probes: one change of place fewer than places is least.
+    many = [
+        Kind(artefact, plane, frozenset(probes))
+        for artefact in ("a", "b")
+        for plane in "xyz"
+        for probes in (["l"], ["r", "l"], ["d", "l", "r"])
+    ]
+    assert len(many) > MOST_EXACT
+    began = process_time()
+    assert changeover(many, CHANGES) == 5 * CHANGES.plane
+    assert process_time() - began < 10.0
+    total, visits = cheapest([(kind, 1) for kind in many], CHANGES)
+    assert total == 5 * CHANGES.plane and {visit.kind for visit in visits} == set(many)
+
+
+def test_six_kinds_take_a_moment() -> None:
+    six = [Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])]
+    changeover(six, CHANGES)
+    began = process_time()
+    for _ in range(1000):
+        changeover(six, CHANGES)
+    assert process_time() - began < 0.5
+
+
+def test_times_of_a_run_sheet_by_hand() -> None:
+    (experiment,) = load("designs/planning/plate-pool.yaml", planning=True)
+    assert experiment.pool is not None
+    drawn = [one for one in experiment.pool.candidates if one.drawn]
+    # 20 min and 49 readings of 15 s, of two probes twice as many and a change of 2 min.
+    assert [one.seconds for one in drawn] == [1200 + 735] * 2 + [1200 + 1470 + 120] * 4
+    sheet = run_sheet(drawn, experiment.pool.changes)
+    # Two changes of plane, each with another probe; within a plane the second position begins where the first ended.
+    assert sheet.seconds == 2 * 1935 + 4 * 2790 + 2 * (1800 + 120)
+    assert sheet.hours == sheet.seconds / 3600
+    assert sum(step.readings for step in sheet.steps) == 2 * 49 + 4 * 98
+    starts = [step.start for step in sheet.steps]
+    spent = [step.seconds + step.change_seconds for step in sheet.steps]
+    assert starts == pytest.approx([sum(spent[:k]) for k in range(6)])
+    assert sheet.seconds == sum(spent)
+    done = run_sheet(drawn, experiment.pool.changes, done=[drawn[4], drawn[0]])
+    assert [step.name for step in done.steps][:2] == ["y low", "z low"]
+    assert [step.done for step in done.steps] == [True] * 2 + [False] * 4
+    # Going on from z: to the other z position, then to x and y.
+    assert done.steps[2].name == "z high"
+    assert done.seconds == 1935 + 3 * 2790 + 2 * (1800 + 120)
+    assert {one.name for one in done.chosen} == {one.name for one in drawn}
+
+
+def test_items_of_calibration_are_paid_for() -> None:
+    (experiment,) = load("designs/planning/campaign.yaml", planning=True)
+    assert experiment.pool is not None
+    by_name = {one.name: one for one in experiment.pool.candidates}
+    sheet = run_sheet([by_name["flat low"], by_name["all distances"]], experiment.pool.changes)
+    assert sheet.seconds == 900 + 25 * 12 + 90 * 60
+    assert [one.name for one in sheet.calibration] == ["all distances"]

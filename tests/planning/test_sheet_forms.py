@@ -1,0 +1,124 @@
+"""Run sheets as text, CSV, Markdown and a page."""
+
+from __future__ import annotations
+
+import csv
+import io
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from analysis.planning.drawings import MARGIN, SIZE, place_drawing
+from analysis.planning.schedule import RunSheet, run_sheet
+from analysis.planning.sheet_forms import (
+    COLUMNS,
+    sheet_csv,
+    sheet_data,
+    sheet_lines,
+    sheet_markdown,
+    sheet_page,
+    summary,
+)
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+from simulator.geometry.positions import ball_coordinates
+
+
+@pytest.fixture(scope="module")
+def experiment() -> Experiment:
+    return load("designs/planning/campaign.yaml", planning=True)[0]
+
+
+@pytest.fixture(scope="module")
+def sheet(experiment: Experiment) -> RunSheet:
+    assert experiment.pool is not None
+    wanted = ("upright", "flat low", "bar along y", "flat z 300 mm at 300, 400 mm turn 1", "better sides")
+    by_name = {one.name: one for one in experiment.pool.candidates}
+    return run_sheet([by_name[name] for name in wanted], experiment.pool.changes, done=[by_name["flat low"]])
+
+
+def test_lines(sheet: RunSheet) -> None:
+    lines = sheet_lines(sheet)
+    assert lines[0].split() == ["start", "min", "position", "probes", "balls", "readings"]
+    assert lines[1].split() == ["1", "done", "flat", "low", "down", "all", "25", "25"]
+    assert "turned 90 deg counter-clockwise seen from +z" in "\n".join(lines)
+    assert "3 times each" in "\n".join(lines)
+    assert lines[-2] == "calibration better sides: 1 h"
+    assert lines[-1] == summary(sheet)
+    assert "1 position done before" in lines[-1]
+
+
+def test_csv_has_minutes_as_numbers(sheet: RunSheet) -> None:
+    rows = list(csv.DictReader(io.StringIO(sheet_csv(sheet))))
+    assert tuple(rows[0]) == COLUMNS
+    assert [row["name"] for row in rows] == [*(step.name for step in sheet.steps), "better sides"]
+    minutes = sum(float(row["minutes"]) + float(row["change_min"]) for row in rows)
+    assert minutes == pytest.approx(60 * sheet.hours, rel=1e-9)
+
+
+def test_markdown_escapes_what_would_break_a_table(sheet: RunSheet) -> None:
+    text = sheet_markdown(sheet, "a | b\nc")
+    assert text.startswith("# a \\| b\\\\x0ac\n")
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    assert len(rows) == 1 + len(sheet.steps) + 2
+    assert {line.replace("\\|", "").count("|") for line in rows[: 1 + len(sheet.steps)]} == {10}
+
+
+def test_data(sheet: RunSheet) -> None:
+    data = sheet_data(sheet)
+    assert data["seconds"] == sheet.seconds
+    assert data["calibration"] == [{"name": "better sides", "seconds": 3600.0}]
+    assert [step["done"] for step in data["steps"]] == [True, False, False, False]
+
+
+class Tags(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, dict(attrs)))
+
+
+def test_page_stands_alone_and_has_a_box_for_each_position(sheet: RunSheet, experiment: Experiment) -> None:
+    page = sheet_page(sheet, experiment, "<b>day</b>")
+    assert "<b>day" not in page and "&lt;b&gt;day" in page
+    tags = Tags()
+    tags.feed(page)
+    names = [tag for tag, _ in tags.seen]
+    assert names.count("section") == names.count("svg") == 4
+    assert "script" not in names and "link" not in names and "img" not in names
+    boxes = [found for tag, found in tags.seen if tag == "input"]
+    # One for each position, and one for each probe where there are two.
+    assert len(boxes) == 4 + 2
+    assert "@media print" in page
+
+
+@pytest.mark.parametrize("name", ["flat low", "upright", "standing x 500 mm at 50, 100 mm turn 2", "bar along x"])
+def test_drawing_is_to_scale_and_right_handed(name: str, experiment: Experiment) -> None:
+    assert experiment.pool is not None
+    candidate = next(one for one in experiment.pool.candidates if one.name == name)
+    root = ElementTree.fromstring(place_drawing(candidate, experiment))
+    circles = np.array([[float(one.attrib[key]) for key in ("cx", "cy")] for one in root.iter("circle")])
+    balls = ball_coordinates(candidate.item.pose, experiment.layouts[candidate.item.artefact])
+    across, up = {"flat low": (0, 1), "upright": (0, 2), "bar along x": (0, 2)}.get(name, (1, 2))
+    # Seen from +y with z upwards, x runs to the left.
+    sign = -1 if across == 0 and up == 2 else 1
+    scale = (SIZE - 2 * MARGIN) / np.ptp(
+        [experiment.machine.volume.lower[[across, up]], experiment.machine.volume.upper[[across, up]]], axis=0
+    ).max()
+    moved = (circles - circles[0]) / scale
+    assert moved[:, 0] == pytest.approx(sign * (balls[:, across] - balls[0, across]), abs=1e-3)
+    assert moved[:, 1] == pytest.approx(-(balls[:, up] - balls[0, up]), abs=1e-3)
+
+
+def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:
+    text = Path("designs/planning/campaign.yaml").read_text("utf-8").replace("flat low", "'<script>alert(1)</script>'")
+    (tmp_path / "e.yaml").write_text(text, "utf-8")
+    (found,) = load(tmp_path / "e.yaml", planning=True)
+    assert found.pool is not None
+    page = sheet_page(run_sheet(found.pool.candidates[:1], found.pool.changes), found, found.title)
+    assert "<script" not in page and "&lt;script&gt;" in page
