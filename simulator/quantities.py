@@ -393,7 +393,7 @@ def _article(kind: str) -> str:
 
 
 # What a number without a unit may have been meant in; to name one alone would lead to errors of a thousand times.
-ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m", "thermal expansion": "m/m/K", "duration": "h"}
+ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m", "thermal expansion": "m/m/K", "duration": "s"}
 
 
 def _with_unit(number: str, kind: str) -> str:

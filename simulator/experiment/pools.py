@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
+from collections.abc import Mapping as AnyMapping
+from collections.abc import Sequence as AnySequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -19,11 +21,19 @@ from .model import Calibration, Floats, Machine, Position, RadiusCalibration
 from .placements import resolve_position
 from .pool import AtMost, Candidate, ChangeTimes, Pool
 from .pool_groups import Bounds, extent, generate, is_within, outline
-from .pool_sections import LimitsSettings, ListedSettings, OwnTimesSettings, SelectorSettings, TimesSettings, is_group
+from .pool_sections import (
+    LimitsSettings,
+    ListedSettings,
+    OwnTimesSettings,
+    PoolSettings,
+    SelectorSettings,
+    TimesSettings,
+    is_group,
+)
 from .problems import written, written_count, written_text
 from .references import References, Tally, frozen
 from .structure import Sections
-from .yamltree import to_python
+from .yamltree import Mapping, Sequence, to_python
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
 
@@ -67,23 +77,29 @@ class Candidates:
 
 
 def resolve_candidates(
-    sections: Sections, positions: Mapping[int, Position], machine: Machine | None, references: References
+    sections: Sections, positions: AnyMapping[int, Position], machine: Machine | None, references: References
 ) -> Candidates:
     """Return the positions to choose from, none without a pool; what is wrong goes to the problems."""
     problems = references.problems
     root, result = problems.root, Candidates()
+    node = written(root, "pool")
     if ("pool", "times") not in sections.values:
+        result.complete = node is None
         return result
     # The candidates have a limit of their own.
     references = replace(references, tally=Tally())
-    _check_names(references)
+    # Candidates may be what a key that is misspelt or no list was meant to be.
+    is_known = isinstance(node, Mapping) and set(node.items) <= set(PoolSettings.model_fields)
+    is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)
+    names_differ = _check_names(references)
     times: TimesSettings = sections.get("pool", "times")
     limits: LimitsSettings = sections.get("pool", "limits")
     reach = _reach(limits, references)
     bounds = None
     if machine is not None and machine.dimension == references.dimension:
         bounds = Bounds(machine.volume, reach, limits.edge)
-    result.complete = len(positions) == written_count(root, "positions")
+    all_drawn = len(positions) == written_count(root, "positions")
+    result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
         settings = sections.get("positions", i)
         stated = to_python(written(root, "positions", i))  # type: ignore[arg-type]
@@ -131,15 +147,16 @@ def resolve_candidates(
     if result.complete and not result.found:
         why = [f"{number} {reason}" for reason, number in result.dropped.items()]
         text = f"no candidate is left: {listing(why)}" if why else "there is no candidate; add some, or positions"
-        problems.add(("pool", "candidates"), f"{text}; widen it" if why else text, of_key=True)
+        problems.add(("pool", "candidates"), f"{text}; widen the pool" if why else text, of_key=True)
+        result.complete = False
     return result
 
 
 def resolve_pool(
     sections: Sections,
     candidates: Candidates,
-    positions: Mapping[int, Position],
-    calibrations: Mapping[int, Calibration],
+    positions: AnyMapping[int, Position],
+    calibrations: AnyMapping[int, Calibration],
     references: References,
 ) -> Pool | None:
     """Return the pool, or None without one; what is wrong goes to the problems."""
@@ -184,7 +201,7 @@ def _candidate(
     plane: str | None,
     group: str,
     drawn: bool,
-    stated: Mapping[str, Any],
+    stated: AnyMapping[str, Any],
     times: TimesSettings,
     own: OwnTimesSettings | None,
     references: References,
@@ -223,9 +240,9 @@ def _identity(position: Position) -> Any:
     )
 
 
-def _check_names(references: References) -> None:
-    """Report entries of the pool with the name of another, or of a position."""
-    problems = references.problems
+def _check_names(references: References) -> bool:
+    """Tell whether no entry of the pool has the name of another, or of a position, after reporting those that have."""
+    problems, before = references.problems, len(references.problems.messages)
     first: dict[str, str] = {}
     for section in (("positions",), ("pool", "candidates"), ("pool", "calibration")):
         for i in range(written_count(problems.root, *section)):
@@ -236,6 +253,7 @@ def _check_names(references: References) -> None:
             if name in first and section != ("positions",):
                 problems.add((*steps, "name"), f'"{name}" is the name of {first[name]} already; names must differ')
             first.setdefault(name, format_path(steps))
+    return len(problems.messages) == before
 
 
 def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
@@ -293,7 +311,7 @@ def _beyond(points: Floats, ends: Floats) -> str:
 
 
 def _limits(
-    limits: LimitsSettings, found: Sequence[Candidate], complete: bool, references: References
+    limits: LimitsSettings, found: AnySequence[Candidate], complete: bool, references: References
 ) -> tuple[tuple[int, ...], list[AtMost]]:
     """Indices of what has to be chosen, and limits on numbers."""
     problems, place = references.problems, ("pool", "limits")
@@ -329,7 +347,7 @@ def _limits(
 
 
 def _selected(
-    of: SelectorSettings, found: Sequence[Candidate], complete: bool, steps: Steps, references: References
+    of: SelectorSettings, found: AnySequence[Candidate], complete: bool, steps: Steps, references: References
 ) -> list[int]:
     """Indices of the candidates to which everything applies that a selector states."""
     root = references.problems.root
