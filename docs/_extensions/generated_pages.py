@@ -26,6 +26,7 @@ from simulator.quantities import (
     UNITS,
     Angle,
     Bending,
+    Duration,
     Expansion,
     Length,
     LengthFunction,
@@ -49,6 +50,7 @@ QUANTITIES = {
         (TemperatureDifference, "temperature difference"),
         (Expansion, "thermal expansion"),
         (Bending, "angle per length"),
+        (Duration, "duration"),
         (LengthFunction, "length, or one that grows as `A + L/K`"),
     )
 }

@@ -14,7 +14,8 @@ SEED = 1
 FILES = Path(__file__).parent / "files"
 QUICKSTART = Path("designs/quickstart.yaml")
 SMALL = [*Path("designs/hocken_borchardt").glob("*.yaml"), *Path("designs/hurt_foss").glob("*.yaml")]
-QUICK = [QUICKSTART, *sorted(SMALL), *sorted(FILES.glob("*.yaml"))]
+POOLED = Path("designs/planning/campaign.yaml")
+QUICK = [QUICKSTART, *sorted(SMALL), POOLED, *sorted(FILES.glob("*.yaml"))]
 # Those that are planned in no time are tried more often.
 EXPERIMENTS = [*sorted(Path("designs/npl").glob("*.yaml")), *5 * QUICK]
 
@@ -47,7 +48,7 @@ WILD: dict[str, list[Any]] = {
     "repeats": [10_000, 10_001, 10**12, 0],
     "random": [10**9, 40_000, 1_000_001, 0],
     "seed": [10**290, 2**64, -1, 1.5],
-    "quarter_turns": [10**18, -(10**18), 10**290, 3],
+    "quarter_turns": [10**18, -(10**18), 10**290, 3, [10**18] * 1000, []],
     "position_coefficients": [10**6, 30, 31, 2],
     "rotation_coefficients": [10**6, 30, 31, 1],
     "coefficients": [10**6, 12, 13, 2],
@@ -56,7 +57,7 @@ WILD: dict[str, list[Any]] = {
         *([k / 30_001 for k in range(1, 30_001)], [k / 50 for k in range(1, 50)], [0.5] * 11, [0.5] * 3),
         *([1e-300], [1e-9, 2e-9], [5e-324, 0.5], [0.5, 0.5 + 1e-16], [1 - 1e-16]),
     ],
-    "centres": [[8, 8, 8], [9, 9, 9], [2, 2, 8], [10**9] * 3],
+    "centres": [[8, 8, 8], [9, 9, 9], [2, 2, 8], [10**9] * 3, {"x": "1e300 m"}, {axis: "500 mm" for axis in "xyz"}],
     "constant": [1e-300, 1e-9, 10, 1e-3],
     "terms": [{"centres": [8, 8, 8]}, "tensor", "quadratic", {"centres": [4, 4, 4], "constant": 1e-3}],
     "pairs": ["all", "braced", "neighbours", [["r1c1", "r1c1"]], [[f"r1c{k}", f"r2c{k}"] for k in range(20_000)]],
@@ -88,6 +89,22 @@ WILD: dict[str, list[Any]] = {
     ],
     "parameter": ["EXX", "EAX", "x" * 5000, "EXX[1]", "EXX t^2", "low: rotation x"],
     "value": ["1e300 m", "1 um", "1e5 rad", "1e6 m"],
+    "set_up": ["0 s", "-1 s", "1e300 h", "1e-300 s", "5"],
+    "price": ["0 s", "1000000 s", "1e9 h", "1 mm"],
+    "planes": [["x"] * 1000, ["z", "z"], [], ["w"]],
+    "levels": [
+        *SIZES,
+        *({"from": "0 mm", "to": "1 m", "count": count} for count in (2, 1000, 1001, 10**18, 1)),
+        *({"x": "1 mm"}, {"from": "1e6 m", "to": "-1e6 m", "count": 3}, {"x": "1 mm", "count": 3}),
+    ],
+    "corners": [{axis: {"from": "0 mm", "to": "1 m", "count": 1000} for axis in "xyz"}, {}, {"x": ["1e6 m"] * 1000}],
+    "probes": [[["down"]] * 1000, {"x": ["down"]}, [["down"], "down"], {"x": [], "y": [[]]}],
+    "keep": ["all", ["x" * 5000], [], ["flat low"] * 1000],
+    "never_together": [[[]], [["flat low", "flat low"]], [["flat low"] * 5000]],
+    "at_most": [[{"of": {"name": "*" * 60 + "z"}, "count": 1}], [{"of": {"name": "["}, "count": 0}], [{}]],
+    "reach": [{"down": {"x": ["1e6 m", "-1e6 m"]}}, {"down": {}}, {"up": {"x": ["0 m", "1 m"]}}],
+    "edge": SIZES,
+    "pool": [{}, {"candidates": []}, {"limits": {"keep": "all"}}, {"candidates": [{}] * 1000}],
 }
 WORDS = vocabulary(schema(), WILD)
 
