@@ -11,7 +11,7 @@ sets of each size are followed.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -88,52 +88,66 @@ def _counted(kinds: Iterable[Kind]) -> frozenset[tuple[Kind, int]]:
 _Last = tuple[int, int]
 _Came = tuple[int, _Last, int, int]
 _States = dict[_Last, tuple[float, _Came]]
+_NOWHERE: _Came = (0, (-1, -1), -1, -1)
+# Weight of what is only to decide between orders that cost the same.
+TIE = 1e-9
 
 
 def cheapest(
-    kinds: Iterable[tuple[Kind, int]], changes: ChangeTimes, after: Sequence[Kind] = ()
+    kinds: Iterable[tuple[Kind, int]], changes: ChangeTimes, after: Kind | None = None
 ) -> tuple[float, tuple[Visit, ...]]:
     """The cheapest order of kinds with their numbers of positions, and what it costs, in seconds.
 
-    Positions of the kinds `after` have been read before, in that order; their visits come first.
+    Of orders that cost the same, one is preferred that goes on easily from positions read before, of the kind `after`.
     """
     # The order of a set differs from run to run.
     todo = sorted(kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes), one[1]))
-    every = [(kind, 1) for kind in after] + todo
-    probe_names = sorted({probe for kind, _ in every for probe in kind.probes})
-    places = list(dict.fromkeys((kind.artefact, kind.plane) for kind, _ in every))
+    every = [kind for kind, _ in todo] + ([] if after is None else [after])
+    probe_names = sorted({probe for kind in every for probe in kind.probes})
+    places = list(dict.fromkeys((kind.artefact, kind.plane) for kind in every))
     stops = [
         _Stop(
             places.index((kind.artefact, kind.plane)),
             tuple(probe_names.index(probe) for probe in sorted(kind.probes)),
             count,
         )
-        for kind, count in every
+        for kind, count in todo
     ]
-    before = len(after)
-    # One layer for each number of kinds visited; of those read before, the order is given.
-    layers: list[dict[int, _States]] = [{0: {}}]
-    for number in range(len(stops)):
+    start: _States = {}
+    if after is not None:
+        here = places.index((after.artefact, after.plane))
+        start = {(probe_names.index(probe), here): (0.0, _NOWHERE) for probe in after.probes}
+    # One layer for each number of kinds visited.
+    layers: list[dict[int, _States]] = [{0: start}]
+    paid = ChangeTimes(TIE * changes.probe, TIE * changes.plane)
+    for _ in stops:
         found: dict[int, _States] = {}
         for visited, states in layers[-1].items():
-            known = _Known(states) if number else None
-            for i in (number,) if number < before else range(before, len(stops)):
+            known = _Known(states) if states else None
+            for i, stop in enumerate(stops):
                 if not visited >> i & 1:
-                    _go_on(found.setdefault(visited | 1 << i, {}), stops[i], i, visited, known, changes)
+                    _go_on(found.setdefault(visited | 1 << i, {}), stop, i, visited, known, paid)
         if len(todo) > MOST_EXACT and len(found) > MOST_SETS:
             costs = sorted((min(states.values())[0], visited) for visited, states in found.items())
             found = {visited: found[visited] for _, visited in costs[:MOST_SETS]}
         layers.append(found)
+        paid = changes
     if not stops:
         return 0.0, ()
     ((visited, states),) = layers[-1].items()
-    last, (cost, _) = min(states.items(), key=lambda item: item[1])
+    last = min(states, key=lambda one: states[one])
     visits: list[Visit] = []
     for layer in reversed(layers[1:]):
         _, (visited, before_that, first, i) = layer[visited][last]
-        visits.append(Visit(every[i][0], probe_names[first], probe_names[last[0]]))
+        visits.append(Visit(todo[i][0], probe_names[first], probe_names[last[0]]))
         last = before_that
-    return cost, tuple(reversed(visits))
+    visits.reverse()
+    return sum(_between(one, other, changes) for one, other in zip(visits, visits[1:], strict=False)), tuple(visits)
+
+
+def _between(one: Visit, other: Visit, changes: ChangeTimes) -> float:
+    is_moved = (one.kind.artefact, one.kind.plane) != (other.kind.artefact, other.kind.plane)
+    return changes.plane * is_moved + changes.probe * (one.last != other.first)
 
 
 @dataclass(frozen=True)

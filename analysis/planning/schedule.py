@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,7 +78,8 @@ class RunSheet:
 def run_sheet(chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[Candidate] = ()) -> RunSheet:
     """The run sheet of chosen candidates: the order that costs least, what is done already first and as it was.
 
-    Candidates that are `done` may be among the chosen ones too.
+    Candidates that are `done` may be among the chosen ones too. They take no time any more, and as before any first
+    position nothing is changed before the first that is left.
     """
     before = [candidate for candidate in done if isinstance(candidate.item, Position)]
     names = {candidate.name for candidate in before}
@@ -89,7 +90,7 @@ def run_sheet(chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[
     for k, (candidate, probes) in enumerate(sequence):
         is_done = k < len(before)
         change, words = 0.0, ""
-        if k and not is_done:
+        if k > len(before):
             change, words = _change(sequence[k - 1], sequence[k], changes)
         seconds = 0.0 if is_done else candidate.seconds
         place, balls = _place(candidate), _balls(candidate)
@@ -144,10 +145,11 @@ def _balls(candidate: Candidate) -> str:
     """Which balls are read, in words; with several groups of readings, by which probes."""
     assert isinstance(candidate.item, Position)
     groups = candidate.item.readings
-    stated: Iterable[Any] = candidate.settings.get("readings") or [candidate.settings]
+    stated: Sequence[Any] = candidate.settings.get("readings") or [candidate.settings]
     words = []
-    for group, said in zip(groups, stated, strict=True):
-        is_all = said.get("balls") in (None, "all")
+    for k, group in enumerate(groups):
+        # Of what is done, other readings may have been taken than the file says.
+        is_all = len(stated) == len(groups) and stated[k].get("balls") in (None, "all")
         text = f"all {len(group.balls)}" if is_all else listing(group.balls, 50)
         text += f", {group.repeats} times each" if group.repeats > 1 else ""
         words.append(f"{text} with {', '.join(group.probes)}" if len(groups) > 1 else text)
@@ -162,12 +164,9 @@ def ordered(
     Positions of equal kind keep the order they are given in.
     """
     own = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
-    before = [kind_of(candidate) for candidate in done]
-    _, visits = cheapest(Counter(map(kind_of, own)).items(), changes, before)
-    found = []
-    for candidate, visit in zip(done, visits, strict=False):
-        found.append((candidate, _sequence(candidate, visit.first, visit.last)))
-    for visit in visits[len(before) :]:
+    _, visits = cheapest(Counter(map(kind_of, own)).items(), changes, kind_of(done[-1]) if done else None)
+    found = [(one, probes_of(one.item)) for one in done if isinstance(one.item, Position)]
+    for visit in visits:
         members = [candidate for candidate in own if kind_of(candidate) == visit.kind]
         first = visit.first
         for k, candidate in enumerate(members):
