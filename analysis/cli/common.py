@@ -39,6 +39,24 @@ def count(text: str) -> int:
     return int(text)
 
 
+def whole(text: str) -> int:
+    """Read an index from the command line."""
+    if not text.isascii() or not text.isdigit():
+        raise ArgumentTypeError(f'expected a whole number, 0 or above, not "{text}"')
+    return int(text)
+
+
+def percentage(text: str) -> float:
+    """Read a percentage above zero from the command line, as a ratio."""
+    try:
+        value = float(text.removesuffix("%").strip())
+    except ValueError:
+        value = float("nan")
+    if not text.endswith("%") or not 0.0 < value <= 100.0:
+        raise ArgumentTypeError(f'expected a percentage such as 1%, not "{text}"')
+    return value / 100.0
+
+
 def seed(text: str) -> int:
     """Read a seed from the command line."""
     if not text.isascii() or not text.isdigit():

@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, count, seed
+from .common import add_file, add_json, count, percentage, seed
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -28,7 +28,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     group = parser.add_argument_group("Monte Carlo")
     group.add_argument("--trials", metavar="N", type=_trial_count, help="number of data sets, at most")
     group.add_argument(
-        "--until", metavar="1%", type=_share, help="stop when the ratios of spread to U are as accurate as this"
+        "--until", metavar="1%", type=percentage, help="stop when the ratios of spread to U are as accurate as this"
     )
     group.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
     group.add_argument(
@@ -42,17 +42,6 @@ def _trial_count(text: str) -> int:
     if count(text) < 2:
         raise ArgumentTypeError(f'one data set has no scatter; ask for 2 at least, not "{text}"')
     return count(text)
-
-
-def _share(text: str) -> float:
-    digits = text.removesuffix("%").strip()
-    try:
-        value = float(digits)
-    except ValueError:
-        value = float("nan")
-    if not text.endswith("%") or not 0.0 < value <= 100.0:
-        raise ArgumentTypeError(f'expected a percentage such as 1%, not "{text}"')
-    return value / 100.0
 
 
 def run(options: Namespace) -> int:

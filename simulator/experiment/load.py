@@ -70,6 +70,12 @@ def message_at(source: Path, steps: Steps, text: str) -> Message:
     return mark_of(read_tree(source, []), steps).message(format_path(steps), text)
 
 
+def tree_of(source: Path, variant: str | None) -> Node:
+    """The tree of a file that is right, or of a variant of it, as ``build`` takes it."""
+    root = read_tree(source, [])
+    return _without_variants(root) if variant is None else variant_trees(root, Problems(root))[variant]
+
+
 def place_in(source: Path, variant: str | None, steps: Steps) -> Mark:
     """Where a path stands in a file that is right, or in a variant of it.
 

@@ -1,0 +1,71 @@
+"""`ballplate reach`: what one unknown of a design must be for a goal to be met."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+
+from .common import add_file, add_json, percentage, print_json, print_lines, single, whole
+
+WRONG_USAGE = 2
+UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser: ArgumentParser = commands.add_parser(
+        "reach",
+        help="tell which repeatability, certificate, repeats, balls or size meets a target",
+        description="Solve for one unknown of a design at a time, the others as drawn: the largest repeatability or "
+        "certificate uncertainty, and the fewest repeats, fewest balls or smallest plate that meet a goal. What is "
+        "told is a value of three digits, or a whole number, with which the file was planned; the next one does not do. "
+        "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1.",
+    )
+    add_file(parser)
+    parser.add_argument("--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated")
+    parser.add_argument(
+        "--goal",
+        default="lengths",
+        help="lengths (default: distances between corrected points, U6, within target_accuracy), tasks, or a quantity "
+        'such as "U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average 0.1 um"',
+    )
+    parser.add_argument(
+        "--share", metavar="95%", type=percentage, help="of the lengths that are to be within; default all"
+    )
+    parser.add_argument("--target", metavar="LENGTH", help='instead of target_accuracy, such as "0.5 um + L/1000000"')
+    parser.add_argument(
+        "--artefact", metavar="NAME", help="the one that varies: its balls, size, calibrations and repeats"
+    )
+    parser.add_argument(
+        "--calibration",
+        metavar="N",
+        type=whole,
+        help="entry of the list that varies, the first is 0; default: all by the same factor",
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: Namespace) -> int:
+    """Solve for what was asked; 1 if no value does."""
+    from simulator.quantities import QuantityError, parse_length_function
+
+    from ..reach.goals import GoalError, parse_goal
+    from ..reach.search import reach
+    from ..reach.tables import reach_data, reach_lines
+    from ..reach.unknowns import NotVariableError
+
+    try:
+        goal = parse_goal(options.goal, options.share)
+        if options.target is not None:
+            parse_length_function(options.target)
+        names = tuple(dict.fromkeys(options.by or UNKNOWNS))
+        found = reach(single(options), goal, names, options.artefact, options.calibration, options.target)
+    except (GoalError, NotVariableError, QuantityError) as error:
+        print(f"ballplate reach: {error}", file=sys.stderr)
+        return WRONG_USAGE
+    if options.json:
+        print_json([reach_data(found)])
+    else:
+        print_lines(reach_lines(found))
+    met = [one.is_met for one in found.answers]
+    return 0 if (all if options.by else any)(met) else 1

@@ -1,0 +1,1 @@
+"""Reverse planning: which value of one unknown meets a goal."""

@@ -1,0 +1,279 @@
+"""Searches for the value of an unknown that just meets a goal; every value is judged by a full plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from simulator.experiment.load import build, tree_of
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment
+from simulator.experiment.variants import override
+from simulator.experiment.yamltree import Node, Scalar
+from simulator.settings import listing
+from simulator.threads import single_threaded
+
+from ..study import Plan, plan
+from .goals import Goal, Judgement, check_goal, judge
+from .steps import PER_DECADE
+from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
+
+# Numbers of balls up to which every one is tried, and the step beyond; values of a size that are tried first.
+EVERY, RATIO, SIZES = 12, 1.25, 16
+# Change of the goal's figure from ten times the extreme to it, up to which it is as good as exact.
+CONVERGED = 1e-3
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What came of a value: how the goal is met and the rank deficiency, or why the file is wrong with it."""
+
+    words: str
+    judgement: Judgement | None
+    deficiency: int
+    refusal: str
+
+    @property
+    def is_met(self) -> bool:
+        return self.judgement is not None and self.judgement.is_met
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an unknown must be for the goal to be met, the others as they are.
+
+    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that was looked at
+    does; `none` does; nothing of this kind repairs what is `undetermined`; or the unknown cannot be `varied`. `words`
+    and `value`, in metres or a number, are the value needed, or without one that comes nearest, or the last looked at;
+    `outcome` is what the plan with it gives. `remarks` tell of the range.
+    """
+
+    name: UnknownName
+    title: str
+    status: Literal["found", "any", "none", "undetermined", "varied"]
+    present: str = ""
+    grows: bool = False
+    words: str = ""
+    value: float | None = None
+    outcome: str = ""
+    beside: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def is_met(self) -> bool:
+        return self.status in ("found", "any")
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A goal, what the design as it is makes of it, and what each unknown must be."""
+
+    label: str
+    title: str
+    goal: Goal
+    present: Judgement
+    deficiency: int
+    answers: tuple[Answer, ...]
+
+
+@single_threaded
+def reach(
+    experiment: Experiment,
+    goal: Goal,
+    names: tuple[UnknownName, ...] = NAMES,
+    artefact: str | None = None,
+    calibration: int | None = None,
+    target: str | None = None,
+) -> Reach:
+    """Solve for each of some unknowns, the others staying as they are.
+
+    `artefact` and `calibration`, an index, choose what varies where there are several; `target` replaces the target
+    accuracy of the file.
+
+    :raises GoalError: the experiment does not have what the goal is about.
+    :raises NotVariableError: a single unknown is asked for that the experiment does not have.
+    :raises ExperimentError: the target is wrong.
+    """
+    root = tree_of(experiment.source, experiment.name)
+    if target is not None:
+        root = override(root, "target_accuracy", Scalar(root.mark, target), root.mark)
+    searched = _Searched(root, experiment.source, experiment.name, goal)
+    present = searched.planned(root)
+    check_goal(goal, present)
+    judged = judge(goal, present)
+    answers = []
+    for name in names:
+        try:
+            one = unknown(name, experiment, root, artefact, calibration)
+        except NotVariableError as error:
+            if len(names) == 1:
+                raise
+            answers.append(Answer(name, name, "varied", remarks=(str(error),)))
+            continue
+        answers.append(_answer(one, searched, judged, present.verdict.deficiency))
+    return Reach(experiment.label, experiment.title, goal, judged, present.verdict.deficiency, tuple(answers))
+
+
+@dataclass(frozen=True)
+class _Searched:
+    """The file of which values are tried."""
+
+    root: Node
+    source: Path
+    name: str | None
+    goal: Goal
+
+    def planned(self, tree: Node) -> Plan:
+        """The plan of a tree.
+
+        :raises ExperimentError: the file is wrong so.
+        """
+        experiment, messages = build(tree, self.source, self.name)
+        if experiment is None:
+            raise ExperimentError(sorted(messages))
+        return plan(experiment)
+
+
+class _Trials:
+    """Values of an unknown that were tried, each once."""
+
+    def __init__(self, one: Unknown, searched: _Searched) -> None:
+        self.one, self.searched = one, searched
+        self.known: dict[int, Tried] = {}
+
+    def at(self, step: int) -> Tried:
+        if step not in self.known:
+            self.known[step] = self._tried(step)
+        return self.known[step]
+
+    def _tried(self, step: int) -> Tried:
+        words = self.one.words(step)
+        try:
+            found = self.searched.planned(self.one.tree(step))
+        except ExperimentError as error:
+            first = error.messages[0]
+            return Tried(words, None, 0, f"{first.path}: {first.text}")
+        return Tried(words, judge(self.searched.goal, found), found.verdict.deficiency, "")
+
+    def distance(self, step: int) -> float:
+        """How far from the goal a value is with which the file is right."""
+        found = self.at(step).judgement
+        assert found is not None
+        return found.distance
+
+    def is_right(self, step: int) -> bool:
+        """Whether the file is right with a value, which is quicker to find out than what comes of it."""
+        if step not in self.known:
+            experiment, _ = build(self.one.tree(step), self.searched.source, self.searched.name)
+            return experiment is not None
+        return not self.known[step].refusal
+
+
+def _answer(one: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
+    if one.is_monotone and present.undetermined:
+        reason = f"rank deficiency {deficiency} leaves {present.undetermined} undetermined whatever it is"
+        return Answer(one.name, one.title, "undetermined", one.present, one.grows, remarks=(reason,))
+    trials = _Trials(one, searched)
+    return _monotone(trials, deficiency) if one.is_monotone else _scanned(trials)
+
+
+def _told(trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]) -> Answer:
+    one, tried = trials.one, trials.at(step)
+    assert tried.judgement is not None
+    outcome = tried.judgement.words
+    return Answer(
+        one.name, one.title, status, one.present, one.grows, tried.words, one.value(step), outcome, "", tuple(remarks)
+    )
+
+
+def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:
+    """The border between a value that does and one that does not, anywhere between these two."""
+    while abs(met - failed) > 1:
+        middle = (met + failed) // 2
+        met, failed = (middle, failed) if trials.at(middle).is_met else (met, middle)
+    beside = trials.at(failed)
+    words = f"{beside.words} does not do: " + (beside.judgement.words if beside.judgement else beside.refusal)
+    return replace(_told(trials, "found", met, remarks), beside=words)
+
+
+def _monotone(trials: _Trials, deficiency: int) -> Answer:
+    """The largest uncertainty, or the smallest number, that does."""
+    one = trials.one
+    best, worst = (one.last, one.first) if one.grows else (one.first, one.last)
+    if trials.at(worst).is_met:
+        return _told(trials, "any", worst, [])
+    remarks = []
+    if one.grows and not trials.is_right(best):
+        best = _border(trials, one.first, best)
+        remarks.append(f"more than {one.words(best)} are not possible: {trials.at(best + 1).refusal}")
+    # Where an extreme drowns everything else in rounding, it tells nothing.
+    while not one.grows and trials.at(best).deficiency > deficiency and best + PER_DECADE < one.last:
+        best += PER_DECADE
+    if not trials.at(best).is_met:
+        remarks += [] if one.grows else _convergence(trials, best)
+        return _told(trials, "none", best, remarks)
+    return _found(trials, best, worst, [])
+
+
+def _border(trials: _Trials, right: int, wrong: int) -> int:
+    """The last value with which the file is right; it is with `right`, and is not with `wrong`."""
+    while wrong - right > 1:
+        middle = (right + wrong) // 2
+        right, wrong = (middle, wrong) if trials.is_right(middle) else (right, middle)
+    return right
+
+
+def _convergence(trials: _Trials, extreme: int) -> list[str]:
+    """Whether an extreme is as good as exact."""
+    found, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
+    if found is None or before is None:
+        return []
+    if abs(before.distance - found.distance) <= CONVERGED * found.distance:
+        return ["an exact one would not be better: with ten times that it is the same"]
+    return ["a smaller one would still change the figure"]
+
+
+def _scanned(trials: _Trials) -> Answer:
+    """The smallest value that does, where larger ones need not be better."""
+    one = trials.one
+    probes = _probes(trials)
+    usable = [step for step in probes if not trials.at(step).refusal]
+    if not usable:
+        refusal = trials.at(one.drawn).refusal or trials.at(probes[0]).refusal
+        return Answer(one.name, one.title, "varied", one.present, one.grows, remarks=(refusal,))
+    remarks = []
+    if one.name == "size" and probes[-1] < one.last:
+        beyond = trials.at(probes[-1] + 1)
+        remarks.append(f"from {beyond.words} on the file is wrong: {beyond.refusal}")
+    refused = [trials.at(step) for step in probes if step not in usable]
+    if refused:
+        remarks.append(f"the file is wrong with {listing([one.words for one in refused], 3)}: {refused[0].refusal}")
+    good = next((k for k, step in enumerate(probes) if trials.at(step).is_met), None)
+    if good is None:
+        if one.name == "balls":
+            remarks.append(f"more than {one.words(one.last)} were not looked at")
+        best = min(usable, key=trials.distance)
+        return _told(trials, "none", best, remarks)
+    if one.name == "size":
+        again = next((trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None)
+        remarks += [] if again is None else [f"not every larger one does: {again.words} does not"]
+    if good == 0:
+        return _told(trials, "any", probes[0], remarks)
+    return _found(trials, probes[good], probes[good - 1], remarks)
+
+
+def _probes(trials: _Trials) -> list[int]:
+    """Values that are tried first, in order, within the range in which the file is right."""
+    one = trials.one
+    if one.name == "balls":
+        found = list(range(one.first, min(EVERY, one.last) + 1))
+        while found[-1] < one.last:
+            found.append(min(int(RATIO * found[-1]), one.last))
+        return found
+    if not trials.is_right(one.drawn):
+        return []
+    last = one.last if trials.is_right(one.last) else _border(trials, one.drawn, one.last)
+    return sorted({int(step) for step in np.linspace(one.first, last, SIZES).round()})

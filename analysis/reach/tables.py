@@ -1,0 +1,73 @@
+"""What is needed for a goal, as text for people and as plain data for programs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..tables import aligned
+from .search import Answer, Reach
+
+
+def reach_lines(found: Reach) -> list[str]:
+    """The goal, what the design makes of it, and a row for each unknown."""
+    now = "met" if found.present.is_met else "not met"
+    lines = [f"{found.label}: {found.title}", f"goal: {found.goal}", f"as drawn: {now}; {found.present.words}"]
+    if found.present.undetermined:
+        lines.append(
+            f"rank deficiency {found.deficiency}: repair the design first; ballplate check tells what is undetermined"
+        )
+    rows = [["changed alone", "as drawn", "needed", "what comes of it"]]
+    for one in found.answers:
+        rows.append([one.title, one.present, _needed(one), _outcome(one)])
+    lines += ["", *aligned(rows, [False] * 4)]
+    notes = []
+    for one in found.answers:
+        notes += [f"{one.name}: {one.beside}"] if one.beside else []
+        notes += [f"{one.name}: {remark}" for remark in one.remarks]
+    return lines + ["", *notes] if notes else lines
+
+
+def _needed(one: Answer) -> str:
+    if one.status == "found":
+        return f"at {'least' if one.grows else 'most'} {one.words}"
+    if one.status == "any":
+        return f"any, even {one.words}"
+    return "cannot be varied" if one.status == "varied" else "no value does"
+
+
+def _outcome(one: Answer) -> str:
+    if one.status == "none":
+        return f"even {one.words}: {one.outcome}" if one.name != "size" else f"best, {one.words}: {one.outcome}"
+    return one.outcome
+
+
+def reach_data(found: Reach) -> dict[str, Any]:
+    """The same as plain data, values in metres or as numbers."""
+    goal = found.goal
+    told: dict[str, Any] = {"kind": goal.kind}
+    if goal.kind == "lengths":
+        told["share"] = goal.share
+    if goal.kind == "quantity":
+        told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
+    return {
+        "experiment": found.label,
+        "title": found.title,
+        "goal": told,
+        "is_met": found.present.is_met,
+        "as_drawn": found.present.words,
+        "rank_deficiency": found.deficiency,
+        "undetermined": found.present.undetermined,
+        "answers": {
+            one.name: {
+                "status": {"varied": "cannot be varied"}.get(one.status, one.status),
+                "as_drawn": one.present or None,
+                "needed": one.words if one.is_met else None,
+                "needed_value": one.value if one.is_met else None,
+                "limit": one.words if one.status == "none" else None,
+                "outcome": one.outcome or None,
+                "next": one.beside or None,
+                "remarks": list(one.remarks),
+            }
+            for one in found.answers
+        },
+    }
