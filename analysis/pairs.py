@@ -43,23 +43,44 @@ class PairSummary:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class PairTile:
+    """Pairs of places by index, `first` and `second` (m,): `lengths` and `uncertainties` (m,) in metres.
+
+    `is_open` (m,) marks those that an undetermined direction changes, whose uncertainties mean nothing.
+    """
+
+    first: Integers
+    second: Integers
+    lengths: Array
+    uncertainties: Array
+    is_open: NDArray[np.bool_]
+
+
 def all_pairs(
     places: Array, common: Array, own: Array, null: Array, labels: Integers, limit: LengthFunction | None = None
 ) -> PairSummary:
-    """Standard uncertainty of the distances between all pairs of `places` (n, d).
+    """Standard uncertainty of the distances between all pairs of `places` (n, d), as `pair_tiles` gives them.
+
+    `labels` (n,) name the places in the result.
+    """
+    found = (_summary(tile, labels, limit) for tile in pair_tiles(places, common, own, null))
+    return sum(found, PairSummary())
+
+
+def pair_tiles(places: Array, common: Array, own: Array, null: Array) -> Iterator[PairTile]:
+    """Standard uncertainties of the distances between all pairs of `places` (n, d), a tile of pairs at a time.
 
     The places' errors are `common` (n, d, r) times r shared standard normal variables plus `own` (n, d, d) times
-    their own; `null` (n, d, k) moves them along undetermined directions. `labels` (n,) name the places in the
-    result. Memory is that of a tile of pairs.
+    their own; `null` (n, d, k) moves them along undetermined directions. Places that coincide make no pair. Memory is
+    that of a tile.
     """
     places = places - places.mean(axis=0) if len(places) else places
     common = without_rigid_motion(places, common)
     null = without_rigid_motion(places, null)
     single = common @ common.transpose(0, 2, 1) + own @ own.transpose(0, 2, 1)
-    return sum(
-        (_tile(places, common, single, null, labels, rows, columns, limit) for rows, columns in _tiles(len(places))),
-        PairSummary(),
-    )
+    for rows, columns in _tiles(len(places)):
+        yield _tile(places, common, single, null, rows, columns)
 
 
 def _tiles(n: int) -> Iterator[tuple[slice, slice]]:
@@ -74,11 +95,9 @@ def _tile(
     common: Array,
     single: Array,
     null: Array,
-    labels: Integers,
     rows: slice,
     columns: slice,
-    limit: LengthFunction | None,
-) -> PairSummary:
+) -> PairTile:
     diagonal = rows.start == columns.start
     n, m, d = rows.stop - rows.start, columns.stop - columns.start, places.shape[1]
     difference = [places[rows, None, axis] - places[None, columns, axis] for axis in range(d)]
@@ -102,17 +121,21 @@ def _tile(
         change = sum(difference[i][:, :, None] * (null[rows, None, i, :] - null[None, columns, i, :]) for i in range(d))
         size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / squared)
         open_ = size[chosen] > _open_above(null)
-    count = int(chosen.sum())
+    first, second = np.nonzero(chosen)
+    return PairTile(rows.start + first, columns.start + second, np.sqrt(squared[chosen]), values, open_)
+
+
+def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> PairSummary:
+    values, open_ = tile.uncertainties, tile.is_open
     if not (~open_).any():
-        return PairSummary(count, int(open_.sum()))
+        return PairSummary(len(values), int(open_.sum()))
     determined = np.where(open_, -1.0, values)
     top = int(determined.argmax())
-    row, column = (int(k[top]) for k in np.nonzero(chosen))
-    where = (int(labels[rows.start + row]), int(labels[columns.start + column]))
-    within = 0
-    if limit is not None:
-        within = int((~open_ & (values <= limit.at(np.sqrt(squared[chosen])))).sum())
-    return PairSummary(count, int(open_.sum()), float(values[~open_].sum()), float(determined[top]), where, within)
+    where = (int(labels[tile.first[top]]), int(labels[tile.second[top]]))
+    within = 0 if limit is None else int((~open_ & (values <= limit.at(tile.lengths))).sum())
+    return PairSummary(
+        len(values), int(open_.sum()), float(values[~open_].sum()), float(determined[top]), where, within
+    )
 
 
 def _open_above(null: Array) -> float:

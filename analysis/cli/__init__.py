@@ -15,7 +15,23 @@ AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERRUPTED = 0, 1, 2, 3, 130
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
     # Loaded only now, so that hardly anything is when an interruption begins to be answered.
-    from . import check, compare, export, fit, init, map, reach, report, reproduce, run, schema, simulate, spline, sweep
+    from . import (
+        check,
+        compare,
+        export,
+        fit,
+        init,
+        lengths,
+        map,
+        reach,
+        report,
+        reproduce,
+        run,
+        schema,
+        simulate,
+        spline,
+        sweep,
+    )
 
     top = argparse.ArgumentParser(
         prog="ballplate",
@@ -24,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    experiments = (check, run, simulate, fit, compare, reach, sweep, export, report)
+    experiments = (check, run, simulate, fit, compare, reach, lengths, sweep, export, report)
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
     return top

@@ -17,7 +17,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="tell which repeatability, certificate, repeats, balls or size meets a target",
         description="Solve for one unknown of a design at a time, the others as drawn: the largest repeatability or "
         "certificate uncertainty, and the fewest repeats, fewest balls or smallest plate that meet a goal. What is "
-        "told is a value of three digits, or a whole number, with which the file was planned; the next one does not do. "
+        "told is a value of three digits, or a whole number, with which the file was planned; the next one fails. "
         "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1.",
     )
     add_file(parser)

@@ -164,6 +164,12 @@ class _Trials:
         assert found is not None
         return found.distance
 
+    def undetermined(self, step: int) -> int:
+        """How much a value with which the file is right leaves open of what the goal asks about."""
+        found = self.at(step).judgement
+        assert found is not None
+        return found.undetermined
+
     def is_right(self, step: int) -> bool:
         """Whether the file is right with a value, which is quicker to find out than what comes of it."""
         if step not in self.known:
@@ -256,6 +262,11 @@ def _scanned(trials: _Trials) -> Answer:
         if one.name == "balls":
             remarks.append(f"more than {one.words(one.last)} were not looked at")
         best = min(usable, key=trials.distance)
+        if trials.undetermined(best):
+            told = (
+                f"something stays undetermined with every value from {one.words(usable[0])} to {one.words(usable[-1])}"
+            )
+            return Answer(one.name, one.title, "undetermined", one.present, one.grows, remarks=(told,))
         return _told(trials, "none", best, remarks)
     if one.name == "size":
         again = next((trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None)

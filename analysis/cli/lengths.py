@@ -1,0 +1,146 @@
+"""`ballplate lengths`: lengths throughout the volume against a target."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .common import add_file, add_json, draw, picture, print_json, print_lines, single
+
+if TYPE_CHECKING:
+    from simulator.experiment.model import Experiment
+
+    from ..lengths import Settings
+
+NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 1, 2, 3
+# Lines of a table of all lengths.
+MOST_PAIRS = 500_000
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser: ArgumentParser = commands.add_parser(
+        "lengths",
+        help="map the uncertainty of lengths over the volume against a target",
+        description="Compute the standard uncertainty u of the length between every two points of a grid over the "
+        "volume, measured on the corrected machine, and compare it and the expanded uncertainty k u with the target by "
+        "length, direction and place. The target accuracy of a file is meant for u. The scatter of the readings that "
+        "will measure a length is no part of u unless asked for. The exit status is 0 if the rank is as expected, "
+        "otherwise 1.",
+    )
+    add_file(parser)
+    parser.add_argument("--target", metavar="LENGTH", help='instead of target_accuracy, such as "0.5 um + L/1000000"')
+    parser.add_argument(
+        "--grid",
+        metavar="N",
+        type=_grid,
+        default=(6,),
+        help="points along each axis, or such as 6,5,4; default 6",
+    )
+    parser.add_argument("--probe", metavar="NAME", help="probe that measures them; default evaluation.probe")
+    parser.add_argument(
+        "--coverage-factor", metavar="K", type=_factor, default=2.0, help="of the expanded uncertainty; default 2"
+    )
+    parser.add_argument(
+        "--with-repeatability", action="store_true", help="count the scatter of the two readings of a length, too"
+    )
+    parser.add_argument("--csv", metavar="FILE", type=Path, help="write a line for each point of the grid")
+    parser.add_argument("--pairs", metavar="FILE", type=Path, help="write a line for each length")
+    parser.add_argument(
+        "--plot", metavar="FILE", type=picture, help="draw slices through the volume, and u against the length"
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def _grid(text: str) -> tuple[int, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) <= 3 and all(part.isascii() and part.isdigit() and len(part) < 6 for part in parts):
+        counts = tuple(map(int, parts))
+        if min(counts) >= 2:
+            return counts
+    raise ArgumentTypeError(f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"')
+
+
+def _factor(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 < value <= 100.0:
+        raise ArgumentTypeError(f'expected a number above 0, such as 2, not "{text}"')
+    return value
+
+
+def run(options: Namespace) -> int:
+    """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
+    from ..length_tables import length_data, length_lines, pair_csv, point_csv
+    from ..lengths import length_map
+
+    experiment = single(options)
+    settings = _settings(experiment, options)
+    if isinstance(settings, str):
+        print(f"ballplate lengths: {settings}", file=sys.stderr)
+        return WRONG_USAGE
+    found = length_map(experiment, settings)
+    count = int(found.whole.count[0])
+    if options.pairs is not None and count > MOST_PAIRS:
+        told = f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make --grid coarser"
+        print(f"ballplate lengths: {told}", file=sys.stderr)
+        return WRONG_USAGE
+    if options.json:
+        print_json([length_data(experiment.label, experiment.title, found)])
+    else:
+        print_lines(length_lines(f"{experiment.label}: {experiment.title}", found))
+    is_written = options.csv is None or _write(options.csv, point_csv(found))
+    is_written &= options.pairs is None or _write(options.pairs, pair_csv(experiment, settings))
+    if options.plot is not None:
+        from ..report.lengths import draw_lengths
+
+        is_written &= draw(lambda path: draw_lengths(found, path), options.plot)
+    if not is_written:
+        return BAD_FILE
+    return 0 if found.deficiency == (experiment.expected_rank_deficiency or 0) else NOT_AS_EXPECTED
+
+
+def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
+    """What was asked for, or why it cannot be."""
+    import math
+
+    from simulator.quantities import QuantityError, parse_length_function
+    from simulator.settings import hint
+
+    from ..lengths import MOST_POINTS, Settings
+
+    try:
+        target = experiment.target_accuracy if options.target is None else parse_length_function(options.target)
+    except QuantityError as error:
+        return f"--target: {error}"
+    if target is None:
+        return 'the file states no target_accuracy; add it, or give --target, such as "0.5 um + L/1000000"'
+    d = experiment.dimension
+    grid = options.grid * d if len(options.grid) == 1 else options.grid
+    if len(grid) != d:
+        return f"--grid has {len(grid)} numbers, but the experiment has {d} dimensions; give one, or {d}"
+    if math.prod(grid) > MOST_POINTS:
+        return f"a grid of {math.prod(grid)} points is too fine; at most {MOST_POINTS} are possible"
+    probe = options.probe or experiment.evaluation.probe
+    if probe not in experiment.probes:
+        return f'unknown probe "{probe}"; {hint(probe, experiment.probes)}'
+    named = [path.resolve() for path in (options.csv, options.pairs, options.plot) if path is not None]
+    if len({*named, options.files[0].resolve()}) <= len(named):
+        return "two of --csv, --pairs, --plot and the experiment are the same file; name another"
+    return Settings(grid, probe, target, options.coverage_factor, options.with_repeatability)
+
+
+def _write(path: Path, lines: Iterable[str]) -> bool:
+    """Write lines; False after saying why not on standard error."""
+    try:
+        with path.open("w", encoding="utf-8") as stream:
+            stream.writelines(f"{line}\n" for line in lines)
+    except OSError as error:
+        print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+        return False
+    return True
