@@ -46,6 +46,8 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
     if whole.undetermined[0]:
         some = ", ".join(f"{_place(found.points[i])} to {_place(found.points[j])}" for i, j in found.open_pairs)
         lines.append(f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as {some}")
+    elif found.deficiency:
+        lines.append("what is undetermined changes none of these lengths; those of another --grid it may change")
     if found.worst is not None:
         i, j = found.worst
         told = f"largest ratio of u to the target: {number(float(whole.maximum_ratio[0]))}"

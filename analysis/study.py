@@ -44,6 +44,15 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class Worth:
+    """Uncertainties alone, for searches that judge many designs: rank deficiency, U1 to U6 and tasks as in a plan."""
+
+    deficiency: int
+    quantities: dict[str, Quantity]
+    tasks: tuple[TaskUncertainty, ...]
+
+
+@dataclass(frozen=True)
 class ParameterEstimate:
     """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined."""
 
@@ -122,6 +131,18 @@ def check(experiment: Experiment, design: Design | None = None) -> Plan:
 def plan(experiment: Experiment) -> Plan:
     """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
     return _plan(experiment, lay_out(experiment), with_quantities=True)
+
+
+@single_threaded
+def worth(experiment: Experiment) -> Worth:
+    """What `plan` finds, less the explanation of the rank, which takes most of its time."""
+    design = lay_out(experiment)
+    layout, state = shared_layout(design), nominal_state(design)
+    factor = eliminate(design, layout, state)
+    found = spectrum(factor)
+    spread = covariance(design, factor, found)
+    quantities = uncertainties(design, layout, state, spread, target=experiment.target_accuracy)
+    return Worth(found.deficiency, quantities, task_uncertainties(design, layout, state, spread))
 
 
 @single_threaded

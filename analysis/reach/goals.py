@@ -10,7 +10,7 @@ from typing import Literal
 from simulator.quantities import QuantityError, parse_positive_angle, parse_positive_length
 from simulator.settings import listing
 
-from ..study import Plan
+from ..study import Plan, Worth
 from ..tables import number, shown_unit
 from ..uncertainty import DESCRIPTIONS, Quantity
 
@@ -92,7 +92,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     return Goal("quantity", 1.0, symbol, statistic, value)  # type: ignore[arg-type]
 
 
-def check_goal(goal: Goal, plan: Plan) -> None:
+def check_goal(goal: Goal, plan: Plan | Worth) -> None:
     """Refuse a goal about what a plan does not have.
 
     :raises GoalError: no target, no tasks, or no such quantity.
@@ -111,7 +111,7 @@ def check_goal(goal: Goal, plan: Plan) -> None:
         raise GoalError(f"the design has no {goal.symbol}; it has {listing(plan.quantities, 20)}")
 
 
-def judge(goal: Goal, plan: Plan) -> Judgement:
+def judge(goal: Goal, plan: Plan | Worth) -> Judgement:
     """Whether a plan meets a goal that `check_goal` lets pass."""
     if goal.kind == "tasks":
         return _judge_tasks(plan)
@@ -141,7 +141,7 @@ def percent(share: float) -> str:
     return f"{math.floor(1e4 * share + 1e-9) / 100:g} % of"
 
 
-def _judge_tasks(plan: Plan) -> Judgement:
+def _judge_tasks(plan: Plan | Worth) -> Judgement:
     ratios = [task.standard_uncertainty / task.target for task in plan.tasks if task.target is not None]
     undetermined = sum(map(math.isnan, ratios))
     within = sum(ratio <= 1.0 for ratio in ratios)

@@ -1,4 +1,4 @@
-"""Searches for the value of an unknown that just meets a goal; every value is judged by a full plan."""
+"""Searches for the value of an unknown that just meets a goal; the value found is judged by a plan of its own."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from simulator.experiment.load import build, tree_of
 from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
 from simulator.experiment.variants import override
-from simulator.experiment.yamltree import Node, Scalar
+from simulator.experiment.yamltree import Mapping, Node, Scalar
 from simulator.settings import listing
 from simulator.threads import single_threaded
 
-from ..study import Plan, plan
+from ..study import Worth, plan, worth
 from .goals import Goal, Judgement, check_goal, judge
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
@@ -98,10 +98,13 @@ def reach(
     :raises ExperimentError: the target is wrong.
     """
     root = tree_of(experiment.source, experiment.name)
+    # Planning is at zero machine error, and true machines take time to check.
+    zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
+    root = override(root, "true_machine", zero, root.mark)
     if target is not None:
         root = override(root, "target_accuracy", Scalar(root.mark, target), root.mark)
     searched = _Searched(root, experiment.source, experiment.name, goal)
-    present = searched.planned(root)
+    present = searched.worth(root)
     check_goal(goal, present)
     judged = judge(goal, present)
     answers = []
@@ -113,8 +116,8 @@ def reach(
                 raise
             answers.append(Answer(name, name, "varied", remarks=(str(error),)))
             continue
-        answers.append(_answer(one, searched, judged, present.verdict.deficiency))
-    return Reach(experiment.label, experiment.title, goal, judged, present.verdict.deficiency, tuple(answers))
+        answers.append(_answer(one, searched, judged, present.deficiency))
+    return Reach(experiment.label, experiment.title, goal, judged, present.deficiency, tuple(answers))
 
 
 @dataclass(frozen=True)
@@ -126,15 +129,22 @@ class _Searched:
     name: str | None
     goal: Goal
 
-    def planned(self, tree: Node) -> Plan:
-        """The plan of a tree.
+    def built(self, tree: Node) -> Experiment:
+        """The experiment of a tree.
 
         :raises ExperimentError: the file is wrong so.
         """
         experiment, messages = build(tree, self.source, self.name)
         if experiment is None:
             raise ExperimentError(sorted(messages))
-        return plan(experiment)
+        return experiment
+
+    def worth(self, tree: Node) -> Worth:
+        """What a tree is worth.
+
+        :raises ExperimentError: the file is wrong so.
+        """
+        return worth(self.built(tree))
 
 
 class _Trials:
@@ -152,11 +162,11 @@ class _Trials:
     def _tried(self, step: int) -> Tried:
         words = self.one.words(step)
         try:
-            found = self.searched.planned(self.one.tree(step))
+            found = self.searched.worth(self.one.tree(step))
         except ExperimentError as error:
             first = error.messages[0]
             return Tried(words, None, 0, f"{first.path}: {first.text}")
-        return Tried(words, judge(self.searched.goal, found), found.verdict.deficiency, "")
+        return Tried(words, judge(self.searched.goal, found), found.deficiency, "")
 
     def distance(self, step: int) -> float:
         """How far from the goal a value is with which the file is right."""
@@ -169,6 +179,10 @@ class _Trials:
         found = self.at(step).judgement
         assert found is not None
         return found.undetermined
+
+    def verified(self, step: int) -> Judgement:
+        """A value judged by a plan of its own."""
+        return judge(self.searched.goal, plan(self.searched.built(self.one.tree(step))))
 
     def is_right(self, step: int) -> bool:
         """Whether the file is right with a value, which is quicker to find out than what comes of it."""
@@ -187,12 +201,10 @@ def _answer(one: Unknown, searched: _Searched, present: Judgement, deficiency: i
 
 
 def _told(trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]) -> Answer:
-    one, tried = trials.one, trials.at(step)
-    assert tried.judgement is not None
-    outcome = tried.judgement.words
-    return Answer(
-        one.name, one.title, status, one.present, one.grows, tried.words, one.value(step), outcome, "", tuple(remarks)
-    )
+    one, found = trials.one, trials.verified(step)
+    assert found.is_met is (status != "none")
+    words, value = one.words(step), one.value(step)
+    return Answer(one.name, one.title, status, one.present, one.grows, words, value, found.words, "", tuple(remarks))
 
 
 def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:

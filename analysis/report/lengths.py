@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
 CURVES = 200.0
 # Room for the numbers and names below the slices.
-UNDER = 74.0
+UNDER = 54.0
 # Slices that are drawn of a grid, in rows of three, and the room between them and for the scale of colours.
 MOST_SLICES, IN_A_ROW, BETWEEN, SCALE = 6, 3, 10.0, 62.0
 

@@ -1,0 +1,217 @@
+"""Reverse planning against closed forms, an independent root finder and plans of files written by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from scipy.optimize import brentq
+
+from analysis.cli import main
+from analysis.reach.goals import Goal, GoalError, parse_goal
+from analysis.reach.search import Answer, reach
+from analysis.reach.steps import at_step, round_down, round_up, step_of
+from analysis.reach.unknowns import NotVariableError
+from analysis.study import Plan, plan
+from simulator.experiment.load import load
+
+TEXT = (
+    Path("designs/quickstart.yaml")
+    .read_text(encoding="utf-8")
+    .replace("coefficients: 5", "coefficients: 4")
+    .replace("balls: [5, 5]", "balls: [4, 4]")
+    .replace("random: 200", "random: 12")
+)
+SIDES = "pairs: corner sides            # or corner diagonals, corners, neighbours, all, or a list of pairs of balls"
+CERTIFICATE = "standard_uncertainty: 0.2 um   # or one that grows with length: 0.1 um + L/1000000"
+TEXT = TEXT.replace(TEXT[TEXT.index("true_machine:") : TEXT.index("# Offsets")], "")
+UNCALIBRATED = TEXT.replace(TEXT[TEXT.index("calibration:") : TEXT.index("# Where U4")], "")
+
+
+def written(folder: Path, text: str, *changes: tuple[str, str]) -> Path:
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file = folder / "design.yaml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def planned(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> Plan:
+    return plan(load(written(folder, text, *changes))[0])
+
+
+def average(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> float:
+    return planned(folder, *changes, text=text).quantities["U6"].average
+
+
+def answer(folder: Path, goal: str | Goal, name: str, text: str = TEXT) -> Answer:
+    asked = parse_goal(goal) if isinstance(goal, str) else goal
+    return reach(load(written(folder, text))[0], asked, (name,)).answers[0]  # type: ignore[arg-type]
+
+
+def test_steps_are_all_numbers_of_three_digits() -> None:
+    values = [at_step(step) for step in range(-950, 950)]
+    assert values == sorted(set(values)) and all(len(value.as_tuple().digits) == 3 for value in values)
+    assert all(step_of(at_step(step)) == step for step in range(-2000, 2000, 7))
+    assert round_down(Decimal("0.21499")) == Decimal("0.214") and round_up(Decimal("0.2141")) == Decimal("0.215")
+
+
+def test_without_certificate_uncertainties_are_proportional_to_the_repeatability(tmp_path: Path) -> None:
+    """The tips of the star probe alone give the length: U is 0.2 um times what the design makes of it."""
+    now = average(tmp_path, text=UNCALIBRATED)
+    found = answer(tmp_path, "U6 average 0.123 um", "repeatability", UNCALIBRATED)
+    assert found.status == "found" and found.value is not None
+    exact = 0.2e-6 * 0.123e-6 / now
+    assert found.value <= exact < found.value + 1.001e-2 * found.value
+    assert found.value == pytest.approx(float(round_down(Decimal(exact))), rel=1e-12)
+    assert found.words == f"{1e6 * found.value:.9g} um"
+
+
+@pytest.mark.parametrize("limit", [0.05e-6, 0.021e-6])
+def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(tmp_path: Path, limit: float) -> None:
+    now = average(tmp_path, text=UNCALIBRATED)
+    found = answer(tmp_path, Goal("quantity", limit=limit), "repeats", UNCALIBRATED)
+    assert found.value == math.ceil((now / limit) ** 2)
+    assert found.beside.startswith(f"{found.value - 1:g} does not do: average U6 ")
+
+
+def test_the_certificate_is_where_an_independent_root_finder_has_it(tmp_path: Path) -> None:
+    loose, tight = (average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {u} um")) for u in ("50", "0.0001"))
+    limit = 0.5 * (loose + tight)
+
+    def excess(log_of_um: float) -> float:
+        return average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {math.exp(log_of_um):.15g} um")) - limit
+
+    root = 1e-6 * math.exp(brentq(excess, math.log(1e-4), math.log(50.0), rtol=1e-8))
+    found = answer(tmp_path, Goal("quantity", limit=limit), "certificate")
+    assert found.status == "found" and found.value == float(round_down(Decimal(root)))
+    again = average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {found.words}"))
+    assert again <= limit and f"average U6 {1e6 * again:.4g}" in found.outcome
+
+
+def test_where_no_certificate_does_the_limit_is_that_of_an_exact_one(tmp_path: Path) -> None:
+    limit = average(tmp_path, (CERTIFICATE, "standard_uncertainty: 0.00001 um"))
+    found = answer(tmp_path, Goal("quantity", limit=0.99 * limit), "certificate")
+    assert found.status == "none" and f"average U6 {1e6 * limit:.4g}" in found.outcome
+    assert found.remarks == ("an exact one would not be better: with ten times that it is the same",)
+    found = answer(tmp_path, Goal("quantity", limit=1.0), "certificate")
+    assert found.status == "any"
+
+
+def test_balls_and_size_are_the_smallest_of_all_that_do(tmp_path: Path) -> None:
+    by_number = {n: average(tmp_path, ("[4, 4]", f"[{n}, {n}]")) for n in (4, 6, 7)}
+    found = answer(tmp_path, Goal("quantity", limit=1.001 * by_number[7]), "balls")
+    assert found.words == "7 x 7" and found.beside.startswith("6 x 6 does not do: ")
+    assert by_number[6] > 1.001 * by_number[7]
+
+    found = answer(tmp_path, Goal("quantity", limit=1.2 * by_number[4]), "size")
+    assert found.status == "found" and found.value is not None
+    edge = round(1e3 * found.value)
+    for size, does in ((edge, True), (edge - 1, False)):
+        value = average(tmp_path, ("[750 mm, 750 mm]", f"[{size} mm, {size} mm]"))
+        assert (value <= 1.2 * by_number[4]) is does
+    assert found.remarks[0].startswith("from 751 mm x 751 mm on the file is wrong: positions[1]: ball")
+
+
+def test_sides_and_axes_keep_their_ratio_and_are_rounded_to_the_safe_side(tmp_path: Path) -> None:
+    text = TEXT.replace("repeatability: 0.2 um", "repeatability: [0.2 um, 0.2 um, 0.3 um]")
+    text = text.replace("[750 mm, 750 mm]", "[750 mm, 600 mm]").replace("[4, 4]", "[6, 4]")
+    text = text.replace(CERTIFICATE, "standard_uncertainty: 0.1 um + L/1000000")
+    file = written(tmp_path, text)
+    goal = Goal("quantity", limit=0.8 * planned(tmp_path, text=text).quantities["U6"].average)
+    names = ("repeatability", "certificate", "balls")
+    found = {one.name: one for one in reach(load(file)[0], goal, names).answers}
+    words = found["repeatability"].words.split(", ")
+    first, third = (float(word.removesuffix(" um")) for word in (words[0], words[2]))
+    assert words[0] == words[1] and third == float(round_down(Decimal("1.5") * Decimal(repr(first))))
+    changes = ("[0.2 um, 0.2 um, 0.3 um]", f"[{found['repeatability'].words}]")
+    assert average(tmp_path, changes, text=text) <= goal.limit
+    columns, rows = map(int, found["balls"].words.split(" x "))
+    assert rows == round(columns * 4 / 6)
+    assert average(tmp_path, ("[6, 4]", f"[{columns}, {rows}]"), text=text) <= goal.limit
+    assert "+ L/" in found["certificate"].words
+
+
+def test_a_deficient_design_is_to_be_repaired_first(tmp_path: Path) -> None:
+    text = TEXT.replace("coefficients: 4", "coefficients: 6")
+    result = reach(load(written(tmp_path, text))[0], Goal(), ("repeatability", "certificate", "repeats", "balls"))
+    assert result.deficiency > 0 and result.present.undetermined > 0
+    by_name = {one.name: one for one in result.answers}
+    for name in ("repeatability", "certificate", "repeats"):
+        assert by_name[name].status == "undetermined"  # type: ignore[index]
+    # More balls repair it.
+    assert by_name["balls"].status == "found" and by_name["balls"].value > 4  # type: ignore[operator]
+
+
+def test_balls_that_are_named_set_limits_to_their_number(tmp_path: Path) -> None:
+    text = TEXT.replace(SIDES, "pairs: [[r1c1, r4c4], [r1c4, r4c1]]")
+    found = answer(tmp_path, "U6 average 0.08 um", "balls", text)
+    assert found.is_met and found.value > 4  # type: ignore[operator]
+    assert 'unknown ball "r4c4"' in found.remarks[0] and found.remarks[0].startswith(
+        "the file is wrong with 2 x 2, 3 x 3"
+    )
+
+
+def test_shares_and_tasks(tmp_path: Path) -> None:
+    target = ("0.5 um + L/1000000", "0.15 um")
+    most = answer(tmp_path, parse_goal("lengths", 0.8), "repeatability", TEXT.replace(*target))
+    every = answer(tmp_path, "lengths", "repeatability", TEXT.replace(*target))
+    assert every.value < most.value  # type: ignore[operator]
+    change = ("repeatability: 0.2 um", f"repeatability: {most.words}")
+    share = planned(tmp_path, change, target).quantities["U6"].within_target
+    assert share is not None and share >= 0.8
+    tasks = "  tasks: [{name: edge, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}]\n\ntarget"
+    with_task = TEXT.replace(*target).replace("\ntarget", tasks)
+    found = answer(tmp_path, "tasks", "repeatability", with_task)
+    told = plan(load(written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}")))[0])
+    assert told.tasks[0].is_within and told.tasks[0].standard_uncertainty > 0.985 * 0.15e-6
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("U7 average 1 um", '"U7" is no quantity with a limit; known: U1'),
+        ("U2 average 1 um", '"U2" is no quantity with a limit; give U2 lengths or U2 angles'),
+        ("U6 median 1 um", '"U6 median 1 um" is no goal; write lengths, tasks'),
+        ("U6 average 1", '"1" has no unit'),
+        ("U2 angles maximum 1 um", '"1 um" is a length; an angle is expected'),
+    ],
+)
+def test_goals_that_are_none(text: str, message: str) -> None:
+    with pytest.raises(GoalError, match="^" + message.replace("(", r"\(")):
+        parse_goal(text)
+
+
+def test_what_the_file_does_not_have(tmp_path: Path) -> None:
+    file = written(tmp_path, UNCALIBRATED.replace("target_accuracy: 0.5 um + L/1000000\n", ""))
+    experiment = load(file)[0]
+    with pytest.raises(GoalError, match="states no target_accuracy"):
+        reach(experiment, Goal())
+    with pytest.raises(GoalError, match="the file has no tasks"):
+        reach(experiment, Goal("tasks"))
+    goal = parse_goal("U6 average 1 um")
+    with pytest.raises(NotVariableError, match="states no calibration"):
+        reach(experiment, goal, ("certificate",))
+    with pytest.raises(NotVariableError, match='unknown artefact "plat"; did you mean "plate"?'):
+        reach(experiment, goal, ("size",), artefact="plat")
+    found = reach(experiment, goal, ("certificate", "repeats")).answers
+    assert [one.status for one in found] == ["varied", "any"]
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(written(tmp_path, TEXT))
+    assert main(["reach", file, "--by", "repeats", "--goal", "U6 average 0.09 um"]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and out.splitlines()[1] == "goal: average U6 at most 0.09 um"
+    assert any(line.startswith("repeats of every reading") and "at least " in line for line in out.splitlines())
+    assert main(["reach", file, "--by", "certificate", "--goal", "U6 average 0.01 um", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["answers"]["certificate"]["status"] == "none" and found["is_met"] is False
+    assert found["answers"]["certificate"]["needed"] is None and found["goal"]["limit"] == 1e-8
+    for wrong in (["--goal", "U9"], ["--target", "3"], ["--share", "95%", "--goal", "tasks"], ["--calibration", "1"]):
+        assert main(["reach", file, "--by", "certificate", *wrong]) == 2
+        assert capsys.readouterr().err.startswith("ballplate reach: ")
