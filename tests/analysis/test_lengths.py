@@ -131,7 +131,7 @@ def test_groups_are_what_counting_one_by_one_gives(tmp_path: Path, deficient: bo
         text = TEXT.replace("position_coefficients: 4", "position_coefficients: 6")
     experiment = experiment_of(tmp_path, text)
     # Points that are not where the balls are, so that they notice what these leave open.
-    grid = (4, 2, 3)
+    grid = (2, 3, 4)
     found = length_map(experiment, settings(coverage_factor=1.5, grid=grid))
     rows = all_pairs(experiment, grid=grid)
     u = np.where(rows[:, 4] == 1, np.nan, rows[:, 3])
