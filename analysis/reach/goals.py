@@ -150,7 +150,7 @@ def _judge_tasks(plan: Plan | Worth) -> Judgement:
         words += f", {undetermined} undetermined"
         return Judgement(False, math.inf, words, undetermined)
     worst = max(range(len(ratios)), key=ratios.__getitem__)
-    words += f"; nearest to its target: {plan.tasks[worst].name}, {percent(ratios[worst])} it"
+    words += f"; most of its target needs {plan.tasks[worst].name}, {number(100 * ratios[worst])} %"
     return Judgement(within == len(ratios), ratios[worst], words, 0)
 
 
