@@ -21,8 +21,9 @@ from .goals import Goal, Judgement, check_goal, judge
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
 
-# Numbers of balls up to which every one is tried, and the step beyond; values of a size that are tried first.
-EVERY, RATIO, SIZES = 12, 1.25, 16
+# Numbers of balls up to which every one is tried, and the step beyond; values of a size that are tried first, and
+# about the best of them if none does.
+EVERY, RATIO, SIZES, REFINED = 12, 1.25, 16, 12
 # Change of the goal's figure from ten times the extreme to it, up to which it is as good as exact.
 CONVERGED = 1e-3
 
@@ -269,6 +270,12 @@ def _scanned(trials: _Trials) -> Answer:
     refused = [trials.at(step) for step in probes if step not in usable]
     if refused:
         remarks.append(f"the file is wrong with {listing([one.words for one in refused], 3)}: {refused[0].refusal}")
+    if one.name == "size" and not any(trials.at(step).is_met for step in usable):
+        # What just does may lie beside the best of them.
+        best = probes.index(min(usable, key=trials.distance))
+        ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
+        probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
+        usable = [step for step in probes if not trials.at(step).refusal]
     good = next((k for k, step in enumerate(probes) if trials.at(step).is_met), None)
     if good is None:
         if one.name == "balls":

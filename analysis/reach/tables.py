@@ -37,7 +37,11 @@ def _needed(one: Answer) -> str:
 
 def _outcome(one: Answer) -> str:
     if one.status == "none":
-        return f"even {one.words}: {one.outcome}" if one.name != "size" else f"best, {one.words}: {one.outcome}"
+        return (
+            f"even {one.words}: {one.outcome}"
+            if one.name != "size"
+            else f"best of those tried, {one.words}: {one.outcome}"
+        )
     return one.outcome
 
 
