@@ -201,6 +201,9 @@ def _of_plate(name: UnknownName, experiment: Experiment, root: Node, artefact: s
         for one, settings in experiment.artefacts.items()
         if isinstance(settings, GridSettings | SquareSettings) and artefact in (None, one)
     ]
+    if artefact is None:
+        plates = [one for one in fitting if experiment.artefacts[one].role == "plate"]
+        fitting = plates or fitting
     if not fitting:
         of = "no artefact is" if artefact is None else f'"{artefact}" is not'
         raise NotVariableError(f"{of} of kind grid or square, whose {name} could be varied")
