@@ -243,6 +243,15 @@ def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Ar
     return found.length - length_values(design, state), np.hypot(found.scatter, design.lengths.uncertainty)
 
 
+def length_geometry(design: Design, state: State, x: Array | None) -> tuple[Array, Whitening]:
+    """Directions (m, d) from the second end of lengths to the first, and what whitens their residuals."""
+    if not len(design.lengths):
+        empty = np.zeros(0)
+        return np.zeros((0, design.dimension)), whitening(empty, empty, np.zeros(0, np.int64))
+    _, found, white = _length_residuals(design, state, x)
+    return found.unit, white
+
+
 def length_values(design: Design, state: State) -> Array:
     """Values (m,) at `state` that lengths of standards are compared with: those certified, or the unknown ones."""
     given = design.lengths

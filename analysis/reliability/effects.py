@@ -1,0 +1,196 @@
+"""What a bias that nobody notices changes in the functions behind U4, U5 and U6, at the most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.design import Design, Integers, State
+from simulator.estimation.covariance import Covariance, blank
+from simulator.estimation.parameters import SharedLayout
+from simulator.geometry.motions import without_rigid_motion
+from simulator.machines.protocol import Array
+
+from ..corrections import corrected_points, correction_rows
+from .response import Response
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+# Places of which all pairs are looked at; of more points, or balls of a plate, some are chosen evenly.
+MOST_PLACES = 200
+
+# Numbers of a product of functions and patterns that are held at once.
+AT_ONCE = 2_000_000
+
+SYMBOLS = ("U4", "U5", "U6")
+
+
+@dataclass(frozen=True)
+class Largest:
+    """For k patterns the largest change by a unit of the bias (k,), its function (k,), and the latter's uncertainty.
+
+    The function is -1, and the change 0, where there is none that is determined.
+    """
+
+    change: Array
+    function: Integers
+    uncertainty: Array
+
+
+@dataclass(frozen=True)
+class Functions:
+    """Linear functions of the displacements of places: rows of `operator` (f, places d), with uncertainties (f,).
+
+    The places move by `common` (places d, r) times the common part of a response and, for balls, by `own`
+    (places d, n d) times its own part; None for points. `first` and `second` (f,) are the places of each function, or
+    one and its axis.
+    """
+
+    operator: csr_array
+    common: Array
+    own: csr_array | None
+    uncertainty: Array
+    first: Integers
+    second: Integers
+
+    def largest(self, response: Response) -> Largest:
+        """The largest change of a function by each pattern."""
+        count = len(response.index)
+        change, where = np.zeros(count), np.full(count, -1)
+        step = max(AT_ONCE // max(len(self.uncertainty), 1), 1)
+        for start in range(0, count if len(self.uncertainty) else 0, step):
+            some = slice(start, min(start + step, count))
+            moved = self.common @ response.common[some].T
+            if self.own is not None:
+                moved += (self.own @ response.own[some].T).toarray()
+            values = np.abs(self.operator @ moved)
+            where[some] = values.argmax(axis=0)
+            change[some] = values[where[some], np.arange(some.stop - some.start)]
+        uncertainty = self.uncertainty[where] if len(self.uncertainty) else np.full(count, np.nan)
+        return Largest(change, where, uncertainty)
+
+    def changes(self, response: Response) -> Array:
+        """Changes (f, k) of all functions by a unit of each pattern's bias; the estimate moves against residuals."""
+        moved = self.common @ response.common.T
+        if self.own is not None:
+            moved += (self.own @ response.own.T).toarray()
+        return np.asarray(-(self.operator @ moved))
+
+
+def error_functions(design: Design, layout: SharedLayout, state: State, found: Covariance) -> Functions:
+    """U4: each component of the error function at the evaluation points that is determined."""
+    from scipy.sparse import eye_array
+
+    probes = np.full(len(design.points), design.point_probe)
+    rates = correction_rows(design, layout, state, design.points, probes)
+    spread, null = _points(rates, found)
+    size = np.sqrt(((rates * found.scale) ** 2).sum(axis=2))
+    uncertainty = blank(np.sqrt((spread**2).sum(axis=2)), null, size).ravel()
+    known = np.flatnonzero(~np.isnan(uncertainty))
+    operator = eye_array(len(uncertainty), format="csr")[known]
+    point, axis = np.divmod(known, design.dimension)
+    return Functions(operator, spread.reshape(len(uncertainty), -1), None, uncertainty[known], point, axis)
+
+
+def point_distances(design: Design, layout: SharedLayout, state: State, found: Covariance) -> Functions:
+    """U6: distances between corrected points, of at most `MOST_PLACES` of them."""
+    chosen = evenly(len(design.points))
+    points, probes = design.points[chosen], np.full(len(chosen), design.point_probe)
+    spread, null = _points(correction_rows(design, layout, state, points, probes), found)
+    corrected = corrected_points(design, state, points, probes)
+    first, second = np.triu_indices(len(points), 1)
+    return _distances(corrected, spread, null, None, first, second, chosen)
+
+
+def ball_distances(design: Design, state: State, found: Covariance) -> Callable[[Integers], Functions]:
+    """U5: distances between balls of each artefact; of large ones those that end at some balls, or at those asked for."""
+    from scipy.sparse import coo_array
+
+    n, d = design.balls.shape
+    common, null = np.zeros_like(found.ball), np.zeros_like(found.ball_null)
+    for artefact in np.flatnonzero(design.is_plate):
+        mine = np.flatnonzero(design.ball_artefact == artefact)
+        centred = state.balls[mine] - state.balls[mine].mean(axis=0)
+        common[mine] = without_rigid_motion(centred, found.ball[mine])
+        null[mine] = without_rigid_motion(centred, found.ball_null[mine])
+    at = d * np.arange(n)[:, None, None] + np.zeros((d, d), np.int64)
+    row, column = at + np.arange(d)[:, None], at + np.arange(d)
+    own = coo_array((found.ball_own.ravel(), (row.ravel(), column.ravel())), shape=(n * d, n * d)).tocsr()
+    own.eliminate_zeros()
+    kept: dict[bytes, Functions] = {}
+
+    def among(asked: Integers) -> Functions:
+        pairs = []
+        for artefact in np.flatnonzero(design.is_plate):
+            mine = np.flatnonzero(design.ball_artefact == artefact)
+            some = mine[evenly(len(mine))]
+            pairs.append(some[np.stack(np.triu_indices(len(some), 1))])
+            others = np.setdiff1d(np.intersect1d(asked, mine), some)
+            pairs.append(np.stack([np.repeat(others, len(some)), np.tile(some, len(others))]))
+        first, second = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), np.int64)
+        key = first.tobytes()
+        if key not in kept:
+            kept.clear()
+            kept[key] = _distances(state.balls, common, null, own, first, second, np.arange(n))
+        return kept[key]
+
+    return among
+
+
+def evenly(count: int) -> Integers:
+    """Indices of up to `MOST_PLACES` of `count` places.
+
+    >>> evenly(3).tolist(), len(evenly(1000)), int(evenly(1000)[-1])
+    ([0, 1, 2], 200, 999)
+    """
+    if count <= MOST_PLACES:
+        return np.arange(count)
+    return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
+
+
+def _points(rates: Array, found: Covariance) -> tuple[Array, Array]:
+    """Spread (p, d, r) and null motion (p, d, k) of points, as wide as those of balls."""
+    spread = np.zeros((*rates.shape[:2], found.ball.shape[2]))
+    spread[:, :, : found.shared.shape[1]] = rates @ found.shared
+    return spread, rates @ found.shared_null
+
+
+def _distances(
+    places: Array,
+    common: Array,
+    null: Array,
+    own: csr_array | None,
+    first: Integers,
+    second: Integers,
+    labels: Integers,
+) -> Functions:
+    """Distances between places `first` and `second` that are determined."""
+    from scipy.sparse import coo_array
+
+    n, d = places.shape
+    centred = places - places.mean(axis=0) if n else places
+    if own is None:
+        common, null = without_rigid_motion(centred, common), without_rigid_motion(centred, null)
+    unit = centred[first] - centred[second]
+    length = np.sqrt((unit**2).sum(axis=1))
+    apart = length > 0.0
+    first, second, unit = first[apart], second[apart], unit[apart] / length[apart, None]
+    row = np.repeat(np.arange(len(first)), 2 * d)
+    column = np.concatenate([d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1)
+    value = np.concatenate([unit, -unit], axis=1)
+    operator = coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
+    change = operator @ null.reshape(n * d, -1)
+    limit = 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
+    known = np.sqrt((change**2).sum(axis=1)) <= limit
+    operator, first, second = operator[known], first[known], second[known]
+    flat = common.reshape(n * d, -1)
+    variance = np.zeros(len(first))
+    for start in range(0, flat.shape[1], 100):
+        variance += ((operator @ flat[:, start : start + 100]) ** 2).sum(axis=1)
+    if own is not None:
+        variance += np.asarray((operator @ own).power(2).sum(axis=1)).ravel()
+    return Functions(operator, flat, own, np.sqrt(variance), labels[first], labels[second])

@@ -1,0 +1,322 @@
+"""What may be wrong with observations: a single one, or an event that touches many, each as a pattern over all rows.
+
+A pattern is what one unit of the bias changes in the whitened residuals. Single observations come first, in the order of
+their rows; the events after them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from simulator.design import Design, Integers, State, locations, probe_offsets
+from simulator.estimation.hat import RowPlaces, row_places
+from simulator.estimation.observations import (
+    expected_readings,
+    length_geometry,
+    length_values,
+    offset_sensitivity,
+    reading_weights,
+    rotation_sensitivity,
+)
+from simulator.estimation.whitening import Whitening
+from simulator.machines.protocol import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+Kind = Literal[
+    "reading", "length", "prior", "coordinate", "distance", "ball", "shift", "turn", "probe", "length value", "scale",
+    "expansion",
+]  # fmt: skip
+SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
+UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
+
+
+@dataclass(frozen=True)
+class Block:
+    """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
+
+    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe, artefact or
+    certificate of a length; `axis` (count,) along or about which, -1 without one; `start` (count,) the first reading of
+    a part, -1 without one. `readings` counts the readings touched.
+    """
+
+    kind: Kind
+    row: Integers
+    column: Integers
+    value: Array
+    subject: Integers
+    axis: Integers
+    start: Integers
+
+    @property
+    def count(self) -> int:
+        return len(self.subject)
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """Patterns as columns of `matrix` (rows, k), with `kind`, `subject`, `axis` and `start` (k,) as in `Block`."""
+
+    design: Design
+    matrix: csc_array
+    kind: np.ndarray
+    subject: Integers
+    axis: Integers
+    start: Integers
+
+    def __len__(self) -> int:
+        return len(self.subject)
+
+    @cached_property
+    def is_local(self) -> np.ndarray:
+        """Which patterns (k,) are of rows that come together: of one ball at the most, or one kind."""
+        return np.isin(self.kind, [*SINGLE, "ball", "length value"])
+
+    def of_kind(self, *kinds: Kind) -> Integers:
+        """Indices of the patterns of some kinds."""
+        return np.flatnonzero(np.isin(self.kind, kinds))
+
+    def unit(self, k: int) -> Literal["m", "rad", "1"]:
+        """Unit of the bias."""
+        kind: Kind = self.kind[k]
+        if kind == "prior":
+            return prior_unit(self.design, int(self.subject[k]))
+        return UNITS.get(kind, "m")
+
+
+def patterns(design: Design, state: State, x: Array | None) -> Patterns:
+    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones."""
+    from scipy.sparse import coo_array
+
+    at = _Place(design, state, x, row_places(design))
+    blocks = [block for build in BUILDERS for block in build(at)]
+    start = np.cumsum([0, *(block.count for block in blocks)])
+    column = np.concatenate([block.column + first for block, first in zip(blocks, start, strict=False)])
+    row = np.concatenate([block.row for block in blocks])
+    value = np.concatenate([block.value for block in blocks])
+    matrix = coo_array((value, (row, column)), shape=(len(at.places), int(start[-1]))).tocsc()
+    kind = np.repeat(np.array([block.kind for block in blocks]), [block.count for block in blocks])
+    return Patterns(
+        design,
+        matrix,
+        kind,
+        np.concatenate([block.subject for block in blocks]),
+        np.concatenate([block.axis for block in blocks]),
+        np.concatenate([block.start for block in blocks]),
+    )
+
+
+def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
+    """Unit of what a prior states."""
+    given = design.priors
+    if given.position[prior] >= 0:
+        return "rad" if given.component[prior] >= design.dimension else "m"
+    if given.probe[prior] >= 0:
+        return "m"
+    used = np.flatnonzero(given.by_model[prior])
+    return design.model.parameters[int(used[0])].unit if len(used) else "1"
+
+
+class _Place:
+    """A design where it is linearised, with what several kinds of patterns need."""
+
+    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces) -> None:
+        self.design, self.state, self.places = design, state, places
+        self.chosen = design.plate_readings
+        self.readings = design.readings.select(self.chosen)
+        self.weight = reading_weights(design, self.readings)
+        self.x = expected_readings(design, state, design.readings) if x is None else x
+        self.unit, self.white = length_geometry(design, state, x)
+        turned = locations(design, state, self.readings) - state.origins[self.readings.position]
+        self.arm = turned
+        self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
+
+    def of_readings(self, rows: Integers, by_axis: Array) -> tuple[Integers, Integers, Array]:
+        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns."""
+        m, d, k = by_axis.shape
+        value = self.weight[rows][:, :, None] * by_axis
+        row = d * rows[:, None, None] + np.arange(d)[:, None] + np.zeros(k, np.int64)
+        column = np.broadcast_to(np.arange(k), value.shape)
+        used = value != 0.0
+        return row[used], column[used], value[used]
+
+    def of_lengths(self, columns: Array) -> tuple[Integers, Integers, Array]:
+        """Entries of changes (lengths, k) of measured less known lengths."""
+        white = self.white.whitened(columns)
+        row, column = np.nonzero(white)
+        return self.places.lengths.start + row, column, white[row, column]
+
+
+def _block(
+    kind: Kind, entries: tuple[Integers, Integers, Array], subject: Any, axis: Any = -1, start: Any = -1
+) -> Block:
+    subject = np.atleast_1d(np.asarray(subject, np.int64))
+    axis = np.broadcast_to(np.asarray(axis, np.int64), subject.shape)
+    return Block(kind, *entries, subject, axis, np.broadcast_to(np.asarray(start, np.int64), subject.shape))
+
+
+def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integers, Array]:
+    row, column, value = (np.concatenate(one) for one in zip(*parts, strict=True))
+    return row, column, value
+
+
+def _single_readings(at: _Place) -> Iterator[Block]:
+    m, d = at.weight.shape
+    rows = np.arange(m * d)
+    yield _block("reading", (rows, rows, at.weight.ravel()), np.repeat(at.chosen, d), np.tile(np.arange(d), m))
+
+
+def _single_lengths(at: _Place) -> Iterator[Block]:
+    count = len(at.design.lengths)
+    row, column = _pairs_within(at.white, at.design.lengths.certificate)
+    own, along = at.white.own[column], at.white.direction
+    value = ((row == column) - along[row] * along[column]) / own
+    yield _block("length", (at.places.lengths.start + row, column, value), np.arange(count))
+
+
+def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers]:
+    """All pairs of rows that whitening mixes, each with itself as well."""
+    every = np.arange(len(group))
+    if not white.direction.any():
+        return every, every
+    pairs = []
+    for certificate in np.unique(group):
+        own = np.flatnonzero(group == certificate)
+        pairs.append(np.stack(np.meshgrid(own, own, indexing="ij")).reshape(2, -1))
+    row, column = np.concatenate(pairs, axis=1)
+    return row, column
+
+
+def _single_items(at: _Place) -> Iterator[Block]:
+    """Priors, co-ordinates and distances: a value that is stated too large makes residuals smaller."""
+    design = at.design
+    kinds: tuple[tuple[Kind, slice, Array], ...] = (
+        ("prior", at.places.priors, design.priors.uncertainty),
+        ("coordinate", at.places.coordinates, design.coordinates.uncertainty),
+        ("distance", at.places.distances, design.distances.uncertainty),
+    )
+    for kind, rows, uncertainty in kinds:
+        every = np.arange(len(uncertainty))
+        axis = design.coordinates.axis if kind == "coordinate" else -1
+        yield _block(kind, (rows.start + every, every, -1.0 / uncertainty), every, axis)
+
+
+def _dirty_balls(at: _Place) -> Iterator[Block]:
+    """A ball that is read several times in a position, displaced there; read once, it is the same as its reading."""
+    d = at.design.dimension
+    key = at.readings.ball * len(at.design.position_names) + at.readings.position
+    _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+    number = np.where(count > 1, np.cumsum(count > 1) - 1, -1)
+    rows = np.flatnonzero(number[group] >= 0)
+    row = d * rows[:, None] + np.arange(d)
+    column = d * number[group[rows]][:, None] + np.arange(d)
+    subject = np.repeat(at.chosen[first[count > 1]], d)
+    axis = np.tile(np.arange(d), int((count > 1).sum()))
+    yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
+
+
+def _slips(at: _Place) -> Iterator[Block]:
+    """Plates that slipped after half of a position's readings, or between two probes."""
+    d = at.design.dimension
+    for k in at.has_plate:
+        rows = np.flatnonzero(at.readings.position == k)
+        probe = at.readings.probe[rows]
+        changes = np.flatnonzero(np.diff(probe)) + 1
+        # Between probes only where each has its readings together.
+        between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
+        for start in np.unique(np.append(between, len(rows) // 2)):
+            moved = rows[start:]
+            if not 0 < start < len(rows):
+                continue
+            arm = at.arm[rows]
+            turns = rotation_sensitivity(at.arm[moved] - arm.mean(axis=0))
+            first = at.chosen[moved[0]]
+            shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
+            yield _block("shift", at.of_readings(moved, shifts), [k] * d, np.arange(d), first)
+            about = np.arange(3) if d == 3 else np.array([2])
+            yield _block("turn", at.of_readings(moved, turns), [k] * len(about), about, first)
+
+
+def _probes(at: _Place) -> Iterator[Block]:
+    """Probes whose offsets are stated too large; one that is estimated cannot be, and what is known of it is a prior."""
+    design, state = at.design, at.state
+    d, offsets = design.dimension, probe_offsets(design, state)
+    given = design.lengths
+    for probe in np.unique(design.readings.probe):
+        fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
+        if not fixed.any():
+            continue
+        read = design.readings.probe == probe
+        rate = np.zeros((len(design.readings), d, d))
+        p = np.broadcast_to(offsets[probe], (int(read.sum()), d))
+        rate[read] = offset_sensitivity(design.model, at.x[read], state.a, p)
+        rate = rate[:, :, fixed]
+        rows = np.flatnonzero(at.readings.probe == probe)
+        apart = rate[given.first] - np.where(given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)])
+        of_lengths = np.einsum("md,mdk->mk", at.unit, apart)
+        entries = _joined(at.of_readings(rows, rate[at.chosen[rows]]), at.of_lengths(of_lengths))
+        yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
+
+
+def _length_values(at: _Place) -> Iterator[Block]:
+    """Certified lengths that are stated too long and are read several times."""
+    given = at.design.lengths
+    known = np.ones(len(given), bool) if given.free is None else given.free < 0
+    numbers, count = np.unique(given.certificate[known], return_counts=True)
+    for number in numbers[count > 1]:
+        entries = at.of_lengths(-1.0 * (given.certificate == number)[:, None])
+        yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
+
+
+def _scales(at: _Place) -> Iterator[Block]:
+    """Certificates of an artefact of which all values are too long by one ratio."""
+    design, places = at.design, at.places
+    known = np.ones(len(design.lengths), bool) if design.lengths.free is None else design.lengths.free < 0
+    for artefact in range(len(design.artefact_names)):
+        of_distances = np.flatnonzero(design.ball_artefact[design.distances.first] == artefact)
+        of_coordinates = np.flatnonzero(design.ball_artefact[design.coordinates.ball] == artefact)
+        of_lengths = known & (design.ball_artefact[design.readings.ball[design.lengths.first]] == artefact)
+        if len(of_distances) + len(of_coordinates) + len(np.unique(design.lengths.certificate[of_lengths])) < 2:
+            continue
+        parts = [
+            (start + rows, np.zeros(len(rows), np.int64), -given.value[rows] / given.uncertainty[rows])
+            for start, rows, given in (
+                (places.distances.start, of_distances, design.distances),
+                (places.coordinates.start, of_coordinates, design.coordinates),
+            )
+        ]
+        columns = -np.where(of_lengths, design.lengths.value, 0.0)[:, None]
+        yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
+
+
+def _expansions(at: _Place) -> Iterator[Block]:
+    """Artefacts that are larger in one position."""
+    design = at.design
+    values = length_values(design, at.state)
+    of_lengths = design.readings.position[design.lengths.first]
+    for k in range(len(design.position_names)):
+        rows = np.flatnonzero(at.readings.position == k)
+        if not len(rows) and not (of_lengths == k).any():
+            continue
+        away = at.arm[rows] - at.arm[rows].mean(axis=0) if len(rows) else at.arm[rows]
+        columns = np.where(of_lengths == k, values, 0.0)[:, None]
+        yield _block("expansion", _joined(at.of_readings(rows, away[:, :, None]), at.of_lengths(columns)), k)
+
+
+BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (
+    _single_readings,
+    _single_lengths,
+    _single_items,
+    _dirty_balls,
+    _slips,
+    _probes,
+    _length_values,
+    _scales,
+    _expansions,
+)

@@ -1,0 +1,160 @@
+"""Redundancy, minimal detectable biases and their effects for all observations and events of a design."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from simulator.design import Design, Integers, nominal_state
+from simulator.estimation.covariance import covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.hat import row_places
+from simulator.estimation.parameters import shared_layout
+from simulator.experiment.model import Experiment
+from simulator.layout import lay_out
+from simulator.machines.protocol import Array
+from simulator.threads import single_threaded
+
+from .effects import SYMBOLS, Functions, Largest, ball_distances, error_functions, point_distances
+from .patterns import Patterns, patterns
+from .power import noncentrality
+from .response import responses
+
+FALSE_ALARM, POWER = 0.001, 0.8
+
+# An effect below this share of the bias, in metres per unit, counts as none.
+NO_EFFECT = 1e-6
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Largest changes `change` (k,) of one kind of function by a unit of each pattern's bias, and where.
+
+    `first` and `second` (k,) are the places of the function that changes most, -1 where none is determined;
+    `uncertainty` (k,) is its standard uncertainty.
+    """
+
+    change: Array
+    first: Integers
+    second: Integers
+    uncertainty: Array
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """What a design notices of biases, for each of its patterns.
+
+    `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands for the mean of its
+    repeats, which have `among_repeats` degrees of freedom more among themselves. `information` (k,) is what is left of
+    a pattern in the residuals, per unit of the bias squared, and 0 where that is nil. `effects` are by symbol, U4 to
+    U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma being known or estimated from the
+    observations, less the one suspected.
+    """
+
+    label: str
+    title: str
+    design: Design
+    patterns: Patterns
+    redundancy: Array
+    among_repeats: int
+    information: Array
+    effects: dict[str, Effects]
+    degrees_of_freedom: int
+    deficiency: int
+    sigma_is_estimated: bool
+    false_alarm: float
+    power: float
+    noncentrality: float
+
+    @property
+    def detectable(self) -> Array:
+        """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can be detected."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.where(self.information > 0.0, self.noncentrality / np.sqrt(self.information), np.inf))
+
+    def is_harmless(self, k: int) -> bool:
+        """Whether a bias changes no distance, between balls or between corrected points."""
+        return all(self.effects[symbol].change[k] <= NO_EFFECT * self.size(k) for symbol in ("U5", "U6"))
+
+    def size(self, k: int) -> float:
+        """About how far, in metres, a unit of a bias moves what it is about."""
+        extent = float(np.ptp(self.design.balls, axis=0).max(initial=0.0))
+        return 1.0 if self.patterns.unit(k) == "m" else max(extent, 1e-3)
+
+
+def reliability(
+    experiment: Experiment,
+    false_alarm: float = FALSE_ALARM,
+    power: float = POWER,
+    sigma: Literal["estimated", "given"] | None = None,
+) -> Reliability:
+    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file says."""
+    return reliability_of(
+        lay_out(experiment), false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment
+    )
+
+
+@single_threaded
+def reliability_of(
+    design: Design,
+    false_alarm: float = FALSE_ALARM,
+    power: float = POWER,
+    sigma_is_estimated: bool = False,
+    experiment: Experiment | None = None,
+) -> Reliability:
+    """Reliability of a design at zero machine error, where sigma is known or estimated."""
+    layout, state = shared_layout(design), nominal_state(design)
+    factor = eliminate(design, layout, state)
+    found_rank = spectrum(factor)
+    spread = covariance(design, factor, found_rank)
+    given = patterns(design, state, None)
+    functions = {
+        "U4": error_functions(design, layout, state, spread),
+        "U6": point_distances(design, layout, state, spread),
+    }
+    balls_of = ball_distances(design, state, spread)
+    redundancy, information = np.zeros(len(row_places(design))), np.zeros(len(given))
+    effects = {symbol: _nothing(len(given)) for symbol in SYMBOLS}
+    for one in responses(design, layout, state, None, spread, given):
+        redundancy[one.rows] = 1.0 - one.hat
+        information[one.index] = one.information
+        asked = np.unique(one.own.indices // design.dimension) if len(one.rows) else np.zeros(0, np.int64)
+        for symbol in SYMBOLS:
+            of_symbol = balls_of(asked) if symbol == "U5" else functions[symbol]
+            _put(effects[symbol], one.index, of_symbol, of_symbol.largest(one))
+    repeats = design.readings.repeats[design.plate_readings]
+    freedom = design.observations - design.parameter_count + found_rank.deficiency
+    return Reliability(
+        experiment.label if experiment else "",
+        experiment.title if experiment else "",
+        design,
+        given,
+        redundancy,
+        design.dimension * int((repeats - 1).sum()),
+        information,
+        effects,
+        freedom,
+        found_rank.deficiency,
+        sigma_is_estimated,
+        false_alarm,
+        power,
+        noncentrality(false_alarm, power, freedom - 1 if sigma_is_estimated else math.inf),
+    )
+
+
+def _nothing(count: int) -> Effects:
+    return Effects(np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan))
+
+
+def _put(effects: Effects, index: Integers, functions: Functions, found: Largest) -> None:
+    """Enter what patterns `index` change."""
+    effects.change[index] = found.change
+    effects.uncertainty[index] = found.uncertainty
+    known = found.function >= 0
+    effects.first[index[known]] = functions.first[found.function[known]]
+    effects.second[index[known]] = functions.second[found.function[known]]
+
+
