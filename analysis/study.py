@@ -14,6 +14,7 @@ from simulator.estimation.gauss_newton import Solution, estimate
 from simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
 from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
 from simulator.experiment.model import Experiment
+from simulator.experiment.yamltree import Mark
 from simulator.geometry.motions import vector_from_rotation
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array, Unit
@@ -24,6 +25,7 @@ from simulator.threads import single_threaded
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
+from .reliability.suspects import Suspect, suspects
 from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, uncertainties
 
@@ -83,6 +85,7 @@ class Fit:
 
     `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
     freedom, or 1 where the file says that they are given. `adjustments` are those of a three-dimensional metric.
+    `suspects` are biases that the residuals show, which nothing else here heeds; `marks` tell where readings stand.
     """
 
     label: str
@@ -99,6 +102,8 @@ class Fit:
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
     tasks: tuple[TaskUncertainty, ...] = ()
+    suspects: tuple[Suspect, ...] = ()
+    marks: tuple[Mark, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -207,6 +212,8 @@ def fit(
         plate_coordinates(experiment, design, solution.state, spread, scale),
         _adjustments(design, layout, solution, spread, scale, freedom if estimated else np.inf),
         task_uncertainties(design, layout, solution.state, spread, scale),
+        tuple(suspects(design, solution, observed.x, freedom, estimated)),
+        observed.marks,
     )
 
 

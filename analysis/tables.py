@@ -188,7 +188,12 @@ def fit_lines(fit: Fit) -> list[str]:
     lines += [summary, "", *aligned(rows, [True, True, True])]
     if not fit.converged:
         return lines
-    lines += ["", *residual_table(fit), "", *uncertainty_table(fit.quantities), ""]
+    lines += ["", *residual_table(fit)]
+    if fit.suspects:
+        from .reliability.wording import suspect_lines
+
+        lines += suspect_lines(fit.suspects, fit.marks)
+    lines += ["", *uncertainty_table(fit.quantities), ""]
     lines += [*task_table(fit.tasks), ""] if fit.tasks else []
     rows = [["parameter", "value", "standard uncertainty", "unit"]]
     machine_and_poses = [
@@ -278,6 +283,11 @@ def plan_data(plan: Plan) -> dict[str, Any]:
 
 def fit_data(fit: Fit) -> dict[str, Any]:
     """A fit as plain data in metres and radians at full precision; what is undetermined is None."""
+    suspected: dict[str, Any] = {}
+    if fit.suspects:
+        from .reliability.wording import suspect_data
+
+        suspected = {"suspected": suspect_data(fit.suspects, fit.marks)}
     return {
         "experiment": fit.label,
         "title": fit.title,
@@ -305,6 +315,7 @@ def fit_data(fit: Fit) -> dict[str, Any]:
             }
             for one in fit.largest
         ],
+        **suspected,
         "estimates": {
             e.name: {
                 "value": finite(e.value),

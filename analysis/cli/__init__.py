@@ -24,6 +24,7 @@ def parser() -> argparse.ArgumentParser:
         lengths,
         map,
         reach,
+        reliability,
         report,
         reproduce,
         run,
@@ -40,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    experiments = (check, run, simulate, fit, compare, reach, lengths, sweep, export, report)
+    experiments = (check, run, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
     return top

@@ -107,7 +107,7 @@ def point_distances(design: Design, layout: SharedLayout, state: State, found: C
 
 
 def ball_distances(design: Design, state: State, found: Covariance) -> Callable[[Integers], Functions]:
-    """U5: distances between balls of each artefact; of large ones those that end at some balls, or at those asked for."""
+    """U5: distances between balls of each artefact; of large ones, those that end at some or the asked balls."""
     from scipy.sparse import coo_array
 
     n, d = design.balls.shape

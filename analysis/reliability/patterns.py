@@ -1,7 +1,7 @@
 """What may be wrong with observations: a single one, or an event that touches many, each as a pattern over all rows.
 
-A pattern is what one unit of the bias changes in the whitened residuals. Single observations come first, in the order of
-their rows; the events after them.
+A pattern is what one unit of the bias changes in the whitened residuals. Single observations come first, in the
+order of their rows; the events after them.
 """
 
 from __future__ import annotations
@@ -244,7 +244,7 @@ def _slips(at: _Place) -> Iterator[Block]:
 
 
 def _probes(at: _Place) -> Iterator[Block]:
-    """Probes whose offsets are stated too large; one that is estimated cannot be, and what is known of it is a prior."""
+    """Probes whose offsets are stated too large; of one that is estimated only its prior can be wrong."""
     design, state = at.design, at.state
     d, offsets = design.dimension, probe_offsets(design, state)
     given = design.lengths

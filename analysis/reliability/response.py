@@ -62,9 +62,7 @@ def responses(
         of_ball = some.ball >= 0
         at = np.flatnonzero(of_ball)
         columns = d * some.ball[at][:, None] + np.arange(d)
-        private = csr_array(
-            (some.own[at].ravel(), (np.repeat(at, d), columns.ravel())), shape=(len(some.rows), n * d)
-        )
+        private = csr_array((some.own[at].ravel(), (np.repeat(at, d), columns.ravel())), shape=(len(some.rows), n * d))
         here = np.zeros(matrix.shape[0], bool)
         here[some.rows] = True
         local = np.flatnonzero(given.is_local & here[first_row])

@@ -156,5 +156,3 @@ def _put(effects: Effects, index: Integers, functions: Functions, found: Largest
     known = found.function >= 0
     effects.first[index[known]] = functions.first[found.function[known]]
     effects.second[index[known]] = functions.second[found.function[known]]
-
-

@@ -1,8 +1,9 @@
 """Rows of the hat matrix's root: what the estimate takes up of each observation, in batches.
 
-With the square root G of the covariance and the whitened Jacobian J, the rows of Q = J G are orthonormal as columns, and
-H = Q Q' is the hat matrix. As G has one block for each ball, a row of Q has a part that it may share with all others and
-one of d columns that only rows of the same ball have. Neither J nor H is formed; nothing here needs full rank.
+With the square root G of the covariance and the whitened Jacobian J, the columns of Q = J G are orthonormal, and
+H = Q Q' is the hat matrix. As G has one block for each ball, a row of Q has a part that it may share with all
+others and one of d columns that only rows of the same ball have. Neither J nor H is formed; nothing here needs full
+rank.
 """
 
 from __future__ import annotations
@@ -102,16 +103,16 @@ def hat_rows(
         yield by_shared(places.lengths.start, length_shared_rows(design, layout, state, x)[1])
     if len(design.priors):
         yield by_shared(places.priors.start, prior_rows(design, layout, state)[1])
-    for some in _slices(len(design.coordinates)):
-        ball, derivative = design.coordinates.ball[some], coordinate_rows(design, state).derivative[some, None]
+    for part in _slices(len(design.coordinates)):
+        ball, derivative = design.coordinates.ball[part], coordinate_rows(design, state).derivative[part, None]
         own = (derivative @ found.ball_own[ball])[:, 0]
-        rows = places.coordinates.start + np.arange(some.start, some.stop)
+        rows = places.coordinates.start + np.arange(part.start, part.stop)
         yield HatRows(rows, (derivative @ found.ball[ball])[:, 0], own, ball)
-    for some in _slices(len(design.distances)):
-        first, second = design.distances.first[some], design.distances.second[some]
-        derivative = distance_rows(design, state).derivative[some, None]
+    for part in _slices(len(design.distances)):
+        first, second = design.distances.first[part], design.distances.second[part]
+        derivative = distance_rows(design, state).derivative[part, None]
         common = (derivative @ (found.ball[first] - found.ball[second]))[:, 0]
-        rows = places.distances.start + np.arange(some.start, some.stop)
+        rows = places.distances.start + np.arange(part.start, part.stop)
         # Balls that distances tie to others have no part of their own.
         yield HatRows(rows, common, np.zeros((len(rows), d)), np.full(len(rows), -1))
 

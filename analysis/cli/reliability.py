@@ -1,0 +1,87 @@
+"""`ballplate reliability`: which biases a design would notice, and what those do that it would not."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentTypeError, Namespace
+from pathlib import Path
+
+from .common import add_file, add_json
+
+WRONG_USAGE, BAD_FILE = 2, 3
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser = commands.add_parser(
+        "reliability",
+        help="tell which biases of readings and certificates would be noticed, and what the others do",
+        description="Compute the redundancy of every observation of a design, the smallest biases of readings, "
+        "certificates, probes and positions that a test of the residuals finds, and what a bias just too small for it "
+        "changes in the error function (U4), in distances between balls (U5) and between corrected points (U6).",
+    )
+    add_file(parser, several=True)
+    parser.add_argument(
+        "--false-alarm",
+        metavar="0.1%",
+        type=_share,
+        default=0.001,
+        help="chance that the test of one bias finds one where there is none; default 0.1%%",
+    )
+    parser.add_argument(
+        "--power", metavar="80%", type=_share, default=0.8, help="chance that a detectable bias is found; default 80%%"
+    )
+    parser.add_argument(
+        "--sigma",
+        choices=("estimated", "given"),
+        help="test against the scatter of the residuals, or the stated uncertainties; default: what the file says",
+    )
+    parser.add_argument("--all", action="store_true", help="list every event, not only the worst of a kind")
+    parser.add_argument("--csv", metavar="FILE", type=Path, help="write a row for every observation")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def _share(text: str) -> float:
+    digits = text.removesuffix("%").strip()
+    try:
+        value = float(digits)
+    except ValueError:
+        value = float("nan")
+    if not text.endswith("%") or not 1e-10 <= value <= 99.9999:
+        raise ArgumentTypeError(f'expected a percentage between 0% and 100%, such as 0.1%, not "{text}"')
+    return value / 100.0
+
+
+def run(options: Namespace) -> int:
+    """Tell the reliability of all experiments of the files."""
+    from ..reliability.study import reliability
+    from ..reliability.tables import reliability_data, reliability_lines, write_observations
+    from .common import experiments, print_json, print_lines
+
+    if options.power <= options.false_alarm:
+        print("ballplate reliability: --power must be above --false-alarm; any test has that much", file=sys.stderr)
+        return WRONG_USAGE
+    chosen = experiments(options)
+    if options.csv is not None and len(chosen) > 1:
+        names = ", ".join(str(one.name or one.label) for one in chosen)
+        text = f"--csv writes the table of one experiment; choose one with --variant: {names}"
+        print(f"ballplate reliability: {text}", file=sys.stderr)
+        return WRONG_USAGE
+    found = []
+    for number, experiment in enumerate(chosen):
+        result = reliability(experiment, options.false_alarm, options.power, options.sigma)
+        if options.json:
+            found.append(reliability_data(result))
+        else:
+            print_lines([*([""] if number else []), *reliability_lines(result, options.all)])
+        if options.csv is not None:
+            try:
+                with options.csv.open("w", encoding="utf-8", newline="") as stream:
+                    write_observations(stream, result)
+            except OSError as error:
+                text = f"cannot be written ({error.strerror or error}); check the folder"
+                print(f"{options.csv}: {text}", file=sys.stderr)
+                return BAD_FILE
+    if options.json:
+        print_json(found)
+    return 0

@@ -1,0 +1,72 @@
+"""Names of observations and events, as a metrologist would say them."""
+
+from __future__ import annotations
+
+from simulator.design import Design
+from simulator.estimation.parameters import AXIS_NAMES
+
+from .patterns import Patterns
+
+
+def name(given: Patterns, k: int) -> str:
+    """What a pattern is about."""
+    kind, subject = given.kind[k], int(given.subject[k])
+    design, axis = given.design, int(given.axis[k])
+    letter = AXIS_NAMES[axis] if axis >= 0 else ""
+    if kind == "reading":
+        return f"{reading_name(design, subject)}, {letter}"
+    if kind == "length":
+        return f"{length_name(design, subject)} in position {design.position_names[_position(design, subject)]}"
+    if kind == "prior":
+        return f"prior of {design.priors.names[subject]}"
+    if kind == "coordinate":
+        return f"{letter} of ball {design.ball_label(int(design.coordinates.ball[subject]))}"
+    if kind == "distance":
+        first, second = (int(end[subject]) for end in (design.distances.first, design.distances.second))
+        return f"distance {design.ball_label(first)} to {design.ball_names[second]}"
+    if kind == "ball":
+        ball, position = design.readings.ball[subject], design.readings.position[subject]
+        return f"dirt on ball {design.ball_label(int(ball))} in position {design.position_names[position]}, {letter}"
+    if kind in ("shift", "turn"):
+        how = f"along {letter}" if kind == "shift" else f"turned about {letter}"
+        return f"position {design.position_names[subject]} slipped {slip_place(given, k)}, {how}"
+    if kind == "probe":
+        return f"offset {letter} of probe {design.probe_names[subject]}"
+    if kind == "length value":
+        return f"certified {length_name(design, subject)}"
+    if kind == "scale":
+        return f"scale of the certificate of {design.artefact_names[subject]}"
+    return f"expansion in position {design.position_names[subject]}"
+
+
+def slip_place(given: Patterns, k: int) -> str:
+    """Where in a position a slip of the artefact is looked for."""
+    design, position, start = given.design, int(given.subject[k]), int(given.start[k])
+    rows = [i for i in design.plate_readings.tolist() if design.readings.position[i] == position]
+    at = rows.index(start)
+    before, after = (int(design.readings.probe[rows[i]]) for i in (at - 1, at))
+    if before != after and len({*design.readings.probe[rows[at:]].tolist()} & {before}) == 0:
+        return f"before probe {design.probe_names[after]}"
+    return f"half-way, before ball {design.ball_label(int(design.readings.ball[start]))}"
+
+
+def reading_name(design: Design, reading: int) -> str:
+    """A reading by ball and position, and by its probe where there are several."""
+    readings = design.readings
+    position = design.position_names[readings.position[reading]]
+    probe = f" with {design.probe_names[readings.probe[reading]]}" if len(design.probe_names) > 1 else ""
+    return f"ball {design.ball_label(int(readings.ball[reading]))} in position {position}{probe}"
+
+
+def length_name(design: Design, length: int) -> str:
+    """A length of a standard by its ends, or a gauge's radius."""
+    given, readings = design.lengths, design.readings
+    ball = int(readings.ball[given.first[length]])
+    artefact = design.artefact_names[design.ball_artefact[ball]]
+    if given.second[length] < 0:
+        return f"radius of {artefact} (ball {design.ball_names[ball]})"
+    return f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]} of {artefact}"
+
+
+def _position(design: Design, length: int) -> int:
+    return int(design.readings.position[design.lengths.first[length]])

@@ -1,0 +1,309 @@
+"""Reliability as text for people, as plain data for programs, and as a table for spreadsheets."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, TextIO
+
+import numpy as np
+
+from simulator.design import Integers
+from simulator.estimation.parameters import AXIS_NAMES
+
+from ..tables import SHOWN, aligned, finite, number
+from .effects import MOST_PLACES, SYMBOLS
+from .names import name
+from .patterns import SINGLE, Kind
+from .study import Reliability
+
+# Observations of a kind that a table names.
+MOST = 5
+
+EVENTS: tuple[tuple[Kind, ...], ...] = (
+    ("ball",),
+    ("shift",),
+    ("turn",),
+    ("probe",),
+    ("length value",),
+    ("scale",),
+    ("expansion",),
+)
+ITEMS: tuple[Kind, ...] = ("length", "prior", "coordinate", "distance")
+
+
+def reliability_lines(result: Reliability, with_all: bool = False) -> list[str]:
+    """Reliability as lines of text; `with_all` lists every event, not only the worst of each position or probe."""
+    lines = [*_heading(result), "", *_positions(result)]
+    readings = result.patterns.of_kind("reading")
+    items = result.patterns.of_kind(*ITEMS)
+    for title, chosen in (("worst readings", readings), ("worst items", items)):
+        if len(chosen):
+            lines += ["", *_table(result, title, _worst_first(result, chosen)[:MOST], with_redundancy=True)]
+    events: list[int] = []
+    for kinds in EVENTS:
+        found = result.patterns.of_kind(*kinds)
+        events += found.tolist() if with_all else _worst_of_each(result, found)
+    if events:
+        lines += ["", *_table(result, "events", events, with_redundancy=False)]
+    return lines + _closing(result, with_all)
+
+
+def _heading(result: Reliability) -> list[str]:
+    design, count = result.design, design_observations(result)
+    rank = f"rank deficiency {result.deficiency}" if result.deficiency else "full rank"
+    sigma = "estimated from the other residuals" if result.sigma_is_estimated else "as given"
+    total = result.redundancy.sum() + result.among_repeats
+    lines = [
+        f"{result.label}: {result.title}",
+        f"{rank}; {design.parameter_count} parameters, {count} observations; redundancy {number(total)} in all, "
+        f"{number(total / count, 3)} of an observation on average",
+        f"detectable: found with a power of {_percent(result.power)} by a test with a false alarm of "
+        f"{_percent(result.false_alarm)}, sigma {sigma}: {number(result.noncentrality)} standard deviations",
+        "effects: the most that a bias just detectable changes in U4 (error function), U5 (distances between "
+        "balls) and U6 (distances between corrected points), with the standard uncertainty there in brackets",
+    ]
+    if result.among_repeats:
+        lines.append("a reading stands for the mean of its repeats")
+    if math.isinf(result.noncentrality):
+        lines.append("too few degrees of freedom to estimate sigma without what is tested; nothing is detectable")
+    return lines
+
+
+def design_observations(result: Reliability) -> int:
+    """Number of observations, repeats counted."""
+    return result.design.observations
+
+
+def _positions(result: Reliability) -> list[str]:
+    """A summary of the readings of plates by position."""
+    design, given = result.design, result.patterns
+    readings = given.of_kind("reading")
+    head = ["position", "readings", "redundancy: smallest", "average", "detectable, um", "largest at"]
+    rows = [[*head, "effect on U6, um", "largest at"]]
+    position = design.readings.position[given.subject[readings]]
+    of_u6 = _effect(result, "U6")
+    for k in np.unique(position):
+        own = readings[position == k]
+        by_bias, by_effect = own[result.detectable[own].argmax()], own[_finite_or_zero(of_u6[own]).argmax()]
+        u = f"{number(1e6 * of_u6[by_effect], 3)} ({number(1e6 * result.effects['U6'].uncertainty[by_effect], 3)})"
+        rows.append(
+            [
+                design.position_names[k],
+                str(len(own) // design.dimension),
+                number(result.redundancy[own].min(), 3),
+                number(result.redundancy[own].mean(), 3),
+                _shown(result.detectable[by_bias], "m"),
+                _short(result, int(by_bias)),
+                u if len(design.points) else "-",
+                _short(result, int(by_effect)),
+            ]
+        )
+    if len(rows) == 1:
+        return ["no readings of plates"]
+    return aligned(rows, [False, True, True, True, True, False, True, False])
+
+
+def _short(result: Reliability, k: int) -> str:
+    """A reading's name without its position."""
+    head, _, tail = name(result.patterns, k).partition(" in position ")
+    design, reading = result.design, int(result.patterns.subject[k])
+    return head + tail.removeprefix(design.position_names[design.readings.position[reading]])
+
+
+def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundancy: bool) -> list[str]:
+    rows = [[title, *(["redundancy"] if with_redundancy else []), "detectable", "unit", *(f"{s}, um" for s in SYMBOLS)]]
+    rows[0].append("U6 at")
+    for k in chosen:
+        unit = result.patterns.unit(k)
+        cells = [name(result.patterns, k)]
+        if with_redundancy:
+            cells.append(number(result.redundancy[k], 3))
+        cells += [_shown(result.detectable[k], unit), SHOWN[unit]]
+        for symbol in SYMBOLS:
+            effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
+            told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
+            cells.append("-" if math.isnan(effect) else told)
+        cells.append(_where(result, "U6", k))
+        rows.append(cells)
+    right = [False, *([True] if with_redundancy else []), True, False, True, True, True, False]
+    return aligned(rows, right)
+
+
+def _effect_number(result: Reliability, symbol: str, k: int) -> str:
+    """An effect in micrometres, 0 where there is none but rounding."""
+    if result.effects[symbol].change[k] <= 1e-9 * result.size(k):
+        return "0"
+    return number(1e6 * _effect(result, symbol)[k], 3)
+
+
+def _effect(result: Reliability, symbol: str) -> np.ndarray:
+    """Effects (k,) of biases that are just detectable; NaN where nothing can be detected or nothing is determined."""
+    effects = result.effects[symbol]
+    known = np.isfinite(result.detectable) & (effects.first >= 0)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, result.detectable * effects.change, np.nan)
+
+
+def _finite_or_zero(values: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(values, nan=0.0, posinf=0.0)
+
+
+def _worst_first(result: Reliability, chosen: Integers) -> list[int]:
+    """Patterns by their effect on U6, then on U5, those that cannot be detected but do harm first."""
+    keys = [_finite_or_zero(_effect(result, symbol)[chosen]) for symbol in ("U5", "U6")]
+    hidden = np.array([_is_dangerous(result, k) for k in chosen.tolist()], bool)
+    return [int(chosen[i]) for i in np.lexsort((chosen, -keys[0], -keys[1], ~hidden))]
+
+
+def _is_dangerous(result: Reliability, k: int) -> bool:
+    return math.isinf(result.detectable[k]) and not result.is_harmless(k)
+
+
+def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
+    """The worst pattern of each subject, or of each position for balls, in the order of the design."""
+    if not len(chosen):
+        return []
+    subject = result.patterns.subject
+    if result.patterns.kind[chosen[0]] == "ball":
+        subject = result.design.readings.position[np.maximum(subject, 0) % max(len(result.design.readings), 1)]
+    worst: dict[int, int] = {}
+    for k in _worst_first(result, chosen):
+        worst.setdefault(int(subject[k]), k)
+    return [worst[key] for key in sorted(worst)]
+
+
+def _closing(result: Reliability, with_all: bool) -> list[str]:
+    """What cannot be detected, in words, and what was left out."""
+    lines = []
+    hidden = np.flatnonzero(result.information <= 0.0).tolist()
+    harmless = [k for k in hidden if result.is_harmless(k)]
+    if harmless:
+        told = _listed(name(result.patterns, k) for k in harmless)
+        lines.append(f"cannot be detected, harmless: {told}: no distance changes, between balls or corrected points")
+    for k in [k for k in hidden if k not in set(harmless)][: 4 * MOST]:
+        unit = result.patterns.unit(k)
+        parts = [
+            f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} um per {SHOWN[unit]}"
+            for symbol in ("U5", "U6")
+            if result.effects[symbol].change[k] > 0.0
+        ]
+        lines.append(f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes {', '.join(parts)}")
+    left = len(hidden) - len(harmless) - 4 * MOST
+    if left > 0:
+        lines.append(f"({left} more that cannot be detected are in --json)")
+    if len(result.patterns.of_kind("reading")) and not len(result.patterns.of_kind("ball")):
+        lines.append("(no ball is read twice in one position: dirt on it is the same as a bias of its reading)")
+    if not with_all:
+        lines.append("(the worst ball of each position, and the worst direction of each event; --all lists the others)")
+    if result.deficiency:
+        lines.append("(functions that the observations leave undetermined are left out)")
+    if len(result.design.points) > MOST_PLACES:
+        lines.append(f"(effects on U6 are those on {MOST_PLACES} of {len(result.design.points)} evaluation points)")
+    return ["", *lines] if lines else []
+
+
+def _listed(names: Iterable[str]) -> str:
+    every = list(names)
+    more = f" and {len(every) - 4 * MOST} more" if len(every) > 4 * MOST else ""
+    return ", ".join(every[: 4 * MOST]) + more
+
+
+def _shown(value: float, unit: str) -> str:
+    return "never" if math.isinf(value) else number(1e6 * value, 3)
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.4g} %"
+
+
+def _where(result: Reliability, symbol: str, k: int) -> str:
+    """Where the largest effect is."""
+    effects, design = result.effects[symbol], result.design
+    first, second = int(effects.first[k]), int(effects.second[k])
+    if first < 0 or result.effects[symbol].change[k] <= 1e-9 * result.size(k):
+        return ""
+    if symbol == "U4":
+        return f"point {first + 1} {AXIS_NAMES[second]}"
+    if symbol == "U5":
+        return f"ball {design.ball_label(first)} to ball {design.ball_label(second)}"
+    return f"point {first + 1} to point {second + 1}"
+
+
+def reliability_data(result: Reliability) -> dict[str, Any]:
+    """Reliability as plain data in metres, radians and ratios; None where nothing can be detected or determined."""
+    singles = len(result.redundancy)
+    return {
+        "experiment": result.label,
+        "title": result.title,
+        "parameters": result.design.parameter_count,
+        "observations": result.design.observations,
+        "rank_deficiency": result.deficiency,
+        "degrees_of_freedom": result.degrees_of_freedom,
+        "sigma_is_estimated": result.sigma_is_estimated,
+        "false_alarm": result.false_alarm,
+        "power": result.power,
+        "noncentrality": finite(result.noncentrality),
+        "redundancy": float(result.redundancy.sum()) + result.among_repeats,
+        "redundancy_among_repeats": result.among_repeats,
+        "observations_by_name": [
+            {**_pattern_data(result, k), "redundancy": float(result.redundancy[k])} for k in range(singles)
+        ],
+        "events": [_pattern_data(result, k) for k in range(singles, len(result.patterns))],
+    }
+
+
+def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
+    hidden = math.isinf(result.detectable[k])
+    return {
+        "name": name(result.patterns, k),
+        "kind": str(result.patterns.kind[k]),
+        "unit": result.patterns.unit(k),
+        "minimal_detectable": finite(float(result.detectable[k])),
+        **({"harmless": result.is_harmless(k)} if result.information[k] <= 0.0 else {}),
+        "effects": {
+            symbol: {
+                "per_unit" if hidden else "change": float(
+                    result.effects[symbol].change[k] * (1.0 if hidden else result.detectable[k])
+                ),
+                "standard_uncertainty": finite(float(result.effects[symbol].uncertainty[k])),
+                "at": _where(result, symbol, k),
+            }
+            for symbol in SYMBOLS
+            if result.effects[symbol].first[k] >= 0
+        },
+    }
+
+
+def write_observations(stream: TextIO, result: Reliability) -> None:
+    """Write a row for every observation: each co-ordinate of each reading, and each item."""
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(
+        ["kind", "position", "ball", "probe", "axis", "name", "redundancy", "unit", "minimal_detectable"]
+        + [f"{symbol}_{what}" for symbol in SYMBOLS for what in ("effect_um", "standard_uncertainty_um", "at")]
+    )
+    design, given = result.design, result.patterns
+    effects = {symbol: _effect(result, symbol) for symbol in SYMBOLS}
+    for k in np.flatnonzero(np.isin(given.kind, SINGLE)).tolist():
+        names = ["", "", "", ""]
+        if given.kind[k] == "reading":
+            i = int(given.subject[k])
+            readings = design.readings
+            position, probe = design.position_names[readings.position[i]], design.probe_names[readings.probe[i]]
+            names = [position, design.ball_label(int(readings.ball[i])), probe, AXIS_NAMES[given.axis[k]]]
+        unit = given.unit(k)
+        cells: list[Any] = [given.kind[k], *names, name(given, k), repr(float(result.redundancy[k])), SHOWN[unit]]
+        cells.append(_cell(result.detectable[k]))
+        for symbol in SYMBOLS:
+            cells += [
+                _cell(effects[symbol][k]),
+                _cell(result.effects[symbol].uncertainty[k]),
+                _where(result, symbol, k),
+            ]
+        writer.writerow(cells)
+
+
+def _cell(value: float) -> str:
+    """A small number in micro-units with all its digits, empty where there is none."""
+    return repr(float(1e6 * value)) if math.isfinite(value) else ""
