@@ -83,7 +83,7 @@ class Functions:
 
 def error_functions(design: Design, layout: SharedLayout, state: State, found: Covariance) -> Functions:
     """U4: each component of the error function at the evaluation points that is determined."""
-    from scipy.sparse import eye_array
+    from scipy.sparse import csr_array, eye
 
     probes = np.full(len(design.points), design.point_probe)
     rates = correction_rows(design, layout, state, design.points, probes)
@@ -91,9 +91,9 @@ def error_functions(design: Design, layout: SharedLayout, state: State, found: C
     size = np.sqrt(((rates * found.scale) ** 2).sum(axis=2))
     uncertainty = blank(np.sqrt((spread**2).sum(axis=2)), null, size).ravel()
     known = np.flatnonzero(~np.isnan(uncertainty))
-    operator = eye_array(len(uncertainty), format="csr")[known]
+    operator = csr_array(eye(len(uncertainty), format="csr"))[known]
     point, axis = np.divmod(known, design.dimension)
-    return Functions(operator, spread.reshape(len(uncertainty), -1), None, uncertainty[known], point, axis)
+    return Functions(operator, spread.reshape(len(uncertainty), spread.shape[2]), None, uncertainty[known], point, axis)
 
 
 def point_distances(design: Design, layout: SharedLayout, state: State, found: Covariance) -> Functions:
@@ -183,11 +183,11 @@ def _distances(
     column = np.concatenate([d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1)
     value = np.concatenate([unit, -unit], axis=1)
     operator = coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
-    change = operator @ null.reshape(n * d, -1)
+    change = operator @ null.reshape(n * d, null.shape[2])
     limit = 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
     known = np.sqrt((change**2).sum(axis=1)) <= limit
     operator, first, second = operator[known], first[known], second[known]
-    flat = common.reshape(n * d, -1)
+    flat = common.reshape(n * d, common.shape[2])
     variance = np.zeros(len(first))
     for start in range(0, flat.shape[1], 100):
         variance += ((operator @ flat[:, start : start + 100]) ** 2).sum(axis=1)

@@ -33,7 +33,7 @@ def name(given: Patterns, k: int) -> str:
     if kind == "probe":
         return f"offset {letter} of probe {design.probe_names[subject]}"
     if kind == "length value":
-        return f"certified {length_name(design, subject)}"
+        return f"certified {length_name(design, subject, of_reading=False)}"
     if kind == "scale":
         return f"scale of the certificate of {design.artefact_names[subject]}"
     return f"expansion in position {design.position_names[subject]}"
@@ -58,13 +58,13 @@ def reading_name(design: Design, reading: int) -> str:
     return f"ball {design.ball_label(int(readings.ball[reading]))} in position {position}{probe}"
 
 
-def length_name(design: Design, length: int) -> str:
-    """A length of a standard by its ends, or a gauge's radius."""
+def length_name(design: Design, length: int, of_reading: bool = True) -> str:
+    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is certified."""
     given, readings = design.lengths, design.readings
     ball = int(readings.ball[given.first[length]])
     artefact = design.artefact_names[design.ball_artefact[ball]]
     if given.second[length] < 0:
-        return f"radius of {artefact} (ball {design.ball_names[ball]})"
+        return f"radius of {artefact}" + (f" to ball {design.ball_names[ball]}" if of_reading else "")
     return f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]} of {artefact}"
 
 

@@ -51,7 +51,7 @@ def reliability_lines(result: Reliability, with_all: bool = False) -> list[str]:
 
 
 def _heading(result: Reliability) -> list[str]:
-    design, count = result.design, design_observations(result)
+    design, count = result.design, result.design.observations
     rank = f"rank deficiency {result.deficiency}" if result.deficiency else "full rank"
     sigma = "estimated from the other residuals" if result.sigma_is_estimated else "as given"
     total = result.redundancy.sum() + result.among_repeats
@@ -71,11 +71,6 @@ def _heading(result: Reliability) -> list[str]:
     return lines
 
 
-def design_observations(result: Reliability) -> int:
-    """Number of observations, repeats counted."""
-    return result.design.observations
-
-
 def _positions(result: Reliability) -> list[str]:
     """A summary of the readings of plates by position."""
     design, given = result.design, result.patterns
@@ -87,6 +82,7 @@ def _positions(result: Reliability) -> list[str]:
     for k in np.unique(position):
         own = readings[position == k]
         by_bias, by_effect = own[result.detectable[own].argmax()], own[_finite_or_zero(of_u6[own]).argmax()]
+        known = bool(np.isfinite(of_u6[by_effect]))
         u = f"{number(1e6 * of_u6[by_effect], 3)} ({number(1e6 * result.effects['U6'].uncertainty[by_effect], 3)})"
         rows.append(
             [
@@ -96,8 +92,8 @@ def _positions(result: Reliability) -> list[str]:
                 number(result.redundancy[own].mean(), 3),
                 _shown(result.detectable[by_bias], "m"),
                 _short(result, int(by_bias)),
-                u if len(design.points) else "-",
-                _short(result, int(by_effect)),
+                u if known else "-",
+                _short(result, int(by_effect)) if known else "",
             ]
         )
     if len(rows) == 1:
@@ -125,7 +121,7 @@ def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundan
             effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
             told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
             cells.append("-" if math.isnan(effect) else told)
-        cells.append(_where(result, "U6", k))
+        cells.append("" if math.isinf(result.detectable[k]) else _where(result, "U6", k))
         rows.append(cells)
     right = [False, *([True] if with_redundancy else []), True, False, True, True, True, False]
     return aligned(rows, right)
@@ -181,7 +177,8 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     harmless = [k for k in hidden if result.is_harmless(k)]
     if harmless:
         told = _listed(name(result.patterns, k) for k in harmless)
-        lines.append(f"cannot be detected, harmless: {told}: no distance changes, between balls or corrected points")
+        which = "no distance that is determined changes" if result.deficiency else "no distance changes"
+        lines.append(f"cannot be detected, harmless: {told}: {which}, between balls or corrected points")
     for k in [k for k in hidden if k not in set(harmless)][: 4 * MOST]:
         unit = result.patterns.unit(k)
         parts = [

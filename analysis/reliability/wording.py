@@ -61,7 +61,7 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     if kind == "coordinate":
         return f"{name(given, k)} certified {size} too {high}", "check the certificate"
     if kind in ("distance", "length value"):
-        what = length_name(design, subject) if kind == "length value" else name(given, k)
+        what = length_name(design, subject, False) if kind == "length value" else name(given, k)
         return f"{what} certified {size} too {long}", "check the certificate"
     if kind == "scale":
         artefact = design.artefact_names[subject]

@@ -1,0 +1,276 @@
+"""Redundancy, information, effects and patterns against explicit matrices, re-estimation and finite differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.reliability.patterns import Patterns, patterns
+from analysis.reliability.study import Reliability, reliability_of
+from simulator.design import Design, State, nominal_state, probe_offsets
+from simulator.estimation.gauss_newton import gauss_newton, moved
+from simulator.estimation.hat import row_places, whitened_residuals
+from simulator.estimation.observations import expected_readings
+from simulator.estimation.parameters import shared_layout
+from simulator.experiment.load import load
+from simulator.geometry.motions import rotation_from_vector
+from simulator.layout import lay_out
+from tests.estimation.test_against_dense import certified_coordinates, repeats, with_length_standard
+from tests.reference import dense
+from tests.reliability.designs import MIXED, PLANE, PLATE, experiment
+
+Real = NDArray[np.float64]
+
+
+def quickstart() -> Design:
+    return lay_out(load(Path("designs/quickstart.yaml"))[0])
+
+
+def two_open_directions() -> Design:
+    """Experiment 6.1.1 B, of rank deficiency 2, with 5 x 5 balls."""
+    text = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").replace("balls: [7, 7]", "balls: [5, 5]")
+    return lay_out(next(one for one in _loaded(text) if one.name == "B"))
+
+
+def _loaded(text: str) -> list:  # type: ignore[type-arg]
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "it.yaml"
+        path.write_text(text, encoding="utf-8")
+        return list(load(path))
+
+
+def shared_certificate() -> Design:
+    """A bar is read in three positions, of which two have the same certificate."""
+    design = with_length_standard(repeats(), projected=False)
+    return replace(design, lengths=replace(design.lengths, certificate=np.array([0, 1, 0])))
+
+
+def numeric(function: Callable[[Real], Real], count: int, scale: Real, step: float = 1e-5) -> Real:
+    """Derivative (m, count) by central differences of steps `scale` (count,) times `step`."""
+    columns = []
+    for k in range(count):
+        move = np.zeros(count)
+        move[k] = step * scale[k]
+        columns.append((function(move) - function(-move)) / (2.0 * move[k]))
+    return np.stack(columns, axis=1)
+
+
+def dense_jacobian(design: Design) -> Real:
+    """Derivative of all whitened residuals by balls and shared parameters, by central differences."""
+    layout, state = shared_layout(design), nominal_state(design)
+    x = expected_readings(design, state, design.readings)
+    balls, s = design.plate_balls, len(layout)
+
+    def residuals(step: Real) -> Real:
+        shift = np.zeros_like(design.balls)
+        shift[balls] = step[s:].reshape(-1, design.dimension)
+        there = moved(
+            design, state, layout.pose_columns, step[:s], shift, layout.model, layout.offset_columns, layout.lengths
+        )
+        return whitened_residuals(design, layout, there, x)
+
+    scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
+    return numeric(residuals, len(scale), scale, 1e-4) * scale
+
+
+def orthonormal(jacobian: Real, deficiency: int) -> Real:
+    """Orthonormal columns that span those of a Jacobian of known rank deficiency."""
+    scaled = jacobian / np.maximum(np.sqrt((jacobian**2).sum(axis=0)), 1e-300)
+    left, values, _ = np.linalg.svd(scaled, full_matrices=False)
+    rank = jacobian.shape[1] - deficiency
+    assert rank == len(values) or values[rank] < 1e-6 * values[rank - 1]
+    return left[:, :rank]
+
+
+def check(result: Reliability, basis: Real, rows: NDArray[np.int64], tolerance: float) -> None:
+    """Compare with H = basis basis', of rows that stand in `rows` for a result's rows."""
+    hat = (basis**2).sum(axis=1)[rows]
+    np.testing.assert_allclose(result.redundancy, 1.0 - hat, atol=tolerance)
+    pattern = np.zeros((len(basis), len(result.patterns)))
+    pattern[rows] = result.patterns.matrix.toarray()
+    left = ((pattern - basis @ (basis.T @ pattern)) ** 2).sum(axis=0)
+    square = (pattern**2).sum(axis=0)
+    nil = result.information == 0.0
+    assert (left[nil] <= 1e-8 * square[nil]).all()
+    np.testing.assert_allclose(result.information[~nil] / square[~nil], left[~nil] / square[~nil], atol=tolerance)
+    total = result.redundancy.sum() + result.among_repeats
+    np.testing.assert_allclose(total, result.degrees_of_freedom, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["plate", "mixed", "plane"])
+def test_small_designs_against_a_hat_matrix_by_differences(name: str, tmp_path: Path) -> None:
+    text = {"plate": PLATE, "mixed": MIXED, "plane": PLANE}[name]
+    design = lay_out(experiment(tmp_path, text))
+    result = reliability_of(design)
+    jacobian = dense_jacobian(design)
+    check(result, orthonormal(jacobian, result.deficiency), np.arange(len(jacobian)), 1e-6)
+    if name == "mixed":
+        kinds = set(result.patterns.kind.tolist())
+        assert {"length", "prior", "coordinate", "distance", "ball", "length value", "scale"} <= kinds
+
+
+@pytest.mark.parametrize("make", [quickstart, two_open_directions, certified_coordinates])
+def test_plates_against_complex_steps(make: Callable[[], Design]) -> None:
+    """The Jacobian is that of the dense reference, which shares no code with the estimator."""
+    design = make()
+    result = reliability_of(design)
+    problem = dense.planned(design, 5, 5)
+    jacobian = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
+    places = row_places(design)
+    # Distances stand before co-ordinates there.
+    readings = np.arange(places.readings.stop)
+    distances = places.readings.stop + np.arange(len(design.distances))
+    coordinates = places.readings.stop + len(design.distances) + np.arange(len(design.coordinates))
+    rows = np.concatenate([readings, coordinates, distances])
+    assert result.deficiency == (2 if make is two_open_directions else 0)
+    check(result, orthonormal(jacobian, result.deficiency), rows, 1e-9)
+
+
+def test_repeats_and_lengths_that_share_a_certificate() -> None:
+    """Each repeat is a row of its own, and lengths are whitened otherwise, in the dense reference."""
+    design = shared_certificate()
+    result = reliability_of(design)
+    problem = dense.planned(design, 5, 5)
+    jacobian = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
+    basis = orthonormal(jacobian, 0)
+    hat = (basis**2).sum(axis=1)
+    d, of_plates = design.dimension, design.plate_readings
+    count = design.readings.repeats[of_plates]
+    reading = np.repeat(np.arange(len(of_plates)), count)
+    of_means = np.zeros((len(of_plates), d))
+    np.add.at(of_means, reading, hat[: d * len(reading)].reshape(-1, d))
+    places = row_places(design)
+    np.testing.assert_allclose(result.redundancy[places.readings], 1.0 - of_means.ravel(), atol=1e-9)
+    np.testing.assert_allclose(result.redundancy[places.distances], 1.0 - hat[-7:-3], atol=1e-9)
+    # A bias of one length, and of the certificate that two of them share.
+    given = design.lengths
+    noise = (design.repeatability**2 * given.direction**2).sum(axis=1)
+    ends = 1.0 / design.readings.repeats[given.first] + 1.0 / design.readings.repeats[given.second]
+    same = given.certificate[:, None] == given.certificate
+    covariance = (
+        np.diag(noise * ends * given.with_repeatability) + np.outer(given.uncertainty, given.uncertainty) * same
+    )
+    for kind, biases in (("length", np.eye(3)), ("length value", np.array([[-1.0], [0.0], [-1.0]]))):
+        pattern = np.zeros((len(basis), biases.shape[1]))
+        pattern[-3:] = np.linalg.solve(np.linalg.cholesky(covariance), biases)
+        left = ((pattern - basis @ (basis.T @ pattern)) ** 2).sum(axis=0)
+        found = result.information[result.patterns.of_kind(kind)]  # type: ignore[arg-type]
+        np.testing.assert_allclose(found, left, rtol=1e-7)
+    np.testing.assert_allclose(result.redundancy.sum() + result.among_repeats, len(hat) - hat.sum(), rtol=1e-9)
+
+
+def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Design, Real]:
+    """The design and its readings with a bias put in where it belongs, as an observer would see it."""
+    state, kind, subject, axis = nominal_state(design), given.kind[k], int(given.subject[k]), int(given.axis[k])
+    x = expected_readings(design, state, design.readings).copy()
+    readings, step = design.readings, size * np.eye(design.dimension)[max(axis, 0) % design.dimension]
+    here = readings.position == subject
+    if kind == "reading":
+        x[subject] += step
+    elif kind == "ball":
+        x[(readings.ball == readings.ball[subject]) & (readings.position == readings.position[subject])] += step
+    elif kind == "shift":
+        x[here & (np.arange(len(x)) >= given.start[k])] += step
+    elif kind == "turn":
+        vector = size * (np.eye(3)[axis] if design.dimension == 3 else np.ones(1))
+        rows = np.flatnonzero(here)
+        places = x[rows] + design.probes[readings.probe[rows]]
+        centre = places.mean(axis=0)
+        turned = centre + (places - centre) @ rotation_from_vector(vector[None])[0].T
+        late = rows >= given.start[k]
+        x[rows[late]] += (turned - places)[late]
+    elif kind == "expansion":
+        rows = np.flatnonzero(here)
+        places = x[rows] + probe_offsets(design, state)[readings.probe[rows]]
+        x[rows] += size * (places - places.mean(axis=0))
+    elif kind == "probe":
+        probes = design.probes.copy()
+        probes[subject] += step
+        return replace(design, probes=probes), x
+    elif kind in ("distance", "coordinate", "prior"):
+        field = {"distance": "distances", "coordinate": "coordinates", "prior": "priors"}[kind]
+        items = getattr(design, field)
+        value = items.value.copy()
+        value[subject] += size
+        return replace(design, **{field: replace(items, value=value)}), x
+    elif kind == "length value":
+        same = design.lengths.certificate == design.lengths.certificate[subject]
+        return replace(design, lengths=replace(design.lengths, value=design.lengths.value + size * same)), x
+    elif kind == "scale":
+        of_plate = design.artefact_names[subject] == "plate"
+        assert of_plate
+        larger = {
+            field: replace(getattr(design, field), value=getattr(design, field).value * (1.0 + size))
+            for field in ("distances", "coordinates")
+        }
+        return replace(design, **larger), x
+    else:
+        raise AssertionError(kind)
+    return design, x
+
+
+@pytest.mark.parametrize("text", [PLATE, MIXED, PLANE], ids=["plate", "mixed", "plane"])
+def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: Path) -> None:
+    design = lay_out(experiment(tmp_path, text))
+    state, layout = nominal_state(design), shared_layout(design)
+    given = patterns(design, state, None)
+    matrix, seen = given.matrix.toarray(), set()
+    for k in range(len(given)):
+        if given.kind[k] == "length" or given.kind[k] == "reading" and k % 5:
+            continue
+        seen.add(given.kind[k])
+        sides = []
+        for sign in (1.0, -1.0):
+            biased, x = changed(design, given, k, 1e-6 * sign)
+            sides.append(whitened_residuals(biased, layout, state, x))
+        expected = (sides[0] - sides[1]) / 2e-6
+        np.testing.assert_allclose(matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k])
+    wanted = {"reading", "distance", "shift", "turn", "probe", "expansion", "scale"}
+    assert wanted <= seen and (text is not MIXED or {"ball", "length value", "coordinate", "prior"} <= seen)
+
+
+def distances_of(design: Design, state: State) -> tuple[Real, Real]:
+    """Distances between all balls of the plate, and between all corrected evaluation points."""
+    balls = state.balls[design.plate_balls]
+    offsets = np.broadcast_to(probe_offsets(design, state)[design.point_probe], design.points.shape)
+    points = design.points + design.model.error(design.points, state.a, offsets)
+    found = []
+    for places in (balls, points):
+        first, second = np.triu_indices(len(places), 1)
+        found.append(np.sqrt(((places[first] - places[second]) ** 2).sum(axis=1)))
+    return found[0], found[1]
+
+
+@pytest.mark.parametrize("text", [PLATE, MIXED], ids=["plate", "mixed"])
+def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_path: Path) -> None:
+    design = lay_out(experiment(tmp_path, text))
+    result = reliability_of(design)
+    start, exact = nominal_state(design), expected_readings(design, nominal_state(design), design.readings)
+    before = distances_of(design, gauss_newton(design, exact, start).state)
+    given, size, tried = result.patterns, 1e-6, set()
+    assert result.deficiency == 0
+    chosen = [
+        k
+        for kind in sorted(set(given.kind.tolist()) - {"length"})
+        for k in given.of_kind(kind)[:: max(len(given.of_kind(kind)) // 3, 1)]
+    ]
+    for k in chosen:
+        if given.kind[k] == "scale" and given.design.artefact_names[given.subject[k]] != "plate":
+            continue
+        biased, x = changed(design, given, k, size)
+        found = gauss_newton(biased, x, start)
+        assert found.status == "converged"
+        for symbol, was, now in zip(("U5", "U6"), before, distances_of(biased, found.state), strict=True):
+            largest = np.abs(now - was).max() / size
+            np.testing.assert_allclose(
+                result.effects[symbol].change[k], largest, rtol=2e-3, atol=2e-6, err_msg=given.kind[k]
+            )
+        tried.add(given.kind[k])
+    assert len(tried) >= (7 if text is PLATE else 11)
