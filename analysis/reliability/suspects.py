@@ -69,16 +69,12 @@ def suspects(design: Design, solution: Solution, x: Array, freedom: int, sigma_i
     if freedom < 3 or sum_of_squares <= ROUNDING**2 * freedom:
         return []
     layout = shared_layout(design)
-    found = _Search(design, layout, solution, x)
+    found = Search(design, layout, solution, x)
     chosen: list[tuple[int, float, float]] = []
     while len(chosen) < MOST and freedom >= 3:
-        sigma = np.ones(len(found.information))
-        limit = alarm_limit(FAMILY / found.tests)
+        limit = alarm_limit(FAMILY / found.tests, freedom - 1 if sigma_is_estimated else math.inf)
         statistic = found.statistics()
-        if sigma_is_estimated:
-            limit = alarm_limit(FAMILY / found.tests, freedom - 1)
-            sigma = np.sqrt(np.maximum(sum_of_squares - statistic**2, ROUNDING**2) / (freedom - 1))
-        ratio = np.abs(statistic) / sigma
+        ratio = np.abs(studentised(statistic, sum_of_squares, freedom) if sigma_is_estimated else statistic)
         # Of patterns that are the same, the first: single observations stand before events.
         k = int(np.flatnonzero(ratio >= (1.0 - 1e-9) * ratio.max())[0])
         if ratio[k] <= limit:
@@ -91,7 +87,17 @@ def suspects(design: Design, solution: Solution, x: Array, freedom: int, sigma_i
     return found.told(chosen, scale)
 
 
-class _Search:
+def studentised(statistic: Array, sum_of_squares: Array | float, freedom: int) -> Array:
+    """Statistics (...) in terms of the sigma that the other observations show, of `freedom` - 1 degrees of freedom.
+
+    >>> studentised(np.array([3.0]), 19.0, 11)
+    array([3.])
+    """
+    others = np.maximum(sum_of_squares - statistic**2, ROUNDING**2) / (freedom - 1)
+    return np.asarray(statistic / np.sqrt(others))
+
+
+class Search:
     """Statistics of all patterns, less what the suspects found so far explain."""
 
     def __init__(self, design: Design, layout: SharedLayout, solution: Solution, x: Array) -> None:
