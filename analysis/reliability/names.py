@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from simulator.design import Design
 from simulator.estimation.parameters import AXIS_NAMES
 
@@ -42,11 +44,11 @@ def name(given: Patterns, k: int) -> str:
 def slip_place(given: Patterns, k: int) -> str:
     """Where in a position a slip of the artefact is looked for."""
     design, position, start = given.design, int(given.subject[k]), int(given.start[k])
-    rows = [i for i in design.plate_readings.tolist() if design.readings.position[i] == position]
-    at = rows.index(start)
-    before, after = (int(design.readings.probe[rows[i]]) for i in (at - 1, at))
-    if before != after and len({*design.readings.probe[rows[at:]].tolist()} & {before}) == 0:
-        return f"before probe {design.probe_names[after]}"
+    rows = np.flatnonzero(design.readings.position == position)
+    probe = design.readings.probe[rows]
+    at = int(np.searchsorted(rows, start))
+    if probe[at - 1] != probe[at] and probe[at - 1] not in probe[at:]:
+        return f"before probe {design.probe_names[probe[at]]}"
     return f"half-way, before ball {design.ball_label(int(design.readings.ball[start]))}"
 
 

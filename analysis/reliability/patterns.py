@@ -41,9 +41,9 @@ UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "exp
 class Block:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
-    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe, artefact or
-    certificate of a length; `axis` (count,) along or about which, -1 without one; `start` (count,) the first reading of
-    a part, -1 without one. `readings` counts the readings touched.
+    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe or artefact;
+    of a certified length, the first that has it, and of a ball, its first reading in that position. `axis` (count,)
+    is along or about which, -1 without one; `start` (count,) the first reading after a slip, -1 without one.
     """
 
     kind: Kind

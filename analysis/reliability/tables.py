@@ -161,12 +161,11 @@ def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
     """The worst pattern of each subject, or of each position for balls, in the order of the design."""
     if not len(chosen):
         return []
-    subject = result.patterns.subject
-    if result.patterns.kind[chosen[0]] == "ball":
-        subject = result.design.readings.position[np.maximum(subject, 0) % max(len(result.design.readings), 1)]
+    of_balls = result.patterns.kind[chosen[0]] == "ball"
     worst: dict[int, int] = {}
     for k in _worst_first(result, chosen):
-        worst.setdefault(int(subject[k]), k)
+        subject = int(result.patterns.subject[k])
+        worst.setdefault(int(result.design.readings.position[subject]) if of_balls else subject, k)
     return [worst[key] for key in sorted(worst)]
 
 

@@ -16,12 +16,16 @@ from simulator.settings import listing
 
 from ..tables import SHOWN, number
 from .names import length_name, name, reading_name
-from .suspects import Suspect
+from .suspects import MOST, Suspect
 
 
 def suspect_lines(found: Sequence[Suspect], marks: Sequence[Mark] = ()) -> list[str]:
     """A line for each suspect, the most significant first; `marks` tell where the readings stand."""
-    return [f"suspected: {suspect_words(one, marks)}" for one in found]
+    lines = [f"suspected: {suspect_words(one, marks)}" for one in found]
+    if len(found) == MOST:
+        what = "look for what these have in common, or state larger uncertainties, or a richer error model"
+        lines.append(f"suspected: there may be more than these {MOST}; {what}")
+    return lines
 
 
 def suspect_words(one: Suspect, marks: Sequence[Mark] = ()) -> str:
