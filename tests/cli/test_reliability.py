@@ -1,0 +1,163 @@
+"""`ballplate reliability`, and what `fit` suspects, as their users see them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from analysis.cli import main
+
+QUICKSTART = "designs/quickstart.yaml"
+Rows = list[dict[str, str]]
+
+
+def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "all.csv"
+    assert main(["reliability", QUICKSTART, "--csv", str(table)]) == 0
+    out = capsys.readouterr().out
+    assert "754 observations; redundancy 580.0 in all" in out
+    assert "estimated from the other residuals: 4.152 standard deviations" in out
+    assert "cannot be detected, harmless: offset x of probe down, offset y of probe down, offset z of probe down" in out
+    assert "DANGEROUS" not in out and "scale of the certificate of plate" in out
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 754
+    assert sum(float(row["redundancy"]) for row in rows) == pytest.approx(580.0)
+    worst = max((row for row in rows if row["kind"] == "reading"), key=lambda row: float(row["minimal_detectable"]))
+    assert (worst["position"], worst["ball"], worst["axis"]) == ("z high", "r1c1", "x")
+
+
+def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--variant", "length known", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    by_name = {event["name"]: event for event in found["events"]}
+    certificate = by_name["certified length 1-2 of bar"]
+    assert certificate["minimal_detectable"] is None and certificate["harmless"] is False
+    # The longest distance between two evaluation points is about two and a half bars long.
+    assert 2.0 < certificate["effects"]["U6"]["per_unit"] < 3.0
+    assert by_name["offset x of probe cone"]["harmless"] is True
+    assert found["redundancy"] == pytest.approx(found["degrees_of_freedom"])
+
+
+def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%", "--json"]
+    assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--variant", "flat", *options]) == 0
+    assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(1.959964 + 1.281552, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--power", "0.8"], 'expected a percentage between 0% and 100%, such as 0.1%, not "0.8"'),
+        (["--false-alarm", "90%"], "--power must be above --false-alarm"),
+    ],
+)
+def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        status = main(["reliability", QUICKSTART, *options])
+    except SystemExit as left:
+        status = int(str(left.code))
+    assert status == 2 and told in capsys.readouterr().err
+
+
+def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--csv", str(tmp_path / "t.csv")]) == 2
+    assert "choose one with --variant: length known, " in capsys.readouterr().err
+    assert main(["reliability", QUICKSTART, "--csv", str(tmp_path / "no" / "t.csv")]) == 3
+    assert "cannot be written" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Rows:
+    path = tmp_path_factory.mktemp("readings") / "readings.csv"
+    assert main(["simulate", QUICKSTART, "-o", str(path)]) == 0
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def add(row: dict[str, str], column: str, micrometres: float) -> None:
+    row[column] = repr(float(row[column]) + 1e-3 * micrometres)
+
+
+def nothing(rows: Rows) -> None:
+    pass
+
+
+def one_reading(rows: Rows) -> None:
+    add(rows[39], "y_mm", 3.0)
+
+
+def three_readings(rows: Rows) -> None:
+    for i, column, size in ((5, "z_mm", 2.0), (98, "x_mm", -2.0), (200, "y_mm", 2.5)):
+        add(rows[i], column, size)
+
+
+def slip(rows: Rows) -> None:
+    for row in [row for row in rows if row["position"] == "z high"][12:]:
+        add(row, "y_mm", 1.2)
+
+
+def probe(rows: Rows) -> None:
+    for row in rows:
+        if row["probe"] == "left":
+            add(row, "z_mm", -2.0)
+
+
+def dirt(rows: Rows) -> None:
+    for row in rows:
+        if row["position"] == "x low" and row["ball"] == "r3c2":
+            add(row, "y_mm", 1.5)
+
+
+def warm(rows: Rows) -> None:
+    """The plate is larger by 3 ppm in one position."""
+    for row in rows:
+        if row["position"] == "z low":
+            add(row, "x_mm", 3e-3 * float(row["x_mm"]))
+            add(row, "y_mm", 3e-3 * float(row["y_mm"]))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (nothing, []),
+        (one_reading, ["ball r3c5 in position z high with down read .* too high in y .* leave out line 41 of r.csv"]),
+        (three_readings, ["too high in z .* line 7 of", "too low in x .* line 100 of", "too high in y .* line 202 of"]),
+        (slip, ["plate slipped in position z high, by 1.* along y, about before line 39 of r.csv"]),
+        (
+            probe,
+            ["offset z of probe (left|right) stated (2.0|1.9).* too .*; it cannot be told from offset z of probe "],
+        ),
+        (dirt, ["ball r3c2 in position x low read 1.* too high in y each time .* lines 63 and 88 of r.csv"]),
+        (warm, [r"plate [23]\.\d+\(0.\d+\) ppm larger in position z low .* check the temperature there"]),
+    ],
+)
+@pytest.mark.parametrize("sigma", ["estimated", "given"])
+def test_what_a_fit_suspects(
+    spoil: Callable[[Rows], None],
+    told: list[str],
+    sigma: str,
+    clean: Rows,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rows = [dict(row) for row in clean]
+    spoil(rows)
+    with (tmp_path / "r.csv").open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    assert main(["fit", QUICKSTART, str(tmp_path / "r.csv"), "--sigma", sigma, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    if not told:
+        assert "suspected" not in found
+        return
+    words = [one["words"] for one in found["suspected"]]
+    assert len(words) == len(told), words
+    for pattern in told:
+        assert any(re.search(pattern, text) for text in words), (pattern, words)
+    for one in found["suspected"]:
+        assert one["statistic"] > one["limit"] > 4.0 and abs(one["value"]) > 4.0 * one["standard_uncertainty"]
