@@ -138,6 +138,7 @@ def warm(rows: Rows) -> None:
         (
             probe,
             ["offset z of probe (left|right) stated [12].* too .*; it cannot be told from offset z of probe "],
+            [2e-6],
         ),
         (dirt, ["ball r3c2 in position x low read 1.* too high in y each time .* lines 63 and 88 of r.csv"], [1.5e-6]),
         (warm, [r"plate [23]\.\d+\(0.\d+\) ppm larger in position z low .* check the temperature there"], [3e-6]),
