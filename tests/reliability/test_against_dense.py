@@ -104,9 +104,9 @@ def check(result: Reliability, basis: Real, rows: NDArray[np.int64], tolerance: 
     np.testing.assert_allclose(total, result.degrees_of_freedom, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["plate", "mixed", "plane"])
+@pytest.mark.parametrize("name", ["mixed", "plane"])
 def test_small_designs_against_a_hat_matrix_by_differences(name: str, tmp_path: Path) -> None:
-    text = {"plate": PLATE, "mixed": MIXED, "plane": PLANE}[name]
+    text = {"mixed": MIXED, "plane": PLANE}[name]
     design = lay_out(experiment(tmp_path, text))
     result = reliability_of(design)
     jacobian = dense_jacobian(design)
@@ -223,7 +223,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
     given = patterns(design, state, None)
     matrix, seen = given.matrix.toarray(), set()
     # Some of each kind; those of single lengths are compared with the dense reference.
-    for k in [int(k) for kind in set(given.kind.tolist()) - {"length"} for k in _some(given.of_kind(kind), 7)]:
+    for k in [int(k) for kind in set(given.kind.tolist()) - {"length"} for k in _some(given.of_kind(kind), 4)]:
         seen.add(given.kind[k])
         sides = []
         for sign in (1.0, -1.0):
@@ -259,7 +259,7 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_pa
     before = distances_of(design, gauss_newton(design, exact, start).state)
     given, size, tried = result.patterns, 1e-6, set()
     assert result.deficiency == 0
-    chosen = [k for kind in sorted(set(given.kind.tolist()) - {"length"}) for k in _some(given.of_kind(kind), 3)]
+    chosen = [k for kind in sorted(set(given.kind.tolist()) - {"length"}) for k in _some(given.of_kind(kind), 2)]
     for k in chosen:
         if given.kind[k] == "scale" and given.design.artefact_names[given.subject[k]] != "plate":
             continue
