@@ -61,6 +61,9 @@ def run(options: Namespace) -> int:
     if options.power <= options.false_alarm:
         print("ballplate reliability: --power must be above --false-alarm; any test has that much", file=sys.stderr)
         return WRONG_USAGE
+    if options.csv is not None and options.csv.resolve() in [path.resolve() for path in options.files]:
+        print(f"ballplate reliability: --csv {options.csv} is the experiment file; name another", file=sys.stderr)
+        return WRONG_USAGE
     chosen = experiments(options)
     if options.csv is not None and len(chosen) > 1:
         names = ", ".join(str(one.name or one.label) for one in chosen)

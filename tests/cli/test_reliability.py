@@ -67,6 +67,10 @@ def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixtu
 def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--csv", str(tmp_path / "t.csv")]) == 2
     assert "choose one with --variant: length known, " in capsys.readouterr().err
+    own = tmp_path / "own.yaml"
+    own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["reliability", str(own), "--csv", str(own)]) == 2
+    assert "is the experiment file; name another" in capsys.readouterr().err
     assert main(["reliability", QUICKSTART, "--csv", str(tmp_path / "no" / "t.csv")]) == 3
     assert "cannot be written" in capsys.readouterr().err
 
