@@ -36,7 +36,7 @@ def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
     if gauge_only and design.dimension != 3:
         return ""
     like = int(np.flatnonzero(given.to_pivot == gauge_only)[0])
-    pool = list(_places() if gauge_only else _bars(design.dimension))
+    pool = list(_places() if gauge_only else bar_directions(design.dimension))
     rows = _rows(design, given.direction, np.arange(len(given)))
     more = [_rows(design, u, np.full(len(u), like)) for _, _, u in pool]
     wanted = strains.shape[1] - (overall is not None)
@@ -73,7 +73,7 @@ def _leave_open(rows: Array, strains: Array) -> int:
     return strains.shape[1] - int((np.linalg.svd(told, compute_uv=False) > CLEARLY).sum())
 
 
-def _bars(d: int) -> Iterator[tuple[str, str, Array]]:
+def bar_directions(d: int) -> Iterator[tuple[str, str, Array]]:
     """Kind, words and directions (1, d): along axes, diagonals of planes, diagonals of space."""
     axes = np.eye(d)
     for k in range(d):

@@ -160,9 +160,8 @@ def verdict(
 
 def null_directions(design: Design, layout: SharedLayout, spread: Covariance) -> tuple[Direction, ...]:
     """The undetermined directions, in a basis in which each involves as little as possible."""
-    sparse = _echelon(spread.shared_null / spread.scale[:, None])
     found = []
-    for mixture in sparse.T:
+    for mixture in independent_mixture(spread).T:
         shared, balls = spread.shared_null @ mixture, spread.ball_null @ mixture
         moved = np.abs(shared / layout.scale).max(initial=0.0)
         size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
@@ -171,6 +170,11 @@ def null_directions(design: Design, layout: SharedLayout, spread: Covariance) ->
         size *= np.sign(shared[np.flatnonzero(change >= 0.99 * change.max(initial=0.0))[0]]) or 1.0
         found.append(_describe(design, layout, shared / size, balls / size))
     return tuple(found)
+
+
+def independent_mixture(spread: Covariance) -> Array:
+    """Mixtures (k, k) of the null directions in which they are told: each involves as little as possible."""
+    return _echelon(spread.shared_null / spread.scale[:, None])
 
 
 def weak_directions(
@@ -184,17 +188,29 @@ def _weak_columns(
     design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
 ) -> tuple[Integers, Array]:
     """Columns of the root that are weak, weakest first, and what one standard deviation along each of all adds."""
+    effect = effects(design, layout, found)
+    return np.flatnonzero(effect > weak_limit(design, target))[::-1], effect
+
+
+def effects(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
+    """What one standard deviation along each determined direction adds to corrected points, in metres, (rank,).
+
+    Relative to one another, that is; empty where the design has no points.
+    """
     if not len(design.points) or found.rank == 0:
-        return np.zeros(0, np.int64), np.zeros(0)
+        return np.zeros(0)
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
     change = without_rigid_motion(design.points, jacobian @ found.root[layout.model])
     # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
-    effect = np.sqrt(2.0 * (change**2).mean(axis=(0, 1)))
-    limit = WEAK * float(design.repeatability.max())
-    if target is not None:
-        limit = float(target.at(0.5 * float(np.linalg.norm(design.upper - design.lower))))
-    return np.flatnonzero(effect > limit)[::-1], effect
+    return np.asarray(np.sqrt(2.0 * (change**2).mean(axis=(0, 1))))
+
+
+def weak_limit(design: Design, target: LengthFunction | None) -> float:
+    """The effect, in metres, beyond which a direction is weak."""
+    if target is None:
+        return WEAK * float(design.repeatability.max())
+    return float(target.at(0.5 * float(np.linalg.norm(design.upper - design.lower))))
 
 
 def _weak_directions(

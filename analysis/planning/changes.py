@@ -1,0 +1,214 @@
+"""A change of an experiment: in words, with its price, and as a function from experiment to experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import numpy as np
+
+from simulator.experiment.model import (
+    Calibration,
+    CoordinateCalibration,
+    DistanceCalibration,
+    Experiment,
+    Indices,
+    Position,
+    ReadingGroup,
+    Volume,
+)
+from simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
+from simulator.geometry.positions import Pose, ball_coordinates
+from simulator.machines.protocol import Array
+
+# Balls may be this far outside the volume, as in a file.
+TOLERANCE = 1e-9
+
+
+class Kind(IntEnum):
+    """What is changed, the cheapest first."""
+
+    POOL = 0
+    MOVE = 1
+    READ_MORE = 2
+    CERTIFICATE = 3
+    ADD_POSITION = 4
+    ARTEFACT = 5
+    MODEL = 6
+
+
+KINDS = {
+    Kind.POOL: "candidates of the pool",
+    Kind.MOVE: "positions moved",
+    Kind.READ_MORE: "more readings in a position",
+    Kind.CERTIFICATE: "calibration",
+    Kind.ADD_POSITION: "more positions",
+    Kind.ARTEFACT: "more balls",
+    Kind.MODEL: "fewer coefficients",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What may be changed of an experiment.
+
+    `words` is an imperative sentence. `cost` compares changes of one kind: seconds for candidates of a pool, otherwise
+    readings or distances more. Two changes that touch the same thing do not go together. `adds` is the position or the
+    calibration item that the change adds and leaves all others as they are, None where it does otherwise. `candidate`
+    is the index of the pool's candidate, -1 where it is none.
+    """
+
+    kind: Kind
+    words: str
+    cost: float
+    touches: frozenset[str]
+    apply: Callable[[Experiment], Experiment]
+    adds: Position | Calibration | None = None
+    candidate: int = -1
+
+
+def apply_all(changes: Sequence[Change], experiment: Experiment) -> Experiment:
+    """The experiment with all changes made."""
+    for change in changes:
+        experiment = change.apply(experiment)
+    return experiment
+
+
+def go_together(changes: Sequence[Change]) -> bool:
+    """Whether no two of the changes touch the same."""
+    touched = [name for change in changes for name in change.touches]
+    return len(touched) == len(set(touched))
+
+
+def is_inside(position: Position, layout: BallLayout, volume: Volume) -> bool:
+    """Whether all balls that a position reads are in the volume."""
+    read = np.unique(np.concatenate([group.ball_indices for group in position.readings]))
+    places = ball_coordinates(position.pose, layout)[read]
+    return bool((places >= volume.lower - TOLERANCE).all() and (places <= volume.upper + TOLERANCE).all())
+
+
+def with_position(experiment: Experiment, position: Position) -> Experiment:
+    """The experiment with the position of that name replaced, or with it as the last one."""
+    places = tuple(position if one.name == position.name else one for one in experiment.positions)
+    if all(one.name != position.name for one in experiment.positions):
+        places = (*experiment.positions, position)
+    return replace(experiment, positions=places)
+
+
+def with_calibration(experiment: Experiment, item: Calibration) -> Experiment:
+    """The experiment with one calibration item more."""
+    return replace(experiment, calibration=(*experiment.calibration, item))
+
+
+def moved(position: Position, rotation: Array, origin: Array) -> Position:
+    """The position in another pose."""
+    for array in (rotation, origin):
+        array.setflags(write=False)
+    return replace(position, pose=Pose(rotation, origin))
+
+
+def read_with(position: Position, probe: str) -> Position:
+    """The position with everything that is read in it read with another probe, too."""
+    if len(position.readings) == 1:
+        group = position.readings[0]
+        return replace(position, readings=(replace(group, probes=(*group.probes, probe)),))
+    every = {
+        int(i): name for group in position.readings for i, name in zip(group.ball_indices, group.balls, strict=True)
+    }
+    indices = np.array(sorted(every), np.intp)
+    more = ReadingGroup((probe,), tuple(every[int(i)] for i in indices), indices, 1)
+    return replace(position, readings=(*position.readings, more))
+
+
+def repeated(position: Position, times: int) -> Position:
+    """The position with everything read so many times as often."""
+    groups = tuple(replace(group, repeats=times * group.repeats) for group in position.readings)
+    return replace(position, readings=groups)
+
+
+def probes_of(position: Position) -> tuple[str, ...]:
+    """Names of all probes that are used in a position."""
+    return tuple(dict.fromkeys(name for group in position.readings for name in group.probes))
+
+
+def count_readings(positions: Sequence[Position]) -> int:
+    """Readings of balls, every repeat counted."""
+    return sum(len(group.probes) * len(group.balls) * group.repeats for place in positions for group in place.readings)
+
+
+def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
+    """Name of the set of pairs that indices (m, 2) are, None if they are none."""
+    wanted = {frozenset(pair) for pair in chosen.tolist()}
+    for name in (*layout.pair_sets, "all"):
+        if name == "all" and len(wanted) != len(layout.names) * (len(layout.names) - 1) // 2:
+            continue
+        found = pairs(layout, name)
+        if len(found) == len(wanted) and {frozenset(pair) for pair in found.tolist()} == wanted:
+            return name
+    return None
+
+
+def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
+    """`all` or `corners` where indices are those, None otherwise."""
+    wanted = set(chosen.tolist())
+    if len(wanted) == len(layout.names):
+        return "all"
+    return "corners" if layout.corner_set and wanted == set(layout.corner_set) else None
+
+
+def with_artefact(experiment: Experiment, name: str, settings: ArtefactSettings) -> Experiment | None:
+    """The experiment with another artefact of that name; None where what is said of its balls would not carry over."""
+    old, new = experiment.layouts[name], settings.layout()
+    places = []
+    for place in experiment.positions:
+        if place.artefact == name:
+            if any(ball_set(old, group.ball_indices) != "all" for group in place.readings):
+                return None
+            every = np.arange(len(new.names))
+            groups = tuple(replace(group, balls=new.names, ball_indices=every) for group in place.readings)
+            place = replace(place, readings=groups)
+        places.append(place)
+    items: list[Calibration] = []
+    for item in experiment.calibration:
+        if item.artefact == name:
+            found = _carried_over(item, old, new)
+            if found is None:
+                return None
+            item = found
+        items.append(item)
+    return replace(
+        experiment,
+        artefacts={**experiment.artefacts, name: settings},
+        layouts={**experiment.layouts, name: new},
+        positions=tuple(places),
+        calibration=tuple(items),
+    )
+
+
+def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibration | None:
+    if isinstance(item, DistanceCalibration):
+        chosen = pair_set(old, item.pairs)
+        if chosen is None or chosen not in (*new.pair_sets, "all") or item.certified:
+            return None
+        return distances(item, new, pairs(new, chosen))
+    if isinstance(item, CoordinateCalibration):
+        balls = ball_set(old, item.balls)
+        if balls is None or item.certified:
+            return None
+        indices = np.arange(len(new.names)) if balls == "all" else np.array(new.corner_set, np.intp)
+        return replace(item, balls=indices, values=new.coordinates[indices][:, list(item.axes)])
+    return None
+
+
+def distances(like: DistanceCalibration, layout: BallLayout, chosen: Indices) -> DistanceCalibration:
+    """Calibrated distances between pairs (m, 2) of balls, otherwise like others."""
+    ends = layout.coordinates[chosen][:, :, : like.dimensions]
+    values = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return replace(
+        like,
+        pairs=chosen,
+        values=values,
+        certified=False,
+        standard_uncertainties=like.standard_uncertainty.at(values),
+    )

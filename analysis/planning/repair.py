@@ -1,0 +1,284 @@
+"""The cheapest changes after which a design determines all that it asks for.
+
+Every set of changes that is told has been applied to the experiment, and the rank of the resulting design computed in
+full; none of its members can be left out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from simulator.experiment.model import Experiment
+from simulator.machines.protocol import Array
+from simulator.threads import single_threaded
+
+from ..rank import independent_mixture
+from ..study import Plan, plan
+from .changes import Change, Kind, apply_all, go_together
+from .judging import Examined, Judged, examine, judge, rank_of, removed, seen_by, work
+from .offers import allowed, offers
+from .written import Edit, edits
+
+# Repairs told, of different kinds.
+MOST_TOLD = 3
+# Changes in a set.
+MOST_TOGETHER = 3
+# Candidates of which every two are compared.
+MOST_PAIRED = 60
+# Judgements of a kind: as many as this amount of work allows, within bounds.
+WORK, FEWEST, MOST = 5e6, 12, 80
+# Sets of candidates that are verified before others are looked for.
+MOST_VERIFIED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Repair:
+    """Changes that leave nothing undetermined, with the plan of the changed design.
+
+    `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts directions still
+    weakly determined, of which `worst` is what one standard deviation along the weakest adds to corrected points, in
+    metres. `smallest` is the smallest singular value. `edits` is what the file is to say.
+    """
+
+    changes: tuple[Change, ...]
+    deficiency: int
+    removes: tuple[int, ...]
+    weak: int
+    worst: float
+    smallest: float
+    plan: Plan | None
+    edits: tuple[Edit, ...]
+
+
+@dataclass(frozen=True)
+class Repairs:
+    """What was found: `complete` repairs, `partial` ones of single directions, and how much was tried.
+
+    `tried` counts by kind the changes that were judged, and `sets` sets of several.
+    """
+
+    complete: tuple[Repair, ...]
+    partial: tuple[Repair, ...]
+    tried: Mapping[Kind, int]
+    sets: int
+
+
+@single_threaded
+def repairs(experiment: Experiment) -> Repairs | None:
+    """Repairs of an experiment's design; None where nothing is undetermined or weakly determined."""
+    base = examine(experiment)
+    if base.judged.is_cured:
+        return None
+    return _Search(base).run()
+
+
+class _Search:
+    """One search: what was judged, and how often."""
+
+    def __init__(self, base: Examined) -> None:
+        self.base = base
+        self.before = base.judged
+        self.tried: Counter[Kind] = Counter()
+        self.sets = 0
+        self.judged: dict[frozenset[Change], Judged | None] = {}
+        self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
+
+    def run(self) -> Repairs:
+        found = offers(self.base.experiment, self.before.deficiency > 0)
+        best: dict[Kind, tuple[Change, ...]] = {}
+        singles: list[Change] = []
+        for kind, changes in found.items():
+            cured = sum(self.judge(one).is_cured for one in best.values())
+            if cured >= MOST_TOLD or (kind == Kind.MODEL and cured > 1):
+                # To ask for less is the last resort.
+                break
+            seen = seen_by(self.base, changes)
+            judged = self.singles(kind, changes, seen)
+            singles += judged
+            possible = [(one,) for one in judged if not self.judge((one,)).deficiency]
+            cheapest = min(map(self.preference, possible), default=None)
+            if kind < Kind.ARTEFACT and (cheapest is None or cheapest[0] or cheapest[1] > MOST_TOGETHER):
+                together = self.set_of(changes, seen)
+                possible += [together] if together else []
+            if possible:
+                best[kind] = min(possible, key=self.preference)
+        if not best:
+            together = self.greedy([one for kind in found for one in self.thinned(found[kind])])
+            if together:
+                best[min(one.kind for one in together)] = together
+        order = sorted(best, key=lambda kind: (not self.judge(best[kind]).is_cured, kind))
+        complete = tuple(self.told(best[kind]) for kind in order[:MOST_TOLD] if self.helps(best[kind]))
+        is_single = any(len(one.changes) == 1 and not one.weak for one in complete)
+        partial = () if is_single else self.of_single_directions(singles)
+        return Repairs(complete, partial, dict(self.tried), self.sets)
+
+    def helps(self, changes: tuple[Change, ...]) -> bool:
+        """Whether changes are worth being told: full rank, or fewer weak directions."""
+        after = self.judge(changes)
+        return after.deficiency < self.before.deficiency or after.weak < self.before.weak
+
+    def judge(self, changes: Sequence[Change]) -> Judged:
+        """What changes lead to, remembered; as before where they are impossible."""
+        key = frozenset(changes)
+        if key not in self.judged:
+            self.judged[key] = judge(self.base.experiment, changes)
+            if len(changes) == 1:
+                self.tried[changes[0].kind] += 1
+            else:
+                self.sets += 1
+        return self.judged[key] or self.before
+
+    def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
+        """A repair that leaves nothing weak first, then the cheapest, then the one that leaves least uncertain."""
+        after = self.judge(changes)
+        return not after.is_cured, sum(one.cost for one in changes), len(changes), after.spread
+
+    def thinned(self, changes: Sequence[Change]) -> list[Change]:
+        """No more of them than can be judged, evenly from all."""
+        if len(changes) <= self.at_most:
+            return list(changes)
+        return [changes[k] for k in np.linspace(0, len(changes) - 1, self.at_most).astype(int)]
+
+    def singles(self, kind: Kind, changes: Sequence[Change], seen: Mapping[Change, Array]) -> list[Change]:
+        """Changes judged one at a time; of additions only those that say something of the null directions."""
+        useful = []
+        for change in changes:
+            if change in seen and not rank_of([seen[change]]):
+                self.tried[kind] += 1
+            else:
+                useful.append(change)
+        # Those that may suffice come first, where there are too many.
+        k = self.before.deficiency
+        whole = [one for one in useful if one not in seen or rank_of([seen[one]]) == k]
+        part = [one for one in useful if one in seen and rank_of([seen[one]]) < k]
+        judged = self.cheapest(whole) if kind == Kind.POOL else self.thinned(whole)
+        for one in judged:
+            self.judge((one,))
+        left = self.at_most - len(judged)
+        for one in part[: max(left, 0)]:
+            self.judge((one,))
+        return [*judged, *part[: max(left, 0)]]
+
+    def cheapest(self, changes: Sequence[Change]) -> list[Change]:
+        """The first of a list in order of cost up to one that cures, and none beyond."""
+        found = []
+        for change in changes[: self.at_most]:
+            found.append(change)
+            if self.judge((change,)).is_cured:
+                break
+        return found
+
+    def set_of(self, changes: Sequence[Change], seen: Mapping[Change, Array]) -> tuple[Change, ...]:
+        """Several changes of a kind that together leave nothing undetermined; empty if there are none."""
+        additions = [one for one in changes if one in seen and rank_of([seen[one]])]
+        nominal: tuple[Change, ...] = ()
+        if additions and self.before.deficiency:
+            for together in self.cheapest_sets(additions, seen):
+                after = self.judge(together)
+                if after.is_cured:
+                    return together
+                nominal = nominal or (together if not after.deficiency else ())
+        return self.greedy(self.thinned(changes)) or nominal
+
+    def cheapest_sets(self, additions: Sequence[Change], seen: Mapping[Change, Array]) -> list[tuple[Change, ...]]:
+        """Sets of additions that remove all null directions, the cheapest pairs first, then one that is built up."""
+        k = self.before.deficiency
+        few = list(additions[:MOST_PAIRED])
+        pairs = [
+            pair
+            for pair in combinations(few, 2)
+            if max(rank_of([seen[one]]) for one in pair) < k
+            and self.may_be(pair)
+            and rank_of([seen[one] for one in pair]) == k
+        ]
+        pairs.sort(key=lambda pair: sum(one.cost for one in pair))
+        built: list[Change] = []
+        while rank_of([seen[one] for one in built]) < k:
+            now = rank_of([seen[one] for one in built])
+            gains = [
+                (rank_of([seen[b] for b in (*built, one)]) - now, one)
+                for one in additions
+                if self.may_be((*built, one))
+            ]
+            gain, best = max(gains, key=lambda one: (one[0] / max(one[1].cost, 1e-9), one[0]), default=(0, None))
+            if best is None or not gain:
+                built = []
+                break
+            built.append(best)
+        for one in sorted(built, key=lambda one: -one.cost):
+            without = [other for other in built if other is not one]
+            if rank_of([seen[other] for other in without]) == k:
+                built = without
+        return [*pairs[:MOST_VERIFIED], *([tuple(built)] if len(built) > 1 else [])]
+
+    def may_be(self, changes: Sequence[Change]) -> bool:
+        """Whether changes go together, in the pool's limits."""
+        pool = self.base.experiment.pool
+        chosen = tuple(one.candidate for one in changes if one.candidate >= 0)
+        return go_together(changes) and (pool is None or allowed(pool, chosen))
+
+    def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:
+        """A set that is built up of the change that helps most each time, less what can be left out of it."""
+        built: tuple[Change, ...] = ()
+        after = self.before
+        while not after.is_cured and len(built) < MOST_TOGETHER:
+            possible = [(*built, one) for one in changes if self.may_be((*built, one))]
+            best = min(possible, key=lambda one: self.judge(one).order, default=())
+            if not best or self.judge(best).order >= after.order:
+                break
+            built, after = best, self.judge(best)
+        if after.deficiency or not self.helps(built):
+            return ()
+        for one in built:
+            without = tuple(other for other in built if other is not one)
+            left = self.judge(without) if without else self.before
+            if (left.deficiency, left.weak) <= (after.deficiency, after.weak):
+                built, after = without, left
+        return built
+
+    def of_single_directions(self, singles: Sequence[Change]) -> tuple[Repair, ...]:
+        """For each null direction the cheapest single change after which it is no part of what is open."""
+        if not self.before.deficiency:
+            return ()
+        told = self.open_errors()
+        order = sorted(singles, key=lambda one: (one.kind, one.cost, self.judge((one,)).spread))
+        found: dict[Change, tuple[int, ...]] = {}
+        for k in range(self.before.deficiency):
+            for one in order:
+                after = self.judge((one,))
+                if one.kind == Kind.MODEL or not after.deficiency or after.deficiency >= self.before.deficiency:
+                    continue
+                gone = removed(told, after.open_errors)
+                if k in gone:
+                    found[one] = gone
+                    break
+        return tuple(self.told((one,), gone) for one, gone in found.items())
+
+    def open_errors(self) -> Array:
+        """What the null directions do to the machine, in the form in which they are told."""
+        return np.asarray(self.before.open_errors @ independent_mixture(self.base.spread))
+
+    def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
+        """A repair with the plan of the changed design."""
+        experiment = self.base.experiment
+        changed = apply_all(changes, experiment)
+        after = self.judge(changes)
+        planned = plan(changed) if removes is None else None
+        if planned is not None and planned.verdict.deficiency != after.deficiency:
+            raise AssertionError("two computations of one design's rank differ")
+        gone = tuple(range(self.before.deficiency)) if removes is None else removes
+        return Repair(
+            changes,
+            after.deficiency,
+            gone,
+            after.weak,
+            after.worst,
+            after.smallest,
+            planned,
+            edits(experiment, changed),
+        )

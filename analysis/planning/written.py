@@ -1,0 +1,215 @@
+"""Changes of an experiment as what its file is to say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import yaml
+
+from simulator.experiment.model import (
+    Calibration,
+    CoordinateCalibration,
+    DistanceCalibration,
+    Experiment,
+    Position,
+    ReadingGroup,
+)
+from simulator.geometry.positions import AXIS_INDEX, IN_PLANE_AXES, QUARTER_TURNS, ball_coordinates
+from simulator.machines.protocol import Array
+from simulator.quantities import LengthFunction, format_length, parse_length
+
+from .changes import ball_set, pair_set
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A value that a file is to have at a path; `is_new` says that it goes to the end of the list there."""
+
+    path: str
+    value: Any
+    is_new: bool = False
+
+    def __str__(self) -> str:
+        return f"{'add to ' if self.is_new else ''}{self.path}: {flow(self.value)}"
+
+
+def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
+    """What the file of `before` has to say otherwise to be that of `after`.
+
+    Positions, calibration, probes, sizes of artefacts and of the error model are compared.
+    """
+    found = []
+    for name, artefact in after.artefacts.items():
+        found += _fields(f"artefacts.{name}", before.artefacts[name], artefact)
+    found += _fields("error_model", before.error_model, after.error_model)
+    for name, offset in after.probes.items():
+        if name not in before.probes:
+            found.append(Edit(f"probes.{name}", [written_length(v) for v in offset]))
+    known = {place.name: position_settings(before, place) for place in before.positions}
+    for place in after.positions:
+        settings = position_settings(after, place)
+        if place.name not in known:
+            found.append(Edit("positions", settings, True))
+        elif settings != known[place.name]:
+            found.append(Edit(f"positions[{place.name}]", settings))
+    for k, item in enumerate(after.calibration):
+        said = calibration_settings(after, item)
+        if k >= len(before.calibration):
+            found.append(Edit("calibration", said, True))
+            continue
+        old = calibration_settings(before, before.calibration[k])
+        found += [Edit(f"calibration[{k}].{key}", value) for key, value in said.items() if value != old.get(key)]
+    return tuple(found)
+
+
+def _fields(path: str, before: Any, after: Any) -> list[Edit]:
+    if before is after:
+        return []
+    old, new = before.model_dump(), after.model_dump()
+    return [Edit(f"{path}.{key}", _plain(value)) for key, value in new.items() if value != old[key]]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
+
+
+def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:
+    """What a file says of a position."""
+    said: dict[str, Any] = {"name": position.name}
+    if len(experiment.artefacts) > 1:
+        said["artefact"] = position.artefact
+    said |= _placement(experiment, position)
+    groups = [_group(experiment, position, group) for group in position.readings]
+    return said | (groups[0] if len(groups) == 1 else {"readings": groups})
+
+
+def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
+    layout, pose, d = experiment.layouts[position.artefact], position.pose, experiment.dimension
+    found = plane_of(pose.rotation)
+    if found is None:
+        return {"pose": {"origin": [written_length(v) for v in pose.origin], "rotation": _angles(pose.rotation)}}
+    plane, turns = found
+    normal = AXIS_INDEX[plane]
+    lower = ball_coordinates(pose, layout).min(axis=0)
+    said: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": written_length(pose.origin[normal])}
+    said["corner"] = {axis: written_length(lower[AXIS_INDEX[axis]]) for axis in IN_PLANE_AXES[plane]}
+    return said | ({"quarter_turns": turns} if turns else {})
+
+
+def plane_of(rotation: Array) -> tuple[Any, int] | None:
+    """The plane and the quarter-turns that a rotation (d, d) is, None where it is free.
+
+    >>> plane_of(np.eye(3)), plane_of(-np.eye(2)), plane_of(np.diag([1.0, -1.0, -1.0]))
+    (('z', 0), ('z', 2), None)
+    """
+    for plane in ("x", "y", "z") if len(rotation) == 3 else ("z",):
+        for turns in range(4):
+            if np.abs(rotation - plane_rotation(plane, turns, len(rotation))).max() < 1e-12:
+                return plane, turns
+    return None
+
+
+def plane_rotation(plane: str, turns: int, dimension: int = 3) -> Array:
+    """The rotation (d, d) of an artefact in a plane after quarter-turns."""
+    turn = QUARTER_TURNS[turns % 4]
+    if dimension == 2:
+        return turn.copy()
+    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
+    rotation = np.zeros((3, 3))
+    rotation[np.ix_([first, second], [0, 1])] = turn
+    rotation[AXIS_INDEX[plane], 2] = 1.0
+    return rotation
+
+
+def _angles(rotation: Array) -> Any:
+    """The angles about x, then y, then z, that a rotation is; one angle in two dimensions."""
+    if len(rotation) == 2:
+        return _angle(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    upright = np.hypot(rotation[0, 0], rotation[1, 0])
+    about_y = np.arctan2(-rotation[2, 0], upright)
+    if upright > 1e-9:
+        about_x, about_z = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+    else:
+        about_x, about_z = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
+    return [_angle(value) for value in (about_x, about_y, about_z)]
+
+
+def _angle(value: float) -> str:
+    degrees = float(np.degrees(value)) + 0.0
+    return f"{degrees:.12g} deg"
+
+
+def _group(experiment: Experiment, position: Position, group: ReadingGroup) -> dict[str, Any]:
+    said: dict[str, Any] = {}
+    if len(experiment.probes) > 1 or experiment.dimension == 3:
+        said["probes"] = list(group.probes)
+    if ball_set(experiment.layouts[position.artefact], group.ball_indices) != "all":
+        said["balls"] = list(group.balls)
+    if group.repeats > 1:
+        said["repeats"] = group.repeats
+    if group.standard_uncertainty is not None:
+        values = map(written_length, group.standard_uncertainty)
+        said["standard_uncertainty"] = dict(zip(AXES, values, strict=False))
+    return said
+
+
+def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str, Any]:
+    """What a file says of a calibration item, its certified values left out."""
+    layout = experiment.layouts[item.artefact]
+    said: dict[str, Any] = {"kind": item.kind}
+    if len(experiment.artefacts) > 1:
+        said["artefact"] = item.artefact
+    if isinstance(item, DistanceCalibration):
+        named = [[layout.names[i] for i in pair] for pair in item.pairs.tolist()]
+        said["pairs"] = pair_set(layout, item.pairs) or named
+        if item.dimensions == 2 and experiment.dimension == 3:
+            said["dimensions"] = 2
+        said["standard_uncertainty"] = length_function(item.standard_uncertainty)
+    elif isinstance(item, CoordinateCalibration):
+        balls = ball_set(layout, item.balls)
+        said["balls"] = balls or [layout.names[i] for i in item.balls.tolist()]
+        by_axis = zip(item.axes, item.standard_uncertainties, strict=True)
+        said["standard_uncertainty"] = {AXES[axis]: written_length(u) for axis, u in by_axis}
+    else:
+        said["standard_uncertainty"] = written_length(item.standard_uncertainty)
+    return said
+
+
+def length_function(value: LengthFunction) -> str:
+    """An uncertainty as a file has it.
+
+    >>> length_function(LengthFunction(5e-7, 1e-6))
+    '0.5 um + L/1000000'
+    """
+    constant = written_length(value.constant)
+    return f"{constant} + L/{1.0 / value.slope:.12g}" if value.slope else constant
+
+
+def written_length(value: float) -> str:
+    """A length as a file has it: the shortest that reads well, with all digits where it needs them.
+
+    >>> written_length(0.125), written_length(0.1 / 3)
+    ('125 mm', '0.03333333333333333 m')
+    """
+    value = float(value)
+    text = format_length(value)
+    if abs(parse_length(text) - value) <= 1e-15:
+        return text
+    return f"{value!r} m"
+
+
+def flow(value: Any) -> str:
+    """Plain data as YAML in one line.
+
+    >>> flow({"name": "z low", "corner": {"x": "0 mm"}, "probes": ["a, b", "down"]})
+    "{name: z low, corner: {x: 0 mm}, probes: ['a, b', down]}"
+    """
+    text = yaml.safe_dump(value, default_flow_style=True, width=float("inf"), sort_keys=False, allow_unicode=True)
+    return str(text).removesuffix("\n...\n").strip()
