@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from .checking import CheckedDesign, CheckedFile
+from .planning.tables import repair_lines
 from .tables import verdict_lines
 
 
@@ -25,18 +26,22 @@ def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> lis
         )
         for message in checked.messages
     ]
-    return lines + [_design_line(checked.file, design, workspace) for design in checked.designs]
+    return lines + [line for design in checked.designs for line in _design_lines(checked.file, design, workspace)]
 
 
-def _design_line(file: str, design: CheckedDesign, workspace: Path | None) -> str:
+def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> list[str]:
     told = verdict_lines(design.plan.verdict)
+    suggested = repair_lines(design.repairs, design.plan.verdict)
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space after a hash.
-        return f"as expected: {file}: {design.plan.label}: {told[0]}".replace("##[", "# #[").replace("\n", " ")
+        start = f"as expected: {file}: {design.plan.label}: "
+        return [f"{start}{line}".replace("##[", "# #[").replace("\n", " ") for line in (told[0], *suggested)]
     place = design.place
     # The log of a run shows only the message, so that it names the place again.
-    text = "\n".join([f"{place.file}:{place.line}:{place.column}: {design.plan.label}: {told[0]}", *told[1:]])
-    return _error(place.file, place.line, place.column, f"rank of {design.plan.label}", text, workspace)
+    text = "\n".join(
+        [f"{place.file}:{place.line}:{place.column}: {design.plan.label}: {told[0]}", *told[1:], *suggested]
+    )
+    return [_error(place.file, place.line, place.column, f"rank of {design.plan.label}", text, workspace)]
 
 
 def _error(file: str, line: int, column: int, title: str, text: str, workspace: Path | None) -> str:

@@ -12,15 +12,20 @@ from simulator.experiment.model import Experiment
 from simulator.experiment.variants import unknown_variants
 from simulator.experiment.yamltree import Mark
 
+from .planning.repair import Repairs, repairs
 from .study import Plan, check
 
 
 @dataclass(frozen=True)
 class CheckedDesign:
-    """The verdict on one design; `place` is where its file should change, None where the rank is as expected."""
+    """The verdict on one design; `place` is where its file should change, None where the rank is as expected.
+
+    `repairs` are changes that would determine what is open, None where nothing is or none were asked for.
+    """
 
     plan: Plan
     place: Mark | None
+    repairs: Repairs | None = None
 
 
 @dataclass(frozen=True)
@@ -37,8 +42,12 @@ class CheckedFile:
         return all(design.plan.verdict.as_expected for design in self.designs)
 
 
-def check_files(files: Sequence[Path], variants: Sequence[str] = ()) -> Iterator[CheckedFile]:
+def check_files(
+    files: Sequence[Path], variants: Sequence[str] = (), with_repairs: bool = False
+) -> Iterator[CheckedFile]:
     """Check all files, one after the other; with `variants` only designs of these names.
+
+    With `with_repairs` what would determine the rest is looked for.
 
     A variant that no file has is told last, as the error of all files together.
     """
@@ -49,7 +58,7 @@ def check_files(files: Sequence[Path], variants: Sequence[str] = ()) -> Iterator
             experiments = load(path)
             found |= {experiment.name for experiment in experiments}
             chosen = [one for one in experiments if not variants or one.name in variants]
-            yield CheckedFile(str(path), tuple(map(_checked, chosen)), ())
+            yield CheckedFile(str(path), tuple(_checked(one, with_repairs) for one in chosen), ())
         except ExperimentError as error:
             complete = False
             yield CheckedFile(str(path), (), error.messages)
@@ -59,8 +68,9 @@ def check_files(files: Sequence[Path], variants: Sequence[str] = ()) -> Iterator
         yield CheckedFile(messages[0].file, (), messages)
 
 
-def _checked(experiment: Experiment) -> CheckedDesign:
+def _checked(experiment: Experiment, with_repairs: bool) -> CheckedDesign:
     plan = check(experiment)
+    found = repairs(experiment) if with_repairs else None
     if plan.verdict.as_expected:
-        return CheckedDesign(plan, None)
-    return CheckedDesign(plan, place_in(experiment.source, experiment.name, ("expected_rank_deficiency",)))
+        return CheckedDesign(plan, None, found)
+    return CheckedDesign(plan, place_in(experiment.source, experiment.name, ("expected_rank_deficiency",)), found)

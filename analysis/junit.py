@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from .checking import CheckedDesign, CheckedFile
+from .planning.tables import repair_lines
 from .tables import plan_lines, verdict_lines
 
 # No XML document can hold these, not even as character references.
@@ -41,13 +42,14 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
     case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
+    told = [*plan_lines(design.plan), *repair_lines(design.repairs, design.plan.verdict)]
     if design.place is None:
-        ElementTree.SubElement(case, "system-out").text = _clean("\n".join(plan_lines(design.plan)))
+        ElementTree.SubElement(case, "system-out").text = _clean("\n".join(told))
         return case
     message = _clean(verdict_lines(design.plan.verdict)[0])
     failure = ElementTree.SubElement(case, "failure", {"type": "rank", "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"
-    failure.text = _clean("\n".join([place, *plan_lines(design.plan)]))
+    failure.text = _clean("\n".join([place, *told]))
     return case
 
 

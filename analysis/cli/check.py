@@ -31,6 +31,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "radians",
     )
     parser.add_argument("--json", action="store_const", dest="format", const="json", help="the same as --format json")
+    parser.add_argument(
+        "--suggest",
+        action="store_true",
+        help="tell the cheapest changes after which nothing is undetermined or weakly determined, each verified",
+    )
     parser.set_defaults(run=run)
 
 
@@ -39,19 +44,20 @@ def run(options: Namespace) -> int:
     from ..annotations import annotation_lines
     from ..checking import check_files
     from ..junit import junit_report
+    from ..planning.tables import repair_data, repair_lines
     from ..tables import plan_data, plan_lines
     from .common import print_json, print_lines
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
     files = []
-    for checked in check_files(options.files, options.variant):
+    for checked in check_files(options.files, options.variant, options.suggest):
         files.append(checked)
         if options.format == "github":
             for line in annotation_lines(checked, workspace):
                 print(line, flush=True)
         elif options.format == "text":
             for design in checked.designs:
-                print_lines(plan_lines(design.plan))
+                print_lines([*plan_lines(design.plan), *repair_lines(design.repairs, design.plan.verdict)])
         if options.format in ("text", "json"):
             for message in checked.messages:
                 print(message, file=sys.stderr)
@@ -59,7 +65,8 @@ def run(options: Namespace) -> int:
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([plan_data(design.plan) for design in designs])
+        suggested = [{"repairs": repair_data(design.repairs)} if options.suggest else {} for design in designs]
+        print_json([plan_data(one.plan) | more for one, more in zip(designs, suggested, strict=True)])
     if any(checked.messages for checked in files):
         return BAD_FILE
     return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED

@@ -174,6 +174,11 @@ def rank_of(triangles: Sequence[Array]) -> int:
     return int((np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())
 
 
+def weakest_of(triangles: Sequence[Array]) -> float:
+    """How well the triangles together show the direction that they show least, in standard deviations."""
+    return float(np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False)[-1])
+
+
 def removed(before: Array, after: Array) -> tuple[int, ...]:
     """Which null directions, told by what they do to the machine (parameters, k), are no part of those afterwards.
 

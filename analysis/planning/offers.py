@@ -61,6 +61,8 @@ TIP = 0.05
 # More balls a side, and fewer coefficients, than this are not tried.
 MOST_BALLS_MORE, MOST_COEFFICIENTS_LESS = 6, 6
 TIMES = (2, 4, 9)
+# Distances between two balls of a line.
+MOST_DISTANCES = 200
 
 Generator = Callable[[Experiment], Iterator[Change]]
 
@@ -278,7 +280,7 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
         for factor in (0.5, 0.1):
             better, words = _better(item, factor)
             layout = experiment.layouts[item.artefact]
-            what: str = item.kind
+            what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
             if isinstance(item, DistanceCalibration):
                 what = f"distances ({pair_set(layout, item.pairs) or len(item.pairs)})"
             told = f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard uncertainty)"
@@ -329,8 +331,8 @@ def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
             yield f"{words} ({len(layout.pair_sets[name])})", pairs(layout, name)
 
 
-def row_pairs(layout: BallLayout, most: int = 40) -> list[tuple[int, int]]:
-    """Balls on the same line along x or y as an outer ball of it: from the ends of the edges inwards."""
+def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
+    """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`, evenly from all."""
     found = []
     xy = np.round(layout.coordinates[:, :2], 9)
     for across, along in ((1, 0), (0, 1)):
@@ -338,7 +340,9 @@ def row_pairs(layout: BallLayout, most: int = 40) -> list[tuple[int, int]]:
             members = np.flatnonzero(xy[:, across] == line)
             members = members[np.argsort(xy[members, along], kind="stable")]
             found += [(int(members[0]), int(one)) for one in members[:0:-1]]
-    return found[:: max(len(found) // most, 1)]
+    if len(found) <= MOST_DISTANCES:
+        return found
+    return [found[k] for k in np.linspace(0, len(found) - 1, MOST_DISTANCES).astype(int)]
 
 
 def distance_words(layout: BallLayout, pair: tuple[int, int]) -> str:

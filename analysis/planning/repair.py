@@ -6,7 +6,6 @@ full; none of its members can be left out.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -20,18 +19,20 @@ from simulator.threads import single_threaded
 from ..rank import independent_mixture
 from ..study import Plan, plan
 from .changes import Change, Kind, apply_all, go_together
-from .judging import Examined, Judged, examine, judge, rank_of, removed, seen_by, work
+from .judging import SEEN, Examined, Judged, examine, judge, rank_of, removed, seen_by, weakest_of, work
 from .offers import allowed, offers
 from .written import Edit, edits
 
 # Repairs told, of different kinds.
 MOST_TOLD = 3
-# Changes in a set.
-MOST_TOGETHER = 3
+# Changes in a set: as many as directions are open, within bounds.
+FEWEST_TOGETHER, MOST_TOGETHER = 3, 6
 # Candidates of which every two are compared.
 MOST_PAIRED = 60
 # Judgements of a kind: as many as this amount of work allows, within bounds.
 WORK, FEWEST, MOST = 5e6, 12, 80
+# A smallest singular value below this fraction of what it was is a repair in name only.
+FAINT = 0.01
 # Sets of candidates that are verified before others are looked for.
 MOST_VERIFIED = 8
 
@@ -42,7 +43,8 @@ class Repair:
 
     `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts directions still
     weakly determined, of which `worst` is what one standard deviation along the weakest adds to corrected points, in
-    metres. `smallest` is the smallest singular value. `edits` is what the file is to say.
+    metres. `smallest` is the smallest singular value, and `is_faint` says that it is far below those of the design as it
+    was. `edits` is what the file is to say.
     """
 
     changes: tuple[Change, ...]
@@ -51,6 +53,7 @@ class Repair:
     weak: int
     worst: float
     smallest: float
+    is_faint: bool
     plan: Plan | None
     edits: tuple[Edit, ...]
 
@@ -83,9 +86,10 @@ class _Search:
     def __init__(self, base: Examined) -> None:
         self.base = base
         self.before = base.judged
-        self.tried: Counter[Kind] = Counter()
+        self.tried: dict[Kind, set[Change]] = {}
         self.sets = 0
         self.judged: dict[frozenset[Change], Judged | None] = {}
+        self.together = int(np.clip(self.before.deficiency, FEWEST_TOGETHER, MOST_TOGETHER))
         self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
 
     def run(self) -> Repairs:
@@ -93,16 +97,16 @@ class _Search:
         best: dict[Kind, tuple[Change, ...]] = {}
         singles: list[Change] = []
         for kind, changes in found.items():
-            cured = sum(self.judge(one).is_cured for one in best.values())
+            cured = sum(self.is_sound(self.judge(one)) for one in best.values())
             if cured >= MOST_TOLD or (kind == Kind.MODEL and cured > 1):
                 # To ask for less is the last resort.
                 break
             seen = seen_by(self.base, changes)
-            judged = self.singles(kind, changes, seen)
-            singles += judged
-            possible = [(one,) for one in judged if not self.judge((one,)).deficiency]
+            whole, part = self.singles(kind, changes, seen)
+            singles += [*whole, *part]
+            possible: list[tuple[Change, ...]] = [(one,) for one in whole if not self.judge((one,)).deficiency]
             cheapest = min(map(self.preference, possible), default=None)
-            if kind < Kind.ARTEFACT and (cheapest is None or cheapest[0] or cheapest[1] > MOST_TOGETHER):
+            if kind < Kind.ARTEFACT and (cheapest is None or cheapest[0] or cheapest[1] > 1.0):
                 together = self.set_of(changes, seen)
                 possible += [together] if together else []
             if possible:
@@ -111,11 +115,19 @@ class _Search:
             together = self.greedy([one for kind in found for one in self.thinned(found[kind])])
             if together:
                 best[min(one.kind for one in together)] = together
-        order = sorted(best, key=lambda kind: (not self.judge(best[kind]).is_cured, kind))
+        order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
         complete = tuple(self.told(best[kind]) for kind in order[:MOST_TOLD] if self.helps(best[kind]))
-        is_single = any(len(one.changes) == 1 and not one.weak for one in complete)
+        is_single = any(len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete)
         partial = () if is_single else self.of_single_directions(singles)
-        return Repairs(complete, partial, dict(self.tried), self.sets)
+        return Repairs(complete, partial, {kind: len(self.tried[kind]) for kind in sorted(self.tried)}, self.sets)
+
+    def is_faint(self, after: Judged) -> bool:
+        """Whether what was undetermined is so little determined now that nobody would call it known."""
+        return self.before.deficiency > 0 and after.smallest < FAINT * self.before.smallest
+
+    def is_sound(self, after: Judged) -> bool:
+        """Whether changes repair the design in more than name."""
+        return after.is_cured and not self.is_faint(after)
 
     def helps(self, changes: tuple[Change, ...]) -> bool:
         """Whether changes are worth being told: full rank, or fewer weak directions."""
@@ -128,7 +140,7 @@ class _Search:
         if key not in self.judged:
             self.judged[key] = judge(self.base.experiment, changes)
             if len(changes) == 1:
-                self.tried[changes[0].kind] += 1
+                self.tried.setdefault(changes[0].kind, set()).add(changes[0])
             else:
                 self.sets += 1
         return self.judged[key] or self.before
@@ -136,7 +148,7 @@ class _Search:
     def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
         """A repair that leaves nothing weak first, then the cheapest, then the one that leaves least uncertain."""
         after = self.judge(changes)
-        return not after.is_cured, sum(one.cost for one in changes), len(changes), after.spread
+        return not self.is_sound(after), sum(one.cost for one in changes), len(changes), after.spread
 
     def thinned(self, changes: Sequence[Change]) -> list[Change]:
         """No more of them than can be judged, evenly from all."""
@@ -144,32 +156,30 @@ class _Search:
             return list(changes)
         return [changes[k] for k in np.linspace(0, len(changes) - 1, self.at_most).astype(int)]
 
-    def singles(self, kind: Kind, changes: Sequence[Change], seen: Mapping[Change, Array]) -> list[Change]:
-        """Changes judged one at a time; of additions only those that say something of the null directions."""
+    def singles(
+        self, kind: Kind, changes: Sequence[Change], seen: Mapping[Change, Array]
+    ) -> tuple[list[Change], list[Change]]:
+        """Changes that may suffice, judged one at a time, and additions that remove some of the null directions."""
         useful = []
         for change in changes:
             if change in seen and not rank_of([seen[change]]):
-                self.tried[kind] += 1
+                self.tried.setdefault(kind, set()).add(change)
             else:
                 useful.append(change)
-        # Those that may suffice come first, where there are too many.
         k = self.before.deficiency
         whole = [one for one in useful if one not in seen or rank_of([seen[one]]) == k]
         part = [one for one in useful if one in seen and rank_of([seen[one]]) < k]
         judged = self.cheapest(whole) if kind == Kind.POOL else self.thinned(whole)
         for one in judged:
             self.judge((one,))
-        left = self.at_most - len(judged)
-        for one in part[: max(left, 0)]:
-            self.judge((one,))
-        return [*judged, *part[: max(left, 0)]]
+        return judged, part
 
     def cheapest(self, changes: Sequence[Change]) -> list[Change]:
         """The first of a list in order of cost up to one that cures, and none beyond."""
         found = []
         for change in changes[: self.at_most]:
             found.append(change)
-            if self.judge((change,)).is_cured:
+            if self.is_sound(self.judge((change,))):
                 break
         return found
 
@@ -180,23 +190,24 @@ class _Search:
         if additions and self.before.deficiency:
             for together in self.cheapest_sets(additions, seen):
                 after = self.judge(together)
-                if after.is_cured:
+                if self.is_sound(after):
                     return together
                 nominal = nominal or (together if not after.deficiency else ())
-        return self.greedy(self.thinned(changes)) or nominal
+        useful = [one for one in changes if one not in seen or one in additions]
+        return self.greedy(self.thinned(useful)) or nominal
 
     def cheapest_sets(self, additions: Sequence[Change], seen: Mapping[Change, Array]) -> list[tuple[Change, ...]]:
         """Sets of additions that remove all null directions, the cheapest pairs first, then one that is built up."""
         k = self.before.deficiency
-        few = list(additions[:MOST_PAIRED])
+        ranks = {one: rank_of([seen[one]]) for one in additions}
         pairs = [
             pair
-            for pair in combinations(few, 2)
-            if max(rank_of([seen[one]]) for one in pair) < k
+            for pair in combinations(self.different(additions, seen), 2)
+            if max(ranks[one] for one in pair) < k <= sum(ranks[one] for one in pair)
             and self.may_be(pair)
             and rank_of([seen[one] for one in pair]) == k
         ]
-        pairs.sort(key=lambda pair: sum(one.cost for one in pair))
+        pairs.sort(key=lambda pair: (sum(one.cost for one in pair), -weakest_of([seen[one] for one in pair])))
         built: list[Change] = []
         while rank_of([seen[one] for one in built]) < k:
             now = rank_of([seen[one] for one in built])
@@ -216,6 +227,15 @@ class _Search:
                 built = without
         return [*pairs[:MOST_VERIFIED], *([tuple(built)] if len(built) > 1 else [])]
 
+    def different(self, additions: Sequence[Change], seen: Mapping[Change, Array]) -> list[Change]:
+        """The first of additions, less those that cost the same and say the same as one before."""
+        found: dict[tuple[float, bytes], Change] = {}
+        for one in additions:
+            said = seen[one].T @ seen[one]
+            digits = np.round(said / max(float(np.abs(said).max()), SEEN), 6) + 0.0
+            found.setdefault((one.cost, digits.tobytes()), one)
+        return list(found.values())[:MOST_PAIRED]
+
     def may_be(self, changes: Sequence[Change]) -> bool:
         """Whether changes go together, in the pool's limits."""
         pool = self.base.experiment.pool
@@ -226,7 +246,7 @@ class _Search:
         """A set that is built up of the change that helps most each time, less what can be left out of it."""
         built: tuple[Change, ...] = ()
         after = self.before
-        while not after.is_cured and len(built) < MOST_TOGETHER:
+        while not after.is_cured and len(built) < self.together:
             possible = [(*built, one) for one in changes if self.may_be((*built, one))]
             best = min(possible, key=lambda one: self.judge(one).order, default=())
             if not best or self.judge(best).order >= after.order:
@@ -246,17 +266,16 @@ class _Search:
         if not self.before.deficiency:
             return ()
         told = self.open_errors()
-        order = sorted(singles, key=lambda one: (one.kind, one.cost, self.judge((one,)).spread))
+        order = self.thinned(sorted(singles, key=lambda one: (one.kind, one.cost)))
         found: dict[Change, tuple[int, ...]] = {}
         for k in range(self.before.deficiency):
             for one in order:
                 after = self.judge((one,))
-                if one.kind == Kind.MODEL or not after.deficiency or after.deficiency >= self.before.deficiency:
-                    continue
-                gone = removed(told, after.open_errors)
-                if k in gone:
-                    found[one] = gone
-                    break
+                if one.kind < Kind.MODEL and 0 < after.deficiency < self.before.deficiency:
+                    gone = removed(told, after.open_errors)
+                    if k in gone:
+                        found[one] = gone
+                        break
         return tuple(self.told((one,), gone) for one, gone in found.items())
 
     def open_errors(self) -> Array:
@@ -279,6 +298,7 @@ class _Search:
             after.weak,
             after.worst,
             after.smallest,
+            self.is_faint(after),
             planned,
             edits(experiment, changed),
         )
