@@ -173,7 +173,7 @@ def _laid(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[
     for words, along in _bars(experiment.dimension):
         rotation = _along(along)
         if np.abs(rotation[:, 0] - place.pose.rotation[:, 0]).max() > 1e-9:
-            yield f"lay the bar of {{}} {words}", (rotation, _clean(centre - rotation @ middle))
+            yield f"lay the bar of {{}} {words}", (rotation, np.round(centre - rotation @ middle, 5) + 0.0)
 
 
 def more_readings(experiment: Experiment) -> Iterator[Change]:
@@ -437,7 +437,7 @@ def _bar_poses(experiment: Experiment, artefact: str) -> Iterator[tuple[str, Axi
     centre, middle = 0.5 * (volume.lower + volume.upper), _middle(experiment.layouts[artefact])[:d]
     for words, along in _bars(d):
         rotation = _along(along)
-        yield f"{words}, in the middle of the volume", None, (rotation, _clean(centre - rotation @ middle))
+        yield f"{words}, in the middle of the volume", None, (rotation, np.round(centre - rotation @ middle, 5) + 0.0)
 
 
 def _bars(d: int) -> Iterator[tuple[str, Array]]:

@@ -43,8 +43,8 @@ class Repair:
 
     `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts directions still
     weakly determined, of which `worst` is what one standard deviation along the weakest adds to corrected points, in
-    metres. `smallest` is the smallest singular value, and `is_faint` says that it is far below those of the design as it
-    was. `edits` is what the file is to say.
+    metres. `smallest` is the smallest singular value, and `is_faint` says that it is far below those of the design
+    before. `edits` is what the file is to say.
     """
 
     changes: tuple[Change, ...]

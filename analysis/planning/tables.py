@@ -71,8 +71,10 @@ def _numbers(one: Repair) -> str:
 
 def _names(direction: Direction) -> list[str]:
     """Errors that a direction changes, or else what it changes instead."""
-    errors = [part.name for part in direction.functions]
-    return errors or [part.name for part in (*direction.artefacts, *direction.lengths, *direction.probes)]
+    if direction.functions:
+        return [part.name for part in direction.functions]
+    artefacts, lengths = [part.name for part in direction.artefacts], [part.name for part in direction.lengths]
+    return [*artefacts, *lengths, *(part.name for part in (*direction.probes, *direction.positions))]
 
 
 def _tried(found: Repairs) -> str:

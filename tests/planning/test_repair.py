@@ -1,0 +1,260 @@
+"""Repairs of deficient and weak designs: whatever is told is written out as a file and computed again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from analysis.planning.changes import Kind, apply_all
+from analysis.planning.judging import examine, judge, rank_of, seen_by
+from analysis.planning.offers import offers
+from analysis.planning.repair import Repair, Repairs, repairs
+from analysis.planning.tables import repair_lines
+from analysis.study import check
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment, Position
+from simulator.experiment.pool import AtMost, Candidate, ChangeTimes, Pool
+from simulator.layout import lay_out
+from tests.reference import dense
+
+NPL = Path("designs/npl")
+DEFICIENT = [
+    ("npl/6.1.1", "B"),
+    ("npl/6.1.1", "D"),
+    ("npl/6.2.1", "n=4 NDEL=7"),
+    ("npl/6.2.2", "grid n=7 NDEL=10"),
+    ("hocken_borchardt/angles", "half a turn"),
+    ("hocken_borchardt/angles", "shifted only"),
+    ("hocken_borchardt/angles", "half a turn, equal scales"),
+    ("hurt_foss/bar-bell", "length unknown"),
+    ("hurt_foss/bar-bell", "flat"),
+    ("hurt_foss/bar-bell", "one axis"),
+    ("hurt_foss/bar-bell", "axes only"),
+    ("hurt_foss/bryan-gauge", "radius unknown"),
+]
+
+
+@cache
+def design(file: str, variant: str) -> Experiment:
+    return next(one for one in load(f"designs/{file}.yaml") if one.name == variant)
+
+
+@cache
+def repaired(file: str, variant: str) -> Repairs:
+    found = repairs(design(file, variant))
+    assert found is not None
+    return found
+
+
+def plain(path: Path, variant: str | None) -> dict[str, Any]:
+    """What a file says, with a variant of it written out."""
+    said: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+    for key, value in (said.pop("variants", {}) or {}).get(variant, {}).items():
+        put(said, key, value)
+    said.pop("expected_rank_deficiency", None)
+    return said
+
+
+def put(said: dict[str, Any], path: str, value: Any, is_new: bool = False) -> None:
+    """Set what stands at a path, of which entries of lists are chosen by index or by name."""
+    steps = path.replace("]", "").replace("[", "\0").split("\0")
+    steps = [*steps[0].split("."), *(part for step in steps[1:] for part in step.split(".", 1))]
+    at: Any = said
+    for step in steps[:-1]:
+        at = at[place(at, step)] if isinstance(at, list) else at.setdefault(step, {})
+    last: Any = place(at, steps[-1]) if isinstance(at, list) else steps[-1]
+    if is_new:
+        at.setdefault(last, []).append(value)
+    else:
+        at[last] = value
+
+
+def place(entries: list[Any], step: str) -> int:
+    return int(step) if step.isdigit() else next(k for k, one in enumerate(entries) if one["name"] == step)
+
+
+def written_out(said: dict[str, Any], repair: Repair, folder: Path) -> Experiment:
+    """The experiment of the file with a repair's edits in it."""
+    for edit in repair.edits:
+        put(said, edit.path, edit.value, edit.is_new)
+    path = folder / "repaired.yaml"
+    path.write_text(yaml.safe_dump(said), encoding="utf-8")
+    (found,) = load(path)
+    return found
+
+
+@pytest.mark.parametrize("file, variant", DEFICIENT)
+def test_repaired_files_have_full_rank(file: str, variant: str, tmp_path: Path) -> None:
+    found = repaired(file, variant)
+    before = check(design(file, variant)).verdict
+    assert found.complete
+    for repair in found.complete:
+        after = check(written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)).verdict
+        assert after.deficiency == repair.deficiency == 0
+        assert len(after.weak) == repair.weak
+        np.testing.assert_allclose(after.singular_values[-1], repair.smallest, rtol=1e-5)
+        assert repair.removes == tuple(range(before.deficiency))
+    for repair in found.partial:
+        after = check(written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)).verdict
+        assert after.deficiency == repair.deficiency == before.deficiency - len(repair.removes)
+        # What is left open has no part in what is said to be removed.
+        gone = {part.name for k in repair.removes for part in before.null[k].functions}
+        stays = {
+            part.name for k, one in enumerate(before.null) if k not in repair.removes for part in one.functions
+        }
+        assert not (gone - stays) & {part.name for one in after.null for part in one.functions}
+
+
+@pytest.mark.parametrize("file, variant", DEFICIENT)
+def test_nothing_can_be_left_out(file: str, variant: str) -> None:
+    experiment = design(file, variant)
+    for repair in repaired(file, variant).complete:
+        for left_out in repair.changes if len(repair.changes) > 1 else ():
+            rest = [one for one in repair.changes if one is not left_out]
+            verdict = check(apply_all(rest, experiment)).verdict
+            assert verdict.deficiency or len(verdict.weak) > repair.weak
+
+
+@pytest.mark.parametrize("file, variant", DEFICIENT[:1])
+def test_a_dense_computation_agrees(file: str, variant: str) -> None:
+    experiment = design(file, variant)
+    for changes in [(), *(one.changes for one in repaired(file, variant).complete)]:
+        changed = lay_out(apply_all(changes, experiment))
+        problem = dense.planned(changed, 5, 5)
+        whole = dense.jacobian(lambda step, of=problem: dense.residuals(of, step), problem.parameters)  # type: ignore[misc]
+        assert dense.spread(whole).deficiency == (0 if changes else 2)
+
+
+def test_words_name_errors_and_positions() -> None:
+    experiment = design("npl/6.1.1", "B")
+    lines = repair_lines(repaired("npl/6.1.1", "B"), check(experiment).verdict)
+    first, written = lines[:2]
+    assert 'repair 1: turn position "z low" by ' in first
+    assert "full rank, and nothing is weakly determined; removes undetermined 1 and 2 (" in first
+    assert all(name in first for name in ("EXX", "EYY", "EZZ", "average U6 0.2", "smallest singular value 0.0"))
+    assert written.startswith("repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: ")
+    kinds = [one.changes[0].kind for one in repaired("npl/6.1.1", "B").complete]
+    assert kinds == [Kind.MOVE, Kind.READ_MORE, Kind.CERTIFICATE]
+
+
+@pytest.mark.parametrize("file, variant", DEFICIENT[:3])
+def test_screening_tells_the_rank(file: str, variant: str) -> None:
+    """Rows of added observations on the null directions against the full computation."""
+    base = examine(design(file, variant))
+    additions = [one for changes in offers(base.experiment).values() for one in changes if one.adds is not None]
+    seen = seen_by(base, additions)
+    assert len(seen) == len(additions)
+    generator = np.random.default_rng(3)
+    for k in generator.choice(len(additions), 12, replace=False):
+        after = judge(base.experiment, (additions[k],))
+        assert after is not None and after.deficiency == base.judged.deficiency - rank_of([seen[additions[k]]])
+    for _ in range(6):
+        chosen = [additions[k] for k in generator.choice(len(additions), 2, replace=False)]
+        after = judge(base.experiment, chosen)
+        assert after is not None
+        assert after.deficiency == base.judged.deficiency - rank_of([seen[one] for one in chosen])
+
+
+def small(**changed: Any) -> dict[str, Any]:
+    """A small plate in three planes, every length of which can be changed by its path."""
+    across = {"x": ("right", ["y", "z"]), "y": ("back", ["z", "x"]), "z": ("down", ["x", "y"])}
+    said: dict[str, Any] = {
+        "title": "trap",
+        "machine": {"volume": ["600 mm"] * 3, "repeatability": "0.2 um"},
+        "error_model": {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2},
+        "probes": {
+            "down": ["0 mm", "0 mm", "-50 mm"],
+            "right": ["50 mm", "0 mm", "0 mm"],
+            "back": ["0 mm", "50 mm", "0 mm"],
+        },
+        "artefacts": {"plate": {"kind": "grid", "balls": [4, 4], "size": ["400 mm", "400 mm"]}},
+        "positions": [
+            {
+                "name": f"{plane} {where}",
+                "plane": plane,
+                "level": level,
+                "corner": dict.fromkeys(axes, corner),
+                "quarter_turns": turns,
+                "probes": [probe],
+            }
+            for plane, (probe, axes) in across.items()
+            for where, level, corner, turns in (("low", "100 mm", "20 mm", 0), ("high", "500 mm", "150 mm", 1))
+        ],
+        "calibration": [{"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}],
+        "evaluation": {"points": {"random": 60, "seed": 1}, "probe": "down"},
+    }
+    for path, value in changed.items():
+        said[path] = value
+    return said
+
+
+def only_probe() -> dict[str, Any]:
+    said = small(probes={"down": ["0 mm", "0 mm", "-50 mm"]})
+    for one in said["positions"]:
+        one["probes"] = ["down"]
+    return said
+
+
+def one_plane() -> dict[str, Any]:
+    said = small()
+    said["positions"] = [one for one in said["positions"] if one["plane"] == "z"]
+    return said
+
+
+def no_length() -> dict[str, Any]:
+    return small(calibration=[])
+
+
+def flat_metric() -> dict[str, Any]:
+    return {
+        "title": "one position",
+        "machine": {"volume": ["900 mm", "900 mm"], "repeatability": "0.2 um"},
+        "error_model": {"kind": "metric", "scale": "x"},
+        "artefacts": {"plate": {"kind": "grid", "balls": [4, 4], "size": ["360 mm", "360 mm"]}},
+        "positions": [{"name": "only", "corner": {"x": "100 mm", "y": "200 mm"}}],
+    }
+
+
+def empirical() -> dict[str, Any]:
+    said = one_plane()
+    said["error_model"] = {"kind": "empirical", "terms": "quadratic"}
+    return said
+
+
+def of_a_file() -> dict[str, Any]:
+    said = one_plane()
+    said["machine"]["volume"] = ["1000 mm", "800 mm", "600 mm"]
+    path = Path("designs/park/machines/gec-like.yaml").resolve()
+    said["error_model"] = {"kind": "machine", "file": str(path)}
+    return said
+
+
+TRAPS = {one.__name__: one for one in (only_probe, one_plane, no_length, flat_metric, empirical, of_a_file)}
+
+
+def loaded(said: dict[str, Any], folder: Path) -> Experiment:
+    path = folder / "trap.yaml"
+    path.write_text(yaml.safe_dump(said), encoding="utf-8")
+    (found,) = load(path)
+    return found
+
+
+@pytest.mark.parametrize("trap", sorted(TRAPS))
+def test_traps(trap: str, tmp_path: Path) -> None:
+    said = TRAPS[trap]()
+    experiment = loaded(said, tmp_path)
+    before = check(experiment).verdict
+    found = repairs(experiment)
+    assert before.deficiency and found is not None and found.complete, repair_lines(found, before)
+    for repair in found.complete:
+        after = check(written_out(TRAPS[trap](), repair, tmp_path)).verdict
+        assert after.deficiency == repair.deficiency == 0 and len(after.weak) == repair.weak
+    print("\n".join(repair_lines(found, before)))
