@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -38,6 +38,9 @@ class Kind(IntEnum):
     MODEL = 6
 
 
+# What a calibrated distance, and setting up a position, take as many readings for.
+EFFORT = {Kind.CERTIFICATE: 25.0, Kind.READ_MORE: 1.0, Kind.ADD_POSITION: 1.5, Kind.POOL: 1.0}
+
 KINDS = {
     Kind.POOL: "candidates of the pool",
     Kind.MOVE: "positions moved",
@@ -54,9 +57,10 @@ class Change:
     """What may be changed of an experiment.
 
     `words` is an imperative sentence. `cost` compares changes of one kind: seconds for candidates of a pool, otherwise
-    readings or distances more. Two changes that touch the same thing do not go together. `adds` is the position or the
-    calibration item that the change adds and leaves all others as they are, None where it does otherwise. `candidate`
-    is the index of the pool's candidate, -1 where it is none.
+    readings or distances more. Two changes that touch the same thing do not go together.
+    `adds` is what is observed besides, where everything else stays as it is: a calibration item, a position, or the
+    further readings in the position that `of` names. `candidate` is the index of the pool's candidate, -1 where it is
+    none.
     """
 
     kind: Kind
@@ -65,6 +69,7 @@ class Change:
     touches: frozenset[str]
     apply: Callable[[Experiment], Experiment]
     adds: Position | Calibration | None = None
+    of: str | None = None
     candidate: int = -1
 
 
@@ -108,23 +113,51 @@ def moved(position: Position, rotation: Array, origin: Array) -> Position:
     return replace(position, pose=Pose(rotation, origin))
 
 
-def read_with(position: Position, probe: str) -> Position:
-    """The position with everything that is read in it read with another probe, too."""
-    if len(position.readings) == 1:
-        group = position.readings[0]
-        return replace(position, readings=(replace(group, probes=(*group.probes, probe)),))
+def further(position: Position, probe: str) -> Position:
+    """Everything that is read in a position, read once with another probe, and nothing else."""
     every = {
         int(i): name for group in position.readings for i, name in zip(group.ball_indices, group.balls, strict=True)
     }
     indices = np.array(sorted(every), np.intp)
-    more = ReadingGroup((probe,), tuple(every[int(i)] for i in indices), indices, 1)
-    return replace(position, readings=(*position.readings, more))
+    repeats = min(group.repeats for group in position.readings)
+    group = ReadingGroup((probe,), tuple(every[int(i)] for i in indices), indices, repeats)
+    if len(position.readings) == 1:
+        group = replace(position.readings[0], probes=(probe,))
+    return replace(position, readings=(group,))
 
 
-def repeated(position: Position, times: int) -> Position:
-    """The position with everything read so many times as often."""
+def with_further(experiment: Experiment, name: str, more: Position, probes: Mapping[str, Array]) -> Experiment:
+    """The experiment with the readings of `more` in the position `name` besides, with probes that may be new."""
+    (group,) = more.readings
+    position = _named(experiment, name)
+    same = [
+        k
+        for k, one in enumerate(position.readings)
+        if np.array_equal(one.ball_indices, group.ball_indices) and one.repeats == group.repeats
+    ]
+    groups = [*position.readings]
+    if same and len(groups) == 1:
+        groups[0] = replace(groups[0], probes=(*groups[0].probes, *group.probes))
+    else:
+        groups.append(group)
+    changed = with_position(experiment, replace(position, readings=tuple(groups)))
+    return replace(changed, probes={**experiment.probes, **probes})
+
+
+def with_pose(experiment: Experiment, name: str, pose: Pose) -> Experiment:
+    """The experiment with a position in another pose."""
+    return with_position(experiment, replace(_named(experiment, name), pose=pose))
+
+
+def with_repeats(experiment: Experiment, name: str, times: int) -> Experiment:
+    """The experiment with everything in a position read so many times as often."""
+    position = _named(experiment, name)
     groups = tuple(replace(group, repeats=times * group.repeats) for group in position.readings)
-    return replace(position, readings=groups)
+    return with_position(experiment, replace(position, readings=groups))
+
+
+def _named(experiment: Experiment, name: str) -> Position:
+    return next(one for one in experiment.positions if one.name == name)
 
 
 def probes_of(position: Position) -> tuple[str, ...]:

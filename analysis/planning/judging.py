@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,18 +11,15 @@ import numpy as np
 from simulator.design import Design, nominal_state
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import Factor, eliminate
-from simulator.estimation.observations import reading_blocks
 from simulator.estimation.parameters import SharedLayout, shared_layout
 from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import DistanceCalibration, Experiment, Position
+from simulator.experiment.model import Experiment
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
 
 from ..rank import effects, weak_limit
 from .changes import Change, apply_all
 
-# Rows on null directions, in standard deviations per micrometre, that count for more than rounding.
-SEEN = 1e-6
 # Part of a null direction that counts as its being there, and not rounding.
 THERE = 1e-6
 
@@ -107,76 +104,6 @@ def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | No
 def work(base: Examined) -> float:
     """Size of one judgement: observations times shared parameters."""
     return float(base.design.observations * len(base.layout))
-
-
-def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
-    """What the observations that changes add say of the null directions: a triangle (deficiency, deficiency) for each.
-
-    The pose of an added position is eliminated. Changes that do more than add positions or distances of artefacts that
-    are read already are left out. A set of changes removes as many directions as the rank of its triangles together.
-    """
-    design, null = base.design, base.spectrum.null
-    found: dict[Change, Array] = {}
-    if not base.spectrum.deficiency:
-        return found
-    by_ball = base.spread.ball_null
-    balls = {name: np.flatnonzero(design.ball_artefact == k) for k, name in enumerate(design.artefact_names)}
-    placed = {place.artefact for place in base.experiment.positions}
-    added: list[Position] = []
-    where: dict[Change, int] = {}
-    for change in changes:
-        item = change.adds
-        if isinstance(item, DistanceCalibration) and base.experiment.artefacts[item.artefact].role == "plate":
-            ends = design.balls[balls[item.artefact][item.pairs]].copy()
-            ends[:, :, item.dimensions :] = 0.0
-            along = ends[:, 0] - ends[:, 1]
-            along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]
-            moved = by_ball[balls[item.artefact][item.pairs]]
-            found[change] = _triangle(np.einsum("md,mdk->mk", along, moved[:, 0] - moved[:, 1]))
-        elif (
-            isinstance(item, Position)
-            and item.artefact in placed
-            and base.experiment.artefacts[item.artefact].role == "plate"
-        ):
-            where[change] = len(base.experiment.positions) + len(added)
-            added.append(replace(item, name=f"candidate {len(added)} {item.name}"))
-    if where:
-        extended = lay_out(replace(base.experiment, positions=(*base.experiment.positions, *added)))
-        order = np.argsort(extended.readings.position, kind="stable")
-        first = np.searchsorted(extended.readings.position[order], np.arange(len(extended.position_names) + 1))
-        state = nominal_state(extended)
-        for change, k in where.items():
-            readings = extended.readings.select(order[first[k] : first[k + 1]])
-            blocks = reading_blocks(extended, state, readings, None)
-            rows = blocks.by_model @ null[base.layout.model] + blocks.by_ball @ by_ball[readings.ball]
-            if blocks.by_offset is not None:
-                columns = base.layout.offset_columns[readings.probe]
-                offset_null = np.where(columns[:, :, None] >= 0, null[columns], 0.0)
-                rows = rows + blocks.by_offset @ offset_null
-            flat, poses = rows.reshape(-1, rows.shape[2]), blocks.by_pose.reshape(-1, blocks.by_pose.shape[2])
-            u, sizes, _ = np.linalg.svd(poses, full_matrices=False)
-            u = u[:, sizes > 1e-10 * sizes[0]]
-            found[change] = _triangle(flat - u @ (u.T @ flat))
-    return found
-
-
-def _triangle(rows: Array) -> Array:
-    """A square factor with the same product R' R."""
-    k = rows.shape[1]
-    found = np.linalg.qr(np.concatenate([rows, np.zeros((k, k))]), mode="r")
-    return np.asarray(found)
-
-
-def rank_of(triangles: Sequence[Array]) -> int:
-    """How many directions the triangles together remove."""
-    if not triangles:
-        return 0
-    return int((np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())
-
-
-def weakest_of(triangles: Sequence[Array]) -> float:
-    """How well the triangles together show the direction that they show least, in standard deviations."""
-    return float(np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False)[-1])
 
 
 def removed(before: Array, after: Array) -> tuple[int, ...]:

@@ -39,15 +39,17 @@ from .changes import (
     Kind,
     count_readings,
     distances,
+    further,
     is_inside,
     moved,
     pair_set,
     probes_of,
-    read_with,
-    repeated,
     with_artefact,
     with_calibration,
+    with_further,
+    with_pose,
     with_position,
+    with_repeats,
 )
 from .written import plane_of, plane_rotation
 
@@ -58,6 +60,8 @@ TURNS = {1: "one quarter-turn", 2: "half a turn", 3: "three quarter-turns"}
 LEVELS = (0.25, 0.75, 0.5)
 # Offset of a probe that is to be added where the experiment's own have none.
 TIP = 0.05
+# What readings with it count for, as it has to be made.
+NEW_TIP = 1.5
 # More balls a side, and fewer coefficients, than this are not tried.
 MOST_BALLS_MORE, MOST_COEFFICIENTS_LESS = 6, 6
 TIMES = (2, 4, 9)
@@ -101,7 +105,7 @@ def pool_additions(experiment: Experiment) -> Iterator[Change]:
             else partial(with_calibration, item=one.item)
         )
         words = f'add "{one.name}" of the pool ({duration(one.seconds)})'
-        yield Change(Kind.POOL, words, one.seconds, frozenset({f"candidate {k}"}), add, one.item, k)
+        yield Change(Kind.POOL, words, one.seconds, frozenset({f"candidate {k}"}), add, one.item, candidate=k)
 
 
 def allowed(pool: Pool, chosen: tuple[int, ...]) -> bool:
@@ -128,9 +132,8 @@ def moves(experiment: Experiment) -> Iterator[Change]:
             new = moved(place, *pose)
             if is_inside(new, layout, volume):
                 told = words.format(f'position "{place.name}"')
-                yield Change(
-                    Kind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), partial(with_position, position=new)
-                )
+                apply = partial(with_pose, name=place.name, pose=new.pose)
+                yield Change(Kind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), apply)
 
 
 def _turned(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[Array, Array]]]:
@@ -177,29 +180,23 @@ def _laid(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[
 
 
 def more_readings(experiment: Experiment) -> Iterator[Change]:
-    """Positions read with further probes, those there are and, where they lie on one line, new ones; and repeats."""
-    tips = _new_tips(experiment)
+    """Positions read with further probes, those there are and, where they lie on one line, new ones."""
+    tips = new_tips(experiment)
     for name, offset in {**experiment.probes, **tips}.items():
         for place in experiment.positions:
             if name in probes_of(place) or not _is_plate(experiment, place.artefact) or experiment.dimension == 2:
                 continue
-            new = read_with(place, name)
-            cost = float(count_readings([new]) - count_readings([place]))
+            more = further(place, name)
+            cost = float(count_readings([more]))
             words = f'read position "{place.name}" with probe {name} too'
             if name in tips:
                 # A stylus has to be made.
-                cost *= 1.5
-                words = f'read position "{place.name}" with a new probe too, {_tip_words(offset)}'
-            apply = partial(_read_more, position=new, name=name, offset=offset)
-            yield Change(Kind.READ_MORE, words, cost, frozenset({f"position {place.name}"}), apply)
-    plates = [place for place in experiment.positions if _is_plate(experiment, place.artefact)]
-    for name, offset in tips.items():
-        if len(plates) > 1:
-            every = frozenset(f"position {place.name}" for place in plates)
-            words = f"read every position with a new probe too, {_tip_words(offset)}"
-            cost = 1.5 * sum(count_readings([read_with(place, name)]) - count_readings([place]) for place in plates)
-            apply_all_ = partial(_read_all_more, names=tuple(p.name for p in plates), name=name, offset=offset)
-            yield Change(Kind.READ_MORE, words, float(cost), every, apply_all_)
+                cost *= NEW_TIP
+                words = f'read position "{place.name}" with a new probe too, {_tip_words(name, offset)}'
+            new = {name: offset} if name in tips else {}
+            apply = partial(with_further, name=place.name, more=more, probes=new)
+            touched = frozenset({f"position {place.name} with {name}"})
+            yield Change(Kind.READ_MORE, words, cost, touched, apply, more, place.name)
 
 
 def repeats(experiment: Experiment) -> Iterator[Change]:
@@ -208,21 +205,12 @@ def repeats(experiment: Experiment) -> Iterator[Change]:
         for place in experiment.positions:
             words = f'read position "{place.name}" {times} times'
             cost = float((times - 1) * count_readings([place]))
-            new = repeated(place, times)
-            apply_one = partial(with_position, position=new)
-            yield Change(Kind.READ_MORE, words, cost, frozenset({f"position {place.name}"}), apply_one)
+            touched = frozenset(f"position {place.name} with {name}" for name in experiment.probes)
+            apply = partial(with_repeats, name=place.name, times=times)
+            yield Change(Kind.READ_MORE, words, cost, touched, apply)
 
 
-def _read_more(experiment: Experiment, position: Position, name: str, offset: Array) -> Experiment:
-    return with_position(replace(experiment, probes={**experiment.probes, name: offset}), position)
-
-
-def _read_all_more(experiment: Experiment, names: tuple[str, ...], name: str, offset: Array) -> Experiment:
-    places = tuple(read_with(place, name) if place.name in names else place for place in experiment.positions)
-    return replace(experiment, probes={**experiment.probes, name: offset}, positions=places)
-
-
-def _new_tips(experiment: Experiment) -> dict[str, Array]:
+def new_tips(experiment: Experiment) -> dict[str, Array]:
     """Offsets opposite and perpendicular to those there are, where all of them lie on one line."""
     if experiment.dimension == 2 or experiment.offset_uncertainties:
         return {}
@@ -236,15 +224,15 @@ def _new_tips(experiment: Experiment) -> dict[str, Array]:
         offset = np.zeros(3)
         offset[axis] = sign * size
         if np.linalg.norm(offsets - offset, axis=1).min() > 0.1 * size:
-            name = f"{'-' if sign < 0 else ''}{AXES[axis]}"
+            name = f"{'minus ' if sign < 0 else ''}{AXES[axis]}"
             while name in experiment.probes:
                 name += " new"
             tips[name] = offset
     return tips
 
 
-def _tip_words(offset: Array) -> str:
-    return f"its offset ({', '.join(format_length(v).removesuffix(' mm') for v in offset)}) mm"
+def _tip_words(name: str, offset: Array) -> str:
+    return f"{name}, its offset ({', '.join(format_length(v).removesuffix(' mm') for v in offset)}) mm"
 
 
 def certificates(experiment: Experiment) -> Iterator[Change]:

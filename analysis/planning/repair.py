@@ -6,7 +6,7 @@ full; none of its members can be left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -18,13 +18,16 @@ from simulator.threads import single_threaded
 
 from ..rank import independent_mixture
 from ..study import Plan, plan
-from .changes import Change, Kind, apply_all, go_together
-from .judging import SEEN, Examined, Judged, examine, judge, rank_of, removed, seen_by, weakest_of, work
+from .changes import EFFORT, Change, Kind, apply_all, go_together
+from .judging import Examined, Judged, examine, judge, removed, work
 from .offers import allowed, offers
+from .screening import SEEN, rank_of, seen_by, weakest_of
 from .written import Edit, edits
 
 # Repairs told, of different kinds.
 MOST_TOLD = 3
+# Repairs of single directions told.
+MOST_PARTIAL = 4
 # Changes in a set: as many as directions are open, within bounds.
 FEWEST_TOGETHER, MOST_TOGETHER = 3, 6
 # Candidates of which every two are compared.
@@ -80,6 +83,11 @@ def repairs(experiment: Experiment) -> Repairs | None:
     return _Search(base).run()
 
 
+def effort(change: Change) -> float:
+    """The cost of a change, comparable among additions of all kinds."""
+    return EFFORT.get(change.kind, 1.0) * max(change.cost, 1e-9)
+
+
 class _Search:
     """One search: what was judged, and how often."""
 
@@ -89,37 +97,75 @@ class _Search:
         self.tried: dict[Kind, set[Change]] = {}
         self.sets = 0
         self.judged: dict[frozenset[Change], Judged | None] = {}
+        self.seen: dict[Change, Array] = {}
+        self.ranks: dict[frozenset[Change], int] = {}
         self.together = int(np.clip(self.before.deficiency, FEWEST_TOGETHER, MOST_TOGETHER))
         self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
 
     def run(self) -> Repairs:
         found = offers(self.base.experiment, self.before.deficiency > 0)
+        self.seen = seen_by(self.base, [one for changes in found.values() for one in changes])
         best: dict[Kind, tuple[Change, ...]] = {}
         singles: list[Change] = []
         for kind, changes in found.items():
-            cured = sum(self.is_sound(self.judge(one)) for one in best.values())
-            if cured >= MOST_TOLD or (kind == Kind.MODEL and cured > 1):
+            sound = sum(self.is_sound(self.judge(one)) for one in best.values())
+            if sound >= MOST_TOLD or (kind == Kind.MODEL and sound > 1):
                 # To ask for less is the last resort.
                 break
-            seen = seen_by(self.base, changes)
-            whole, part = self.singles(kind, changes, seen)
+            whole, part = self.singles(kind, changes)
             singles += [*whole, *part]
             possible: list[tuple[Change, ...]] = [(one,) for one in whole if not self.judge((one,)).deficiency]
-            cheapest = min(map(self.preference, possible), default=None)
-            if kind < Kind.ARTEFACT and (cheapest is None or cheapest[0] or cheapest[1] > 1.0):
-                together = self.set_of(changes, seen)
-                possible += [together] if together else []
+            together = self.set_of_additions(changes) if self.is_worth_more(possible) else ()
+            possible += [together] if together else []
             if possible:
                 best[kind] = min(possible, key=self.preference)
-        if not best:
-            together = self.greedy([one for kind in found for one in self.thinned(found[kind])])
-            if together:
-                best[min(one.kind for one in together)] = together
+        for together in self.mixed(found, best):
+            best[max(one.kind for one in together)] = together
         order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
         complete = tuple(self.told(best[kind]) for kind in order[:MOST_TOLD] if self.helps(best[kind]))
         is_single = any(len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete)
         partial = () if is_single else self.of_single_directions(singles)
         return Repairs(complete, partial, {kind: len(self.tried[kind]) for kind in sorted(self.tried)}, self.sets)
+
+    def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
+        """Whether several changes of a kind may be better than the best one."""
+        cheapest = min(map(self.preference, possible), default=None)
+        return cheapest is None or cheapest[0] or cheapest[1] > 1.0
+
+    def mixed(
+        self, found: Mapping[Kind, Sequence[Change]], best: Mapping[Kind, tuple[Change, ...]]
+    ) -> Iterator[tuple[Change, ...]]:
+        """Sets of changes where there is no sound repair but to ask for less: additions of all kinds, then moves too."""
+
+        def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
+            return any(self.is_sound(self.judge(one)) for one in some)
+
+        if is_enough(one for kind, one in best.items() if kind < Kind.ARTEFACT):
+            return
+        additions = [one for changes in found.values() for one in changes]
+        together = self.set_of_additions(additions)
+        if together:
+            yield together
+            if is_enough([together]):
+                return
+        for kind in (Kind.MOVE, *(() if is_enough(best.values()) else (Kind.ARTEFACT, Kind.MODEL))):
+            changes = [one for other in found if other <= kind for one in self.thinned(self.useful(found[other]))]
+            together = self.greedy(found.get(Kind.MOVE, []) if kind == Kind.MOVE else changes)
+            together = together or (self.greedy(changes) if kind == Kind.MOVE else ())
+            if together:
+                yield together
+                return
+
+    def useful(self, changes: Sequence[Change]) -> list[Change]:
+        """Changes less those that add nothing that is missing."""
+        return [one for one in changes if one not in self.seen or self.rank([one])]
+
+    def rank(self, changes: Sequence[Change]) -> int:
+        """How many null directions additions remove together."""
+        key = frozenset(changes)
+        if key not in self.ranks:
+            self.ranks[key] = rank_of([self.seen[one] for one in changes])
+        return self.ranks[key]
 
     def is_faint(self, after: Judged) -> bool:
         """Whether what was undetermined is so little determined now that nobody would call it known."""
@@ -156,19 +202,13 @@ class _Search:
             return list(changes)
         return [changes[k] for k in np.linspace(0, len(changes) - 1, self.at_most).astype(int)]
 
-    def singles(
-        self, kind: Kind, changes: Sequence[Change], seen: Mapping[Change, Array]
-    ) -> tuple[list[Change], list[Change]]:
+    def singles(self, kind: Kind, changes: Sequence[Change]) -> tuple[list[Change], list[Change]]:
         """Changes that may suffice, judged one at a time, and additions that remove some of the null directions."""
-        useful = []
-        for change in changes:
-            if change in seen and not rank_of([seen[change]]):
-                self.tried.setdefault(kind, set()).add(change)
-            else:
-                useful.append(change)
+        useful = self.useful(changes)
+        self.tried.setdefault(kind, set()).update(one for one in changes if one in self.seen)
         k = self.before.deficiency
-        whole = [one for one in useful if one not in seen or rank_of([seen[one]]) == k]
-        part = [one for one in useful if one in seen and rank_of([seen[one]]) < k]
+        whole = [one for one in useful if one not in self.seen or self.rank([one]) == k]
+        part = [one for one in useful if one in self.seen and self.rank([one]) < k]
         judged = self.cheapest(whole) if kind == Kind.POOL else self.thinned(whole)
         for one in judged:
             self.judge((one,))
@@ -183,57 +223,49 @@ class _Search:
                 break
         return found
 
-    def set_of(self, changes: Sequence[Change], seen: Mapping[Change, Array]) -> tuple[Change, ...]:
-        """Several changes of a kind that together leave nothing undetermined; empty if there are none."""
-        additions = [one for one in changes if one in seen and rank_of([seen[one]])]
+    def set_of_additions(self, changes: Sequence[Change]) -> tuple[Change, ...]:
+        """Several additions that together leave nothing undetermined; empty if there are none."""
+        additions = [one for one in changes if one in self.seen and self.rank([one])]
         nominal: tuple[Change, ...] = ()
-        if additions and self.before.deficiency:
-            for together in self.cheapest_sets(additions, seen):
-                after = self.judge(together)
-                if self.is_sound(after):
-                    return together
-                nominal = nominal or (together if not after.deficiency else ())
-        useful = [one for one in changes if one not in seen or one in additions]
-        return self.greedy(self.thinned(useful)) or nominal
+        for together in self.cheapest_sets(additions):
+            after = self.judge(together)
+            if self.is_sound(after):
+                return together
+            nominal = nominal or (together if not after.deficiency else ())
+        return nominal
 
-    def cheapest_sets(self, additions: Sequence[Change], seen: Mapping[Change, Array]) -> list[tuple[Change, ...]]:
+    def cheapest_sets(self, additions: Sequence[Change]) -> list[tuple[Change, ...]]:
         """Sets of additions that remove all null directions, the cheapest pairs first, then one that is built up."""
         k = self.before.deficiency
-        ranks = {one: rank_of([seen[one]]) for one in additions}
         pairs = [
             pair
-            for pair in combinations(self.different(additions, seen), 2)
-            if max(ranks[one] for one in pair) < k <= sum(ranks[one] for one in pair)
+            for pair in combinations(self.different(additions), 2)
+            if max(self.rank([one]) for one in pair) < k <= sum(self.rank([one]) for one in pair)
             and self.may_be(pair)
-            and rank_of([seen[one] for one in pair]) == k
+            and self.rank(pair) == k
         ]
-        pairs.sort(key=lambda pair: (sum(one.cost for one in pair), -weakest_of([seen[one] for one in pair])))
+        pairs.sort(key=lambda pair: (sum(map(effort, pair)), -weakest_of([self.seen[one] for one in pair])))
         built: list[Change] = []
-        while rank_of([seen[one] for one in built]) < k:
-            now = rank_of([seen[one] for one in built])
-            gains = [
-                (rank_of([seen[b] for b in (*built, one)]) - now, one)
-                for one in additions
-                if self.may_be((*built, one))
-            ]
-            gain, best = max(gains, key=lambda one: (one[0] / max(one[1].cost, 1e-9), one[0]), default=(0, None))
-            if best is None or not gain:
-                built = []
-                break
+        while (now := self.rank(built)) < k:
+            possible = [one for one in additions if self.may_be((*built, one))]
+            gains = {one: self.rank([*built, one]) - now for one in possible}
+            best = max(gains, key=lambda one: (gains[one] / effort(one), gains[one]), default=None)
+            if best is None or not gains[best]:
+                return pairs[:MOST_VERIFIED]
             built.append(best)
-        for one in sorted(built, key=lambda one: -one.cost):
+        for one in sorted(built, key=effort, reverse=True):
             without = [other for other in built if other is not one]
-            if rank_of([seen[other] for other in without]) == k:
+            if self.rank(without) == k:
                 built = without
         return [*pairs[:MOST_VERIFIED], *([tuple(built)] if len(built) > 1 else [])]
 
-    def different(self, additions: Sequence[Change], seen: Mapping[Change, Array]) -> list[Change]:
+    def different(self, additions: Sequence[Change]) -> list[Change]:
         """The first of additions, less those that cost the same and say the same as one before."""
         found: dict[tuple[float, bytes], Change] = {}
         for one in additions:
-            said = seen[one].T @ seen[one]
+            said = self.seen[one].T @ self.seen[one]
             digits = np.round(said / max(float(np.abs(said).max()), SEEN), 6) + 0.0
-            found.setdefault((one.cost, digits.tobytes()), one)
+            found.setdefault((effort(one), digits.tobytes()), one)
         return list(found.values())[:MOST_PAIRED]
 
     def may_be(self, changes: Sequence[Change]) -> bool:
@@ -251,7 +283,11 @@ class _Search:
             best = min(possible, key=lambda one: self.judge(one).order, default=())
             if not best or self.judge(best).order >= after.order:
                 break
+            gain = after.deficiency - self.judge(best).deficiency
             built, after = best, self.judge(best)
+            if after.deficiency > gain * (self.together - len(built)):
+                # Later changes help less than the first.
+                break
         if after.deficiency or not self.helps(built):
             return ()
         for one in built:
@@ -276,7 +312,7 @@ class _Search:
                     if k in gone:
                         found[one] = gone
                         break
-        return tuple(self.told((one,), gone) for one, gone in found.items())
+        return tuple(self.told((one,), gone) for one, gone in list(found.items())[:MOST_PARTIAL])
 
     def open_errors(self) -> Array:
         """What the null directions do to the machine, in the form in which they are told."""

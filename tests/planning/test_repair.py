@@ -14,9 +14,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from analysis.planning.changes import Kind, apply_all
-from analysis.planning.judging import examine, judge, rank_of, seen_by
+from analysis.planning.judging import examine, judge
 from analysis.planning.offers import offers
 from analysis.planning.repair import Repair, Repairs, repairs
+from analysis.planning.screening import rank_of, seen_by
 from analysis.planning.tables import repair_lines
 from analysis.study import check
 from simulator.experiment.load import load
@@ -107,9 +108,7 @@ def test_repaired_files_have_full_rank(file: str, variant: str, tmp_path: Path) 
         assert after.deficiency == repair.deficiency == before.deficiency - len(repair.removes)
         # What is left open has no part in what is said to be removed.
         gone = {part.name for k in repair.removes for part in before.null[k].functions}
-        stays = {
-            part.name for k, one in enumerate(before.null) if k not in repair.removes for part in one.functions
-        }
+        stays = {part.name for k, one in enumerate(before.null) if k not in repair.removes for part in one.functions}
         assert not (gone - stays) & {part.name for one in after.null for part in one.functions}
 
 
@@ -140,7 +139,9 @@ def test_words_name_errors_and_positions() -> None:
     assert 'repair 1: turn position "z low" by ' in first
     assert "full rank, and nothing is weakly determined; removes undetermined 1 and 2 (" in first
     assert all(name in first for name in ("EXX", "EYY", "EZZ", "average U6 0.2", "smallest singular value 0.0"))
-    assert written.startswith("repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: ")
+    assert written.startswith(
+        "repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: "
+    )
     kinds = [one.changes[0].kind for one in repaired("npl/6.1.1", "B").complete]
     assert kinds == [Kind.MOVE, Kind.READ_MORE, Kind.CERTIFICATE]
 

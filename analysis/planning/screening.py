@@ -1,0 +1,113 @@
+"""What further observations say of null directions, without a factorisation of the changed design."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from simulator.design import nominal_state
+from simulator.estimation.observations import reading_blocks
+from simulator.experiment.model import DistanceCalibration, Position
+from simulator.layout import lay_out
+from simulator.machines.protocol import Array
+
+from .changes import Change
+from .judging import Examined
+from .offers import new_tips
+
+# Rows on null directions, in standard deviations per micrometre, that count for more than rounding.
+SEEN = 1e-6
+
+
+def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
+    """What the observations that changes add say of the null directions: a triangle (deficiency, deficiency) for each.
+
+    The pose of an added position is eliminated. Changes that do more than add readings or distances of plates that are
+    read already are left out. A set of changes removes as many directions as the rank of its triangles together.
+    """
+    found: dict[Change, Array] = {}
+    if not base.spectrum.deficiency:
+        return found
+    experiment = base.experiment
+    plates = {place.artefact for place in experiment.positions if experiment.artefacts[place.artefact].role == "plate"}
+    added: dict[Change, Position] = {}
+    for change in changes:
+        item = change.adds
+        if item is None or item.artefact not in plates:
+            continue
+        if isinstance(item, DistanceCalibration):
+            found[change] = _by_distances(base, item)
+        elif isinstance(item, Position):
+            added[change] = replace(item, name=f"candidate {len(added)}")
+    return found | _by_readings(base, added)
+
+
+def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
+    design = base.design
+    own = np.flatnonzero(design.ball_artefact == design.artefact_names.index(item.artefact))[item.pairs]
+    along = design.balls[own[:, 0]] - design.balls[own[:, 1]]
+    along[:, item.dimensions :] = 0.0
+    along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]
+    moved = base.spread.ball_null[own]
+    return _triangle(np.einsum("md,mdk->mk", along, moved[:, 0] - moved[:, 1]))
+
+
+def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, Array]:
+    if not added:
+        return {}
+    experiment, null, layout = base.experiment, base.spectrum.null, base.layout
+    own = len(experiment.positions)
+    together = replace(
+        experiment,
+        positions=(*experiment.positions, *added.values()),
+        probes={**experiment.probes, **new_tips(experiment)},
+    )
+    extended = lay_out(together)
+    state = nominal_state(extended)
+    order = np.argsort(extended.readings.position, kind="stable")
+    first = np.searchsorted(extended.readings.position[order], np.arange(own + len(added) + 1))
+    names = [place.name for place in experiment.positions]
+    # What is held does not move.
+    with_held = np.concatenate([null, np.zeros((1, null.shape[1]))])
+    found = {}
+    for k, change in enumerate(added, start=own):
+        readings = extended.readings.select(order[first[k] : first[k + 1]])
+        blocks = reading_blocks(extended, state, readings, None)
+        rows = blocks.by_model @ null[layout.model] + blocks.by_ball @ base.spread.ball_null[readings.ball]
+        if blocks.by_offset is not None:
+            rows = rows + blocks.by_offset @ with_held[layout.offset_columns[readings.probe]]
+        if change.of is None:
+            rows = _without(rows, blocks.by_pose)
+        else:
+            rows = rows + blocks.by_pose @ with_held[layout.pose_columns[names.index(change.of)]]
+        found[change] = _triangle(rows.reshape(-1, rows.shape[2]))
+    return found
+
+
+def _without(rows: Array, by_pose: Array) -> Array:
+    """Rows (m, d, k) less what a pose of its own can do, with derivatives (m, d, pose size)."""
+    u, sizes, _ = np.linalg.svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
+    u = u[:, sizes > 1e-10 * sizes[0]]
+    flat = rows.reshape(len(u), -1)
+    return np.asarray((flat - u @ (u.T @ flat)).reshape(rows.shape))
+
+
+def _triangle(rows: Array) -> Array:
+    """A square factor with the same product R' R."""
+    k = rows.shape[1]
+    found = np.linalg.qr(np.concatenate([rows, np.zeros((k, k))]), mode="r")
+    return np.asarray(found)
+
+
+def rank_of(triangles: Sequence[Array]) -> int:
+    """How many directions the triangles together remove."""
+    if not triangles:
+        return 0
+    return int((np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())
+
+
+def weakest_of(triangles: Sequence[Array]) -> float:
+    """How well the triangles together show the direction that they show least, in standard deviations."""
+    return float(np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False)[-1])
