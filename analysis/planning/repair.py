@@ -135,7 +135,7 @@ class _Search:
     def mixed(
         self, found: Mapping[Kind, Sequence[Change]], best: Mapping[Kind, tuple[Change, ...]]
     ) -> Iterator[tuple[Change, ...]]:
-        """Sets of changes where there is no sound repair but to ask for less: additions of all kinds, then moves too."""
+        """Sets of changes where no sound repair is known but to ask for less: additions first, then moves as well."""
 
         def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
             return any(self.is_sound(self.judge(one)) for one in some)
@@ -237,7 +237,7 @@ class _Search:
     def cheapest_sets(self, additions: Sequence[Change]) -> list[tuple[Change, ...]]:
         """Sets of additions that remove all null directions, the cheapest pairs first, then one that is built up."""
         k = self.before.deficiency
-        pairs = [
+        pairs: list[tuple[Change, ...]] = [
             pair
             for pair in combinations(self.different(additions), 2)
             if max(self.rank([one]) for one in pair) < k <= sum(self.rank([one]) for one in pair)

@@ -15,7 +15,7 @@ from simulator.machines.protocol import Array
 
 from .changes import Change
 from .judging import Examined
-from .offers import new_tips
+from .moves import new_tips
 
 # Rows on null directions, in standard deviations per micrometre, that count for more than rounding.
 SEEN = 1e-6

@@ -214,6 +214,11 @@ def no_length() -> dict[str, Any]:
     return small(calibration=[])
 
 
+def nothing_known() -> dict[str, Any]:
+    """Neither a certificate nor tips at known distances."""
+    return only_probe() | {"calibration": []}
+
+
 def flat_metric() -> dict[str, Any]:
     return {
         "title": "one position",
@@ -238,7 +243,9 @@ def of_a_file() -> dict[str, Any]:
     return said
 
 
-TRAPS = {one.__name__: one for one in (only_probe, one_plane, no_length, flat_metric, empirical, of_a_file)}
+TRAPS = {
+    one.__name__: one for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical, of_a_file)
+}
 
 
 def loaded(said: dict[str, Any], folder: Path) -> Experiment:
@@ -258,4 +265,139 @@ def test_traps(trap: str, tmp_path: Path) -> None:
     for repair in found.complete:
         after = check(written_out(TRAPS[trap](), repair, tmp_path)).verdict
         assert after.deficiency == repair.deficiency == 0 and len(after.weak) == repair.weak
-    print("\n".join(repair_lines(found, before)))
+
+
+def test_an_unknown_scale_needs_a_length(tmp_path: Path) -> None:
+    experiment = loaded(nothing_known(), tmp_path)
+    found = repairs(experiment)
+    assert found is not None
+    for repair in found.complete:
+        words = " ".join(change.words for change in repair.changes)
+        assert "calibrate the " in words or "a new probe too" in words
+
+
+@pytest.mark.parametrize("variant", ["A w=0.01", "C w=0.01"])
+def test_weak_directions(variant: str, tmp_path: Path) -> None:
+    experiment = design("npl/6.1.1-weights", variant)
+    before = check(experiment).verdict
+    assert not before.deficiency and before.weak
+    found = repairs(experiment)
+    assert found is not None and found.complete and not found.partial
+    for repair in found.complete:
+        said = plain(NPL / "6.1.1-weights.yaml", variant)
+        after = check(written_out(said, repair, tmp_path)).verdict
+        assert not after.deficiency and not after.weak and not repair.weak
+    assert "removes" not in " ".join(repair_lines(found, before))
+
+
+def test_nothing_to_repair() -> None:
+    assert repairs(design("npl/6.1.1", "A")) is None
+
+
+def test_what_cannot_be_repaired_says_what_was_tried() -> None:
+    experiment = design("hurt_foss/bryan-gauge", "one plane")
+    (line,) = repair_lines(repairs(experiment), check(experiment).verdict)
+    assert line.startswith("repair: no changes were found after which nothing is open; ")
+
+
+def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost, ...] = ()) -> Pool:
+    """Positions of the experiment, drawn, then three to add: one that tells nothing, and two that tell all."""
+    drawn = [Candidate(one.name, one, 600.0, "", "", True, {}) for one in experiment.positions]
+    low = experiment.positions[0]
+    shifted = replace(low.pose, origin=low.pose.origin + np.array([0.0, 0.0, 0.4]))
+    turned = replace(low.pose, rotation=low.pose.rotation @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
+    turned = replace(turned, origin=low.pose.origin + np.array([0.75, 0.0, 0.2]))
+    aside = replace(low.pose, origin=low.pose.origin + np.array([0.125, 0.0, 0.3]))
+    named = [("in between", shifted), ("turned", turned), ("aside", aside)]
+    more = [
+        Candidate(name, Position(name, "plate", pose, low.readings), time, "z", "more", False, {})
+        for (name, pose), time in zip(named, seconds, strict=True)
+    ]
+    return Pool((*drawn, *more), ChangeTimes(60.0, 600.0), (), at_most, {})
+
+
+def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
+    found = repairs(replace(experiment, pool=pool))
+    assert found is not None
+    return [change.words for one in found.complete for change in one.changes if change.kind == Kind.POOL]
+
+
+def test_the_cheapest_of_a_pool() -> None:
+    experiment = design("npl/6.1.1", "B")
+    assert from_pool(experiment, pool_of(experiment, [60.0, 5400.0, 7200.0])) == ['add "turned" of the pool (1.5 h)']
+    assert from_pool(experiment, pool_of(experiment, [60.0, 5400.0, 1800.0])) == ['add "aside" of the pool (30 min)']
+    # Of the two only as many as the limits leave.
+    no_more = (AtMost((4, 6), 0),)
+    pool = pool_of(experiment, [60.0, 5400.0, 1800.0], no_more)
+    assert from_pool(experiment, pool) == ['add "turned" of the pool (1.5 h)']
+
+
+def test_other_additions_than_the_pools_are_not_told() -> None:
+    experiment = design("npl/6.1.1", "B")
+    found = offers(replace(experiment, pool=pool_of(experiment, [1.0, 2.0, 3.0])))
+    assert Kind.ADD_POSITION not in found and Kind.CERTIFICATE not in found
+    assert [one.cost for one in found[Kind.POOL]] == [1.0, 2.0, 3.0]
+
+
+def test_a_set_of_a_pool_is_minimal() -> None:
+    """Distances of one line each, of which two are needed."""
+    experiment = design("npl/6.1.1", "B")
+    single = [one for one in offers(experiment)[Kind.CERTIFICATE] if one.cost == 1.0]
+    drawn = [Candidate(one.name, one, 600.0, "", "", True, {}) for one in experiment.positions]
+    more = [
+        Candidate(one.words, one.adds, 60.0 * (k + 1), "", "", False, {})
+        for k, one in enumerate(single)
+        if one.adds is not None
+    ]
+    pool = Pool((*drawn, *more), ChangeTimes(0.0, 0.0), (), (), {})
+    found = repairs(replace(experiment, pool=pool))
+    assert found is not None
+    chosen = found.complete[0].changes
+    assert [one.kind for one in chosen] == [Kind.POOL, Kind.POOL]
+    base = examine(experiment)
+    costs = {frozenset((a, b)): a.cost + b.cost for a in chosen for b in chosen if a is not b}
+    seen = seen_by(base, single)
+    cheapest = min(
+        (60.0 * (i + 1) + 60.0 * (k + 1))
+        for i, one in enumerate(single)
+        for k, other in enumerate(single[:i])
+        if rank_of([seen[one], seen[other]]) == 2
+    )
+    assert set(costs.values()) == {cheapest}
+
+
+@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    chosen=st.sets(st.integers(0, 5), min_size=1, max_size=3),
+    coefficients=st.integers(2, 5),
+    turns=st.integers(0, 3),
+    with_length=st.booleans(),
+)
+def test_whatever_is_told_holds(
+    tmp_path_factory: pytest.TempPathFactory, chosen: set[int], coefficients: int, turns: int, with_length: bool
+) -> None:
+    folder = tmp_path_factory.mktemp("any")
+
+    def said() -> dict[str, Any]:
+        found = small()
+        found["positions"] = [found["positions"][k] for k in sorted(chosen)]
+        found["positions"][-1]["quarter_turns"] = turns
+        found["error_model"]["position_coefficients"] = coefficients
+        found["artefacts"]["plate"]["balls"] = [3, 3]
+        found["calibration"] = found["calibration"] if with_length else []
+        return found
+
+    experiment = loaded(said(), folder)
+    before = check(experiment).verdict
+    found = repairs(experiment)
+    if found is None:
+        assert not before.deficiency and not before.weak
+        return
+    for repair in (*found.complete, *found.partial):
+        after = check(written_out(said(), repair, folder)).verdict
+        assert (after.deficiency, len(after.weak)) == (repair.deficiency, repair.weak)
+    for repair in found.complete:
+        assert not repair.deficiency
+        for one in repair.changes if len(repair.changes) > 1 else ():
+            left = judge(experiment, [other for other in repair.changes if other is not one])
+            assert left is not None and (left.deficiency or left.weak > repair.weak)

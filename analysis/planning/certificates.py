@@ -1,0 +1,165 @@
+"""Distances and radii that may be calibrated, or better than they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from simulator.experiment.model import (
+    CoordinateCalibration,
+    DistanceCalibration,
+    Experiment,
+    Indices,
+    RadiusCalibration,
+)
+from simulator.geometry.artefacts import (
+    BallLayout,
+    BryanGaugeSettings,
+    TwoSpheresSettings,
+    pairs,
+)
+from simulator.quantities import LengthFunction, format_length
+
+from .changes import (
+    Change,
+    Kind,
+    distances,
+    pair_set,
+    with_calibration,
+)
+
+# Distances between two balls of a line.
+MOST_DISTANCES = 200
+
+
+def certificates(experiment: Experiment) -> Iterator[Change]:
+    """Distances of plates and lengths of bars and gauges that are not calibrated yet."""
+    for name, settings in experiment.artefacts.items():
+        layout = experiment.layouts[name]
+        if isinstance(settings, BryanGaugeSettings):
+            if not any(item.artefact == name for item in experiment.calibration):
+                u = float(experiment.machine.repeatability.min())
+                radius = RadiusCalibration(name, settings.radius, u)
+                add = partial(with_calibration, item=radius)
+                words = f"calibrate the radius of {name} to {format_length(u)}"
+                yield Change(Kind.CERTIFICATE, words, 1.0, frozenset({f"length of {name}"}), add)
+            continue
+        if settings.role != "plate" and not isinstance(settings, TwoSpheresSettings):
+            continue
+        known = [item for item in experiment.calibration if item.artefact == name]
+        if settings.role != "plate" and known:
+            continue
+        like = like_distances(experiment, name)
+        calibrated = {
+            frozenset(pair) for item in known if isinstance(item, DistanceCalibration) for pair in item.pairs.tolist()
+        }
+        for words, chosen in natural_distances(layout):
+            if any(frozenset(pair) not in calibrated for pair in chosen.tolist()):
+                new = distances(like, layout, chosen)
+                yield calibrated_distances(name, words, new)
+
+
+def better_certificates(experiment: Experiment) -> Iterator[Change]:
+    """Calibration with smaller uncertainties."""
+    for k, item in enumerate(experiment.calibration):
+        for factor in (0.5, 0.1):
+            better, words = _better(item, factor)
+            layout = experiment.layouts[item.artefact]
+            what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
+            if isinstance(item, DistanceCalibration):
+                what = f"distances ({pair_set(layout, item.pairs) or len(item.pairs)})"
+            told = f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard uncertainty)"
+            apply = partial(_with_better, k=k, item=better)
+            yield Change(Kind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply)
+
+
+def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
+    """The change of calibrating distances."""
+    u = length_words(item.standard_uncertainty)
+    told = f"calibrate the {words.replace('{}', artefact)} to {u}"
+    touched = frozenset(f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist())
+    return Change(Kind.CERTIFICATE, told, float(len(item.pairs)), touched, partial(with_calibration, item=item), item)
+
+
+def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration:
+    """Distances of an artefact, none yet, as certain as others of it, or else as readings."""
+    own = [c for c in experiment.calibration if isinstance(c, DistanceCalibration) and c.artefact == artefact]
+    uncertainty = own[0].standard_uncertainty if own else LengthFunction(float(experiment.machine.repeatability.min()))
+    none, no_pairs = np.zeros(0), np.zeros((0, 2), np.intp)
+    dimensions: Any = 2 if experiment.dimension == 2 else 3
+    return DistanceCalibration(artefact, no_pairs, dimensions, none, False, uncertainty, none, "distance", "included")
+
+
+def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
+    """Words and pairs (m, 2) of single distances along the edges, diagonals and rows, and of sets of them."""
+    n = len(layout.names)
+    if n < 2:
+        return
+    if n == 2:
+        yield "distance of its balls on {}", np.array([[0, 1]], np.intp)
+        return
+    singles = [pair for name in ("corner sides", "corner diagonals") for pair in layout.pair_sets.get(name, ())]
+    if not layout.pair_sets:
+        far = np.linalg.norm(layout.coordinates[:, None] - layout.coordinates[None], axis=2)
+        order = np.argsort(-far[np.triu_indices(n, 1)], kind="stable")[:10]
+        singles = [(int(i), int(j)) for i, j in np.column_stack(np.triu_indices(n, 1))[order]]
+    singles += row_pairs(layout)
+    for pair in dict.fromkeys(singles):
+        yield f"distance {distance_words(layout, pair)} of {{}}", np.array([pair], np.intp)
+    for name, words in (
+        ("corner sides", "four sides of {}"),
+        ("corner diagonals", "two diagonals of {}"),
+        ("neighbours", "distances between neighbours on {}"),
+        ("braced", "braced net of distances on {}"),
+    ):
+        if name in layout.pair_sets:
+            yield f"{words} ({len(layout.pair_sets[name])})", pairs(layout, name)
+
+
+def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
+    """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`, evenly from all."""
+    found = []
+    xy = np.round(layout.coordinates[:, :2], 9)
+    for across, along in ((1, 0), (0, 1)):
+        for line in np.unique(xy[:, across]):
+            members = np.flatnonzero(xy[:, across] == line)
+            members = members[np.argsort(xy[members, along], kind="stable")]
+            found += [(int(members[0]), int(one)) for one in members[:0:-1]]
+    if len(found) <= MOST_DISTANCES:
+        return found
+    return [found[k] for k in np.linspace(0, len(found) - 1, MOST_DISTANCES).astype(int)]
+
+
+def distance_words(layout: BallLayout, pair: tuple[int, int]) -> str:
+    """Names of two balls as those of their distance."""
+    return f"{layout.names[pair[0]]}-{layout.names[pair[1]]}"
+
+
+def length_words(value: LengthFunction) -> str:
+    """An uncertainty that may grow with length, in words."""
+    constant = format_length(value.constant)
+    return f"{constant} + L/{1.0 / value.slope:.6g}" if value.slope else constant
+
+
+def _better(item: Any, factor: float) -> tuple[Any, str]:
+    if isinstance(item, DistanceCalibration):
+        old = item.standard_uncertainty
+        new = LengthFunction(factor * old.constant, factor * old.slope)
+        return (
+            replace(item, standard_uncertainty=new, standard_uncertainties=factor * item.standard_uncertainties),
+            length_words(new),
+        )
+    if isinstance(item, CoordinateCalibration):
+        u = factor * item.standard_uncertainties
+        return replace(item, standard_uncertainties=u), format_length(float(u.min()))
+    u = factor * item.standard_uncertainty
+    return replace(item, standard_uncertainty=u), format_length(u)
+
+
+def _with_better(experiment: Experiment, k: int, item: Any) -> Experiment:
+    items = (*experiment.calibration[:k], item, *experiment.calibration[k + 1 :])
+    return replace(experiment, calibration=items)

@@ -1,0 +1,155 @@
+"""Positions that are read anyway, put otherwise or read more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from itertools import product
+
+import numpy as np
+
+from simulator.experiment.model import (
+    Experiment,
+    Position,
+)
+from simulator.geometry.artefacts import (
+    TwoSpheresSettings,
+)
+from simulator.geometry.positions import AXIS_INDEX, QUARTER_TURNS
+from simulator.machines.protocol import Array
+from simulator.quantities import format_length
+
+from .changes import (
+    Change,
+    Kind,
+    count_readings,
+    further,
+    is_inside,
+    moved,
+    probes_of,
+    with_further,
+    with_pose,
+    with_repeats,
+)
+from .placing import along_rotation, bars, clean, is_plate, middle_of, pitch
+from .written import plane_of
+
+AXES = "xyz"
+TURNS = {1: "one quarter-turn", 2: "half a turn", 3: "three quarter-turns"}
+TIMES = (2, 4, 9)
+# Offset of a probe that is to be added where the experiment's own have none.
+TIP = 0.05
+# What readings with it count for, as it has to be made.
+NEW_TIP = 1.5
+
+
+def moves(experiment: Experiment) -> Iterator[Change]:
+    """Positions that are read anyway, turned, shifted or laid otherwise."""
+    volume = experiment.machine.volume
+    for place in experiment.positions:
+        layout = experiment.layouts[place.artefact]
+        for words, pose in (*_turned(experiment, place), *_shifted(experiment, place), *_laid(experiment, place)):
+            new = moved(place, *pose)
+            if is_inside(new, layout, volume):
+                told = words.format(f'position "{place.name}"')
+                apply = partial(with_pose, name=place.name, pose=new.pose)
+                yield Change(Kind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), apply)
+
+
+def _turned(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[Array, Array]]]:
+    """Turned about the middle of the balls, in their own plane."""
+    layout, pose, d = experiment.layouts[place.artefact], place.pose, experiment.dimension
+    if not is_plate(experiment, place.artefact) or len(layout.names) < 2:
+        return
+    middle = middle_of(layout)[:d]
+    for turns, words in TURNS.items():
+        turn = np.eye(d)
+        turn[:2, :2] = QUARTER_TURNS[turns]
+        rotation = pose.rotation @ turn + 0.0
+        centre = pose.rotation @ middle + pose.origin
+        yield f"turn {{}} by {words}", (rotation, clean(centre - rotation @ middle))
+
+
+def _shifted(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[Array, Array]]]:
+    if not is_plate(experiment, place.artefact):
+        return
+    step = pitch(experiment.layouts[place.artefact])
+    plane = plane_of(place.pose.rotation)
+    for axis in range(experiment.dimension):
+        for steps in (0.5, -0.5, 1.0, -1.0):
+            by = np.zeros(experiment.dimension)
+            by[axis] = np.round(steps * step, 4)
+            amount = f"{format_length(abs(by[axis]))} along {'' if steps > 0 else '-'}{AXES[axis]}"
+            words = f"shift {{}} by {amount}"
+            if plane is not None and experiment.dimension == 3 and axis == AXIS_INDEX[plane[0]]:
+                level = format_length(place.pose.origin[axis] + by[axis])
+                words = f"move {{}} to the level {AXES[axis]} = {level}"
+            yield words, (place.pose.rotation.copy(), clean(place.pose.origin + by))
+
+
+def _laid(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[Array, Array]]]:
+    """A bar in other directions, about its middle."""
+    if not isinstance(experiment.artefacts[place.artefact], TwoSpheresSettings):
+        return
+    middle = middle_of(experiment.layouts[place.artefact])[: experiment.dimension]
+    centre = place.pose.rotation @ middle + place.pose.origin
+    for words, along in bars(experiment.dimension):
+        rotation = along_rotation(along)
+        if np.abs(rotation[:, 0] - place.pose.rotation[:, 0]).max() > 1e-9:
+            yield f"lay the bar of {{}} {words}", (rotation, np.round(centre - rotation @ middle, 5) + 0.0)
+
+
+def more_readings(experiment: Experiment) -> Iterator[Change]:
+    """Positions read with further probes, those there are and, where they lie on one line, new ones."""
+    tips = new_tips(experiment)
+    for name, offset in {**experiment.probes, **tips}.items():
+        for place in experiment.positions:
+            if name in probes_of(place) or not is_plate(experiment, place.artefact) or experiment.dimension == 2:
+                continue
+            more = further(place, name)
+            cost = float(count_readings([more]))
+            words = f'read position "{place.name}" with probe {name} too'
+            if name in tips:
+                # A stylus has to be made.
+                cost *= NEW_TIP
+                words = f'read position "{place.name}" with a new probe too, {_tip_words(name, offset)}'
+            new = {name: offset} if name in tips else {}
+            apply = partial(with_further, name=place.name, more=more, probes=new)
+            touched = frozenset({f"position {place.name} with {name}"})
+            yield Change(Kind.READ_MORE, words, cost, touched, apply, more, place.name)
+
+
+def repeats(experiment: Experiment) -> Iterator[Change]:
+    """Positions read several times."""
+    for times in TIMES:
+        for place in experiment.positions:
+            words = f'read position "{place.name}" {times} times'
+            cost = float((times - 1) * count_readings([place]))
+            touched = frozenset(f"position {place.name} with {name}" for name in experiment.probes)
+            apply = partial(with_repeats, name=place.name, times=times)
+            yield Change(Kind.READ_MORE, words, cost, touched, apply)
+
+
+def new_tips(experiment: Experiment) -> dict[str, Array]:
+    """Offsets opposite and perpendicular to those there are, where all of them lie on one line."""
+    if experiment.dimension == 2 or experiment.offset_uncertainties:
+        return {}
+    offsets = np.array(list(experiment.probes.values()))
+    values = np.linalg.svd(offsets - offsets.mean(axis=0), compute_uv=False)
+    if len(values) > 1 and values[1] > 1e-6:
+        return {}
+    size = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) or TIP
+    tips: dict[str, Array] = {}
+    for sign, axis in product((1.0, -1.0), range(3)):
+        offset = np.zeros(3)
+        offset[axis] = sign * size
+        if np.linalg.norm(offsets - offset, axis=1).min() > 0.1 * size:
+            name = f"{'minus ' if sign < 0 else ''}{AXES[axis]}"
+            while name in experiment.probes:
+                name += " new"
+            tips[name] = offset
+    return tips
+
+
+def _tip_words(name: str, offset: Array) -> str:
+    return f"{name}, its offset ({', '.join(format_length(v).removesuffix(' mm') for v in offset)}) mm"
