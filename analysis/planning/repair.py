@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -19,9 +18,10 @@ from simulator.threads import single_threaded
 from ..rank import independent_mixture
 from ..study import Plan, plan
 from .changes import EFFORT, Change, Kind, apply_all, go_together
+from .covering import covering_pairs, covering_set, different
 from .judging import Examined, Judged, examine, judge, removed, work
 from .offers import allowed, offers
-from .screening import SEEN, rank_of, seen_by, weakest_of
+from .screening import rank_of, seen_by, weakest_of
 from .written import Edit, edits
 
 # Repairs told, of different kinds.
@@ -30,8 +30,6 @@ MOST_TOLD = 3
 MOST_PARTIAL = 4
 # Changes in a set: as many as directions are open, within bounds.
 FEWEST_TOGETHER, MOST_TOGETHER = 3, 6
-# Candidates of which every two are compared.
-MOST_PAIRED = 60
 # Judgements of a kind: as many as this amount of work allows, within bounds.
 WORK, FEWEST, MOST = 5e6, 12, 80
 # A smallest singular value below this fraction of what it was is a repair in name only.
@@ -75,12 +73,12 @@ class Repairs:
 
 
 @single_threaded
-def repairs(experiment: Experiment) -> Repairs | None:
-    """Repairs of an experiment's design; None where nothing is undetermined or weakly determined."""
+def repairs(experiment: Experiment, most: int = MOST_TOLD) -> Repairs | None:
+    """Repairs of an experiment's design, `most` at most; None where nothing is undetermined or weakly determined."""
     base = examine(experiment)
     if base.judged.is_cured:
         return None
-    return _Search(base).run()
+    return _Search(base, most).run()
 
 
 def effort(change: Change) -> float:
@@ -91,25 +89,27 @@ def effort(change: Change) -> float:
 class _Search:
     """One search: what was judged, and how often."""
 
-    def __init__(self, base: Examined) -> None:
+    def __init__(self, base: Examined, most: int) -> None:
+        self.most = most
         self.base = base
         self.before = base.judged
         self.tried: dict[Kind, set[Change]] = {}
         self.sets = 0
         self.judged: dict[frozenset[Change], Judged | None] = {}
         self.seen: dict[Change, Array] = {}
-        self.ranks: dict[frozenset[Change], int] = {}
+        self.ranks: dict[Change, int] = {}
         self.together = int(np.clip(self.before.deficiency, FEWEST_TOGETHER, MOST_TOGETHER))
         self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
 
     def run(self) -> Repairs:
         found = offers(self.base.experiment, self.before.deficiency > 0)
         self.seen = seen_by(self.base, [one for changes in found.values() for one in changes])
+        self.ranks = {one: rank_of([said]) for one, said in self.seen.items()}
         best: dict[Kind, tuple[Change, ...]] = {}
         singles: list[Change] = []
         for kind, changes in found.items():
             sound = sum(self.is_sound(self.judge(one)) for one in best.values())
-            if sound >= MOST_TOLD or (kind == Kind.MODEL and sound > 1):
+            if sound >= self.most or (kind == Kind.MODEL and sound > 1):
                 # To ask for less is the last resort.
                 break
             whole, part = self.singles(kind, changes)
@@ -122,7 +122,7 @@ class _Search:
         for together in self.mixed(found, best):
             best[max(one.kind for one in together)] = together
         order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
-        complete = tuple(self.told(best[kind]) for kind in order[:MOST_TOLD] if self.helps(best[kind]))
+        complete = tuple(self.told(best[kind]) for kind in order[: self.most] if self.helps(best[kind]))
         is_single = any(len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete)
         partial = () if is_single else self.of_single_directions(singles)
         return Repairs(complete, partial, {kind: len(self.tried[kind]) for kind in sorted(self.tried)}, self.sets)
@@ -158,14 +158,7 @@ class _Search:
 
     def useful(self, changes: Sequence[Change]) -> list[Change]:
         """Changes less those that add nothing that is missing."""
-        return [one for one in changes if one not in self.seen or self.rank([one])]
-
-    def rank(self, changes: Sequence[Change]) -> int:
-        """How many null directions additions remove together."""
-        key = frozenset(changes)
-        if key not in self.ranks:
-            self.ranks[key] = rank_of([self.seen[one] for one in changes])
-        return self.ranks[key]
+        return [one for one in changes if one not in self.seen or self.ranks[one]]
 
     def is_faint(self, after: Judged) -> bool:
         """Whether what was undetermined is so little determined now that nobody would call it known."""
@@ -207,8 +200,8 @@ class _Search:
         useful = self.useful(changes)
         self.tried.setdefault(kind, set()).update(one for one in changes if one in self.seen)
         k = self.before.deficiency
-        whole = [one for one in useful if one not in self.seen or self.rank([one]) == k]
-        part = [one for one in useful if one in self.seen and self.rank([one]) < k]
+        whole = [one for one in useful if one not in self.seen or self.ranks[one] == k]
+        part = [one for one in useful if one in self.seen and self.ranks[one] < k]
         judged = self.cheapest(whole) if kind == Kind.POOL else self.thinned(whole)
         for one in judged:
             self.judge((one,))
@@ -225,7 +218,7 @@ class _Search:
 
     def set_of_additions(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Several additions that together leave nothing undetermined; empty if there are none."""
-        additions = [one for one in changes if one in self.seen and self.rank([one])]
+        additions = [one for one in changes if one in self.seen and self.ranks[one]]
         nominal: tuple[Change, ...] = ()
         for together in self.cheapest_sets(additions):
             after = self.judge(together)
@@ -236,37 +229,15 @@ class _Search:
 
     def cheapest_sets(self, additions: Sequence[Change]) -> list[tuple[Change, ...]]:
         """Sets of additions that remove all null directions, the cheapest pairs first, then one that is built up."""
-        k = self.before.deficiency
-        pairs: list[tuple[Change, ...]] = [
-            pair
-            for pair in combinations(self.different(additions), 2)
-            if max(self.rank([one]) for one in pair) < k <= sum(self.rank([one]) for one in pair)
-            and self.may_be(pair)
-            and self.rank(pair) == k
+        few = different(additions, self.seen)
+        found: list[tuple[Change, ...]] = [
+            (few[i], few[k])
+            for i, k in covering_pairs([self.seen[one] for one in few])
+            if self.may_be((few[i], few[k]))
         ]
-        pairs.sort(key=lambda pair: (sum(map(effort, pair)), -weakest_of([self.seen[one] for one in pair])))
-        built: list[Change] = []
-        while (now := self.rank(built)) < k:
-            possible = [one for one in additions if self.may_be((*built, one))]
-            gains = {one: self.rank([*built, one]) - now for one in possible}
-            best = max(gains, key=lambda one: (gains[one] / effort(one), gains[one]), default=None)
-            if best is None or not gains[best]:
-                return pairs[:MOST_VERIFIED]
-            built.append(best)
-        for one in sorted(built, key=effort, reverse=True):
-            without = [other for other in built if other is not one]
-            if self.rank(without) == k:
-                built = without
-        return [*pairs[:MOST_VERIFIED], *([tuple(built)] if len(built) > 1 else [])]
-
-    def different(self, additions: Sequence[Change]) -> list[Change]:
-        """The first of additions, less those that cost the same and say the same as one before."""
-        found: dict[tuple[float, bytes], Change] = {}
-        for one in additions:
-            said = self.seen[one].T @ self.seen[one]
-            digits = np.round(said / max(float(np.abs(said).max()), SEEN), 6) + 0.0
-            found.setdefault((effort(one), digits.tobytes()), one)
-        return list(found.values())[:MOST_PAIRED]
+        found.sort(key=lambda pair: (sum(map(effort, pair)), -weakest_of([self.seen[one] for one in pair])))
+        built = covering_set(additions, self.seen, effort, self.may_be)
+        return [*found[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
 
     def may_be(self, changes: Sequence[Change]) -> bool:
         """Whether changes go together, in the pool's limits."""

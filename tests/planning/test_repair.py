@@ -269,20 +269,20 @@ def test_traps(trap: str, tmp_path: Path) -> None:
 
 def test_an_unknown_scale_needs_a_length(tmp_path: Path) -> None:
     experiment = loaded(nothing_known(), tmp_path)
-    found = repairs(experiment)
+    found = repairs(experiment, most=1)
     assert found is not None
     for repair in found.complete:
         words = " ".join(change.words for change in repair.changes)
         assert "calibrate the " in words or "a new probe too" in words
 
 
-@pytest.mark.parametrize("variant", ["A w=0.01", "C w=0.01"])
-def test_weak_directions(variant: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("variant, most", [("A w=0.01", 1), ("C w=0.01", 3)])
+def test_weak_directions(variant: str, most: int, tmp_path: Path) -> None:
     experiment = design("npl/6.1.1-weights", variant)
     before = check(experiment).verdict
     assert not before.deficiency and before.weak
-    found = repairs(experiment)
-    assert found is not None and found.complete and not found.partial
+    found = repairs(experiment, most)
+    assert found is not None and len(found.complete) == most and not found.partial
     for repair in found.complete:
         said = plain(NPL / "6.1.1-weights.yaml", variant)
         after = check(written_out(said, repair, tmp_path)).verdict
@@ -317,7 +317,7 @@ def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost,
 
 
 def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
-    found = repairs(replace(experiment, pool=pool))
+    found = repairs(replace(experiment, pool=pool), most=1)
     assert found is not None
     return [change.words for one in found.complete for change in one.changes if change.kind == Kind.POOL]
 
@@ -350,7 +350,7 @@ def test_a_set_of_a_pool_is_minimal() -> None:
         if one.adds is not None
     ]
     pool = Pool((*drawn, *more), ChangeTimes(0.0, 0.0), (), (), {})
-    found = repairs(replace(experiment, pool=pool))
+    found = repairs(replace(experiment, pool=pool), most=1)
     assert found is not None
     chosen = found.complete[0].changes
     assert [one.kind for one in chosen] == [Kind.POOL, Kind.POOL]
@@ -366,7 +366,7 @@ def test_a_set_of_a_pool_is_minimal() -> None:
     assert set(costs.values()) == {cheapest}
 
 
-@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(
     chosen=st.sets(st.integers(0, 5), min_size=1, max_size=3),
     coefficients=st.integers(2, 5),
@@ -389,7 +389,7 @@ def test_whatever_is_told_holds(
 
     experiment = loaded(said(), folder)
     before = check(experiment).verdict
-    found = repairs(experiment)
+    found = repairs(experiment, most=2)
     if found is None:
         assert not before.deficiency and not before.weak
         return
