@@ -170,6 +170,48 @@ def test_a_junit_report_is_well_formed_for_any_text() -> None:
     assert junit_report([])
 
 
+def test_suggestions_in_every_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    chosen = ["--variant", "A", "--variant", "B", "wrong.yaml"]
+    assert run("check", *chosen) == 1
+    plain = capsys.readouterr().out
+    assert run("check", "--suggest", *chosen) == 1
+    lines = capsys.readouterr().out.splitlines()
+    repairs = [line for line in lines if line.startswith("repair ")]
+    # What is told without suggestions stays as it is, and nothing is suggested where nothing is open.
+    assert [line for line in lines if line not in repairs] == plain.splitlines()
+    assert repairs[0].startswith("repair 1: turn position ") and "full rank" in repairs[0]
+    assert sum("in the file: " not in line for line in repairs) == 3
+
+    assert run("check", "--json", *chosen) == 1
+    before = json.loads(capsys.readouterr().out)
+    assert run("check", "--json", "--suggest", *chosen) == 1
+    good, bad = json.loads(capsys.readouterr().out)
+    assert good.pop("repairs") is None
+    suggested = bad.pop("repairs")
+    assert [good, bad] == before
+    assert [one["rank_deficiency"] for one in suggested["complete"]] == [0, 0, 0]
+    assert suggested["complete"][0]["removes"] == [1, 2]
+    assert suggested["complete"][0]["edits"][0]["path"].startswith("positions[")
+    assert 1e-7 < suggested["complete"][0]["average_U6"] < 1e-6
+
+    assert run("check", "--format", "github", "--suggest", *chosen) == 1
+    as_expected, error = capsys.readouterr().out.splitlines()
+    assert "repair" not in as_expected and "%0Arepair 1: turn position " in error
+    assert run("check", "--format", "junit", "--suggest", *chosen) == 1
+    failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
+    assert failure is not None and "\nrepair 1: turn position " in (failure.text or "")
+
+
+def test_suggestions_for_an_expected_deficiency(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    symmetrical = SYMMETRICAL.name
+    (folder / symmetrical).write_text(
+        (folder / "wrong.yaml").read_text(encoding="utf-8").replace("deficiency: 1", "deficiency: 2"), encoding="utf-8"
+    )
+    assert run("check", "--format", "github", "--suggest", "--variant", "B", symmetrical) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 3 and all(line.startswith(f"as expected: {symmetrical}: 6.1.1[B]: ") for line in lines)
+
+
 def described(name: str) -> Any:
     return yaml.safe_load(Path(name).read_text(encoding="utf-8"))
 
