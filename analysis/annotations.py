@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from .checking import CheckedDesign, CheckedFile
-from .planning.tables import repair_lines
+from .planning.repair.tables import repair_lines
 from .tables import verdict_lines
 
 

@@ -12,7 +12,7 @@ from simulator.experiment.model import Experiment
 from simulator.experiment.variants import unknown_variants
 from simulator.experiment.yamltree import Mark
 
-from .planning.repair import Repairs, repairs
+from .planning.repair.search import Repairs, repairs
 from .study import Plan, check
 
 
@@ -58,7 +58,9 @@ def check_files(
             experiments = load(path)
             found |= {experiment.name for experiment in experiments}
             chosen = [one for one in experiments if not variants or one.name in variants]
-            yield CheckedFile(str(path), tuple(_checked(one, with_repairs) for one in chosen), ())
+            # What a plan may choose from is loaded where it is asked for only.
+            pools = {one.name: one for one in load(path, planning=True)} if with_repairs else {}
+            yield CheckedFile(str(path), tuple(_checked(one, pools.get(one.name)) for one in chosen), ())
         except ExperimentError as error:
             complete = False
             yield CheckedFile(str(path), (), error.messages)
@@ -68,9 +70,9 @@ def check_files(
         yield CheckedFile(messages[0].file, (), messages)
 
 
-def _checked(experiment: Experiment, with_repairs: bool) -> CheckedDesign:
+def _checked(experiment: Experiment, with_pool: Experiment | None) -> CheckedDesign:
     plan = check(experiment)
-    found = repairs(experiment) if with_repairs else None
+    found = None if with_pool is None else repairs(with_pool)
     if plan.verdict.as_expected:
         return CheckedDesign(plan, None, found)
     return CheckedDesign(plan, place_in(experiment.source, experiment.name, ("expected_rank_deficiency",)), found)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from .checking import CheckedDesign, CheckedFile
-from .planning.tables import repair_lines
+from .planning.repair.tables import repair_lines
 from .tables import plan_lines, verdict_lines
 
 # No XML document can hold these, not even as character references.

@@ -44,7 +44,7 @@ def run(options: Namespace) -> int:
     from ..annotations import annotation_lines
     from ..checking import check_files
     from ..junit import junit_report
-    from ..planning.tables import repair_data, repair_lines
+    from ..planning.repair.tables import repair_data, repair_lines
     from ..tables import plan_data, plan_lines
     from .common import print_json, print_lines
 

@@ -13,12 +13,13 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analysis.planning.changes import Kind, apply_all
-from analysis.planning.judging import examine, judge
-from analysis.planning.offers import offers
-from analysis.planning.repair import Repair, Repairs, repairs
-from analysis.planning.screening import rank_of, seen_by
-from analysis.planning.tables import repair_lines
+from analysis.checking import check_files
+from analysis.planning.repair.changes import Kind, apply_all
+from analysis.planning.repair.judging import examine, judge
+from analysis.planning.repair.offers import offers
+from analysis.planning.repair.screening import rank_of, seen_by
+from analysis.planning.repair.search import Repair, Repairs, repairs
+from analysis.planning.repair.tables import repair_lines
 from analysis.study import check
 from simulator.experiment.load import load
 from simulator.experiment.model import Experiment, Position
@@ -329,6 +330,20 @@ def test_the_cheapest_of_a_pool() -> None:
     no_more = (AtMost((4, 6), 0),)
     pool = pool_of(experiment, [60.0, 5400.0, 1800.0], no_more)
     assert from_pool(experiment, pool) == ['add "turned" of the pool (1.5 h)']
+
+
+def test_a_pool_of_a_file(tmp_path: Path) -> None:
+    """Two positions left of a day's plan; of its pool also the bar, which nothing else places."""
+    said = plain(Path("designs/planning/campaign.yaml"), None)
+    path = tmp_path / "campaign.yaml"
+    path.write_text(yaml.safe_dump(said), encoding="utf-8")
+    (checked,) = check_files([path], with_repairs=True)
+    (one,) = checked.designs
+    assert one.repairs is not None and one.plan.verdict.deficiency
+    first = one.repairs.complete[0]
+    assert [change.kind for change in first.changes] == [Kind.POOL]
+    after = check(written_out(said, first, tmp_path)).verdict
+    assert not after.deficiency and not after.weak
 
 
 def test_other_additions_than_the_pools_are_not_told() -> None:

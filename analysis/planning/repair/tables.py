@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..bar_cures import listed
-from ..rank import Direction, Verdict, length
-from ..tables import finite, number
+from ...bar_cures import listed
+from ...rank import Direction, Verdict, length
+from ...tables import finite, number
 from .changes import KINDS
-from .repair import Repair, Repairs
+from .search import Repair, Repairs
 
 # Names of errors that a line has room for.
 MOST_NAMES = 8

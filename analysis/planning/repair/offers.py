@@ -9,7 +9,7 @@ from simulator.experiment.model import (
     Experiment,
     Position,
 )
-from simulator.experiment.pool import Pool
+from simulator.experiment.pool import Pool, placed_only
 
 from .certificates import better_certificates, certificates
 from .changes import (
@@ -39,8 +39,9 @@ def offers(experiment: Experiment, is_deficient: bool = True) -> dict[Kind, list
         makers += [(Kind.CERTIFICATE, certificates), (Kind.ADD_POSITION, positions)]
     makers += [(Kind.ARTEFACT, more_balls), (Kind.MODEL, fewer_coefficients)]
     found: dict[Kind, list[Change]] = {kind: [] for kind, _ in sorted(makers, key=lambda one: one[0])}
+    placed = placed_only(experiment)
     for kind, maker in makers:
-        found[kind] += maker(experiment)
+        found[kind] += maker(experiment if kind == Kind.POOL else placed)
     return {kind: sorted(changes, key=lambda one: one.cost) for kind, changes in found.items()}
 
 

@@ -14,7 +14,7 @@ from simulator.geometry.artefacts import (
 )
 from simulator.machines.protocol import Array
 
-from ..bar_cures import bar_directions
+from ...bar_cures import bar_directions
 
 
 def bars(d: int) -> Iterator[tuple[str, Array]]:

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulator.experiment.model import Experiment
+from simulator.experiment.pool import placed_only
 from simulator.machines.protocol import Array
 from simulator.threads import single_threaded
 
-from ..rank import independent_mixture
-from ..study import Plan, plan
+from ...rank import independent_mixture
+from ...study import Plan, plan
 from .changes import EFFORT, Change, Kind, apply_all, go_together
 from .covering import covering_pairs, covering_set, different
 from .judging import Examined, Judged, examine, judge, removed, work
@@ -294,7 +295,7 @@ class _Search:
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)
         after = self.judge(changes)
-        planned = plan(changed) if removes is None else None
+        planned = plan(placed_only(changed)) if removes is None else None
         if planned is not None and planned.verdict.deficiency != after.deficiency:
             raise AssertionError("two computations of one design's rank differ")
         gone = tuple(range(self.before.deficiency)) if removes is None else removes

@@ -10,6 +10,7 @@ import numpy as np
 from simulator.design import nominal_state
 from simulator.estimation.observations import reading_blocks
 from simulator.experiment.model import DistanceCalibration, Position
+from simulator.experiment.pool import placed_only
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
 
@@ -64,7 +65,7 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
         positions=(*experiment.positions, *added.values()),
         probes={**experiment.probes, **new_tips(experiment)},
     )
-    extended = lay_out(together)
+    extended = lay_out(placed_only(together))
     state = nominal_state(extended)
     order = np.argsort(extended.readings.position, kind="stable")
     first = np.searchsorted(extended.readings.position[order], np.arange(own + len(added) + 1))

@@ -14,10 +14,11 @@ from simulator.estimation.elimination import Factor, eliminate
 from simulator.estimation.parameters import SharedLayout, shared_layout
 from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
+from simulator.experiment.pool import placed_only
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
 
-from ..rank import effects, weak_limit
+from ...rank import effects, weak_limit
 from .changes import Change, apply_all
 
 # Part of a null direction that counts as its being there, and not rounding.
@@ -83,11 +84,11 @@ class Examined:
 
 
 def examine(experiment: Experiment) -> Examined:
-    """Rank of an experiment's design in full.
+    """Rank of an experiment's design in full, without what only its pool places.
 
     :raises ExperimentError: the design cannot be laid out.
     """
-    design = lay_out(experiment)
+    design = lay_out(placed_only(experiment))
     layout = shared_layout(design)
     factor = eliminate(design, layout, nominal_state(design))
     return Examined(experiment, design, layout, factor, spectrum(factor))
