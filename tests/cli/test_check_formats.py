@@ -18,7 +18,9 @@ from analysis.annotations import annotation_lines, in_message, in_property
 from analysis.checking import CheckedFile, check_files
 from analysis.cli import main
 from analysis.junit import junit_report
+from analysis.planning.repair.search import Repairs, repairs
 from simulator.experiment.messages import Message
+from simulator.experiment.model import Experiment
 
 QUICKSTART = Path("designs/quickstart.yaml")
 SYMMETRICAL = Path("designs/npl/6.1.1.yaml")
@@ -170,17 +172,30 @@ def test_a_junit_report_is_well_formed_for_any_text() -> None:
     assert junit_report([])
 
 
-def test_suggestions_in_every_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Repairs of designs of the same name are looked for once."""
+
+    def repairs_of(experiment: Experiment) -> Repairs | None:
+        if experiment.label not in known:
+            known[experiment.label] = repairs(experiment)
+        return known[experiment.label]
+
+    known: dict[str, Repairs | None] = {}
+    monkeypatch.setattr("analysis.checking.repairs", repairs_of)
+
+
+def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]) -> None:
     chosen = ["--variant", "A", "--variant", "B", "wrong.yaml"]
     assert run("check", *chosen) == 1
     plain = capsys.readouterr().out
     assert run("check", "--suggest", *chosen) == 1
     lines = capsys.readouterr().out.splitlines()
-    repairs = [line for line in lines if line.startswith("repair ")]
+    repairs_told = [line for line in lines if line.startswith("repair ")]
     # What is told without suggestions stays as it is, and nothing is suggested where nothing is open.
-    assert [line for line in lines if line not in repairs] == plain.splitlines()
-    assert repairs[0].startswith("repair 1: turn position ") and "full rank" in repairs[0]
-    assert sum("in the file: " not in line for line in repairs) == 3
+    assert [line for line in lines if line not in repairs_told] == plain.splitlines()
+    assert repairs_told[0].startswith("repair 1: turn position ") and "full rank" in repairs_told[0]
+    assert sum("in the file: " not in line for line in repairs_told) == 3
 
     assert run("check", "--json", *chosen) == 1
     before = json.loads(capsys.readouterr().out)
@@ -201,15 +216,14 @@ def test_suggestions_in_every_format(folder: Path, capsys: pytest.CaptureFixture
     failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
     assert failure is not None and "\nrepair 1: turn position " in (failure.text or "")
 
-
-def test_suggestions_for_an_expected_deficiency(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    symmetrical = SYMMETRICAL.name
-    (folder / symmetrical).write_text(
+    # A deficiency that is expected is no error, and repaired all the same.
+    (folder / "wrong.yaml").write_text(
         (folder / "wrong.yaml").read_text(encoding="utf-8").replace("deficiency: 1", "deficiency: 2"), encoding="utf-8"
     )
-    assert run("check", "--format", "github", "--suggest", "--variant", "B", symmetrical) == 0
+    assert run("check", "--format", "github", "--suggest", "--variant", "B", "wrong.yaml") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) > 3 and all(line.startswith(f"as expected: {symmetrical}: 6.1.1[B]: ") for line in lines)
+    assert len(lines) == len(repairs_told) + 1
+    assert all(line.startswith("as expected: wrong.yaml: wrong[B]: ") for line in lines)
 
 
 def described(name: str) -> Any:

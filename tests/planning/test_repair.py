@@ -51,7 +51,7 @@ def design(file: str, variant: str) -> Experiment:
 
 @cache
 def repaired(file: str, variant: str) -> Repairs:
-    found = repairs(design(file, variant))
+    found = repairs(design(file, variant), most=2 if variant in ("D", "n=4 NDEL=7", "grid n=7 NDEL=10") else 3)
     assert found is not None
     return found
 
@@ -261,7 +261,7 @@ def test_traps(trap: str, tmp_path: Path) -> None:
     said = TRAPS[trap]()
     experiment = loaded(said, tmp_path)
     before = check(experiment).verdict
-    found = repairs(experiment)
+    found = repairs(experiment, most=2)
     assert before.deficiency and found is not None and found.complete, repair_lines(found, before)
     for repair in found.complete:
         after = check(written_out(TRAPS[trap](), repair, tmp_path)).verdict
@@ -277,7 +277,7 @@ def test_an_unknown_scale_needs_a_length(tmp_path: Path) -> None:
         assert "calibrate the " in words or "a new probe too" in words
 
 
-@pytest.mark.parametrize("variant, most", [("A w=0.01", 1), ("C w=0.01", 3)])
+@pytest.mark.parametrize("variant, most", [("A w=0.01", 1), ("C w=0.01", 1)])
 def test_weak_directions(variant: str, most: int, tmp_path: Path) -> None:
     experiment = design("npl/6.1.1-weights", variant)
     before = check(experiment).verdict
@@ -380,7 +380,7 @@ def test_a_set_of_a_pool_is_minimal() -> None:
     assert set(costs.values()) == {cheapest}
 
 
-@settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=3, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(
     chosen=st.sets(st.integers(0, 5), min_size=1, max_size=3),
     coefficients=st.integers(2, 3),
