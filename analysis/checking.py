@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from simulator.experiment.load import load, place_in
 from simulator.experiment.messages import ExperimentError, Message
@@ -12,8 +13,10 @@ from simulator.experiment.model import Experiment
 from simulator.experiment.variants import unknown_variants
 from simulator.experiment.yamltree import Mark
 
-from .planning.repair.search import Repairs, repairs
 from .study import Plan, check
+
+if TYPE_CHECKING:
+    from .planning.repair.search import Repairs
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,11 @@ def check_files(
 
 def _checked(experiment: Experiment, with_pool: Experiment | None) -> CheckedDesign:
     plan = check(experiment)
-    found = None if with_pool is None else repairs(with_pool)
+    found = None
+    if with_pool is not None:
+        from .planning.repair.search import repairs
+
+        found = repairs(with_pool)
     if plan.verdict.as_expected:
         return CheckedDesign(plan, None, found)
     return CheckedDesign(plan, place_in(experiment.source, experiment.name, ("expected_rank_deficiency",)), found)

@@ -182,7 +182,7 @@ def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return known[experiment.label]
 
     known: dict[str, Repairs | None] = {}
-    monkeypatch.setattr("analysis.checking.repairs", repairs_of)
+    monkeypatch.setattr("analysis.planning.repair.search.repairs", repairs_of)
 
 
 def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...bar_cures import listed
 from ...rank import Direction, Verdict, length
 from ...tables import finite, number
 from .changes import KINDS
-from .search import Repair, Repairs
+
+if TYPE_CHECKING:
+    from .search import Repair, Repairs
 
 # Names of errors that a line has room for.
 MOST_NAMES = 8
