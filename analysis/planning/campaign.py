@@ -202,7 +202,7 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     first = starts(problem, drawn, MANY_STARTS if is_small else FEW_STARTS, seed)
     # In a small pool most selections are met again and again, and one process remembers them.
     shares = [first] if is_small else [[start] for start in first]
-    depth = 3 if problem.constraints.count <= VERY_SMALL_POOL else 2 if is_small else 1
+    depth = 2 if is_small else 1
     tasks: list[tuple[object, ...]] = [(problem, None, 0), *((problem, share, depth) for share in shares)]
     relaxed, *found = in_processes(_task, tasks, workers)
     selections = [one for some in found if isinstance(some, list) for one in some]
@@ -222,7 +222,8 @@ def _task(problem: Problem, from_: Sequence[Collection[int]] | None, at_once: in
     if from_ is None:
         return bound(problem)
     losses = Losses(problem)
-    return [improve(problem, start, losses, at_once) for start in from_]
+    thorough = problem.constraints.count <= VERY_SMALL_POOL
+    return [improve(problem, start, losses, at_once, thorough) for start in from_]
 
 
 def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:

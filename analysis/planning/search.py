@@ -193,11 +193,12 @@ def _filled(problem: Problem, members: frozenset[int], losses: Losses, per_secon
 
 
 @single_threaded
-def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: int) -> Found:
+def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: int, thorough: bool = False) -> Found:
     """The best selection that exchanges lead to from a start within the limits.
 
     One candidate is taken out at a time and the gap filled anew until that gains nothing, then two, and so on up to
-    `at_once`.
+    `at_once`. Where it is `thorough`, the gap is filled beginning with each candidate in turn, which gets out of traps that
+    tight limits set.
     """
     members = fill(problem, start, losses)
     size = 1
@@ -205,7 +206,11 @@ def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: i
         before = members
         for gone in combinations(sorted(members - problem.constraints.must), size):
             if members.issuperset(gone):
-                found = fill(problem, members.difference(gone), losses)
+                left = members.difference(gone)
+                found = fill(problem, left, losses)
+                if thorough:
+                    begun = [fill(problem, left | {int(k)}, losses) for k in problem.constraints.additions(left)]
+                    found = min([found, *begun], key=losses.of)
                 if losses.of(found) < losses.of(members) * (1 - GAIN):
                     members = found
         size = size + 1 if members == before else 1
