@@ -23,6 +23,7 @@ def parser() -> argparse.ArgumentParser:
         init,
         lengths,
         map,
+        plan,
         reach,
         reliability,
         report,
@@ -41,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    experiments = (check, run, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
+    experiments = (check, run, plan, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
     return top

@@ -89,8 +89,27 @@ def draw(draw_to: Callable[[Path], None], path: Path) -> bool:
     return True
 
 
-def experiments(options: Namespace) -> list[Experiment]:
-    """Experiments of all files, every variant one of its own, less those not chosen.
+def write(path: Path, text: str, force: bool = False) -> None:
+    """Write a text file, no other in its place unless with `force`.
+
+    :raises ExperimentError: there is such a file already, or it cannot be written.
+    """
+    from simulator.experiment.messages import ExperimentError, Message
+
+    try:
+        with path.open("w" if force else "x", encoding="utf-8", newline="") as stream:
+            stream.write(text)
+    except FileExistsError:
+        told = "exists already; name a new file, or overwrite it with --force"
+        raise ExperimentError([Message(str(path), 0, 0, "", told)]) from None
+    except OSError as error:
+        told = f"cannot be written ({error.strerror}); name another file"
+        raise ExperimentError([Message(str(path), 0, 0, "", told)]) from None
+    print(f"{path} written", file=sys.stderr)
+
+
+def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
+    """Experiments of all files, every variant one of its own, less those not chosen; with pools for `planning`.
 
     :raises ExperimentError: the errors of all files together.
     """
@@ -102,7 +121,7 @@ def experiments(options: Namespace) -> list[Experiment]:
     messages: list[Message] = []
     for path in options.files:
         try:
-            found += load(path)
+            found += load(path, planning=planning)
         except ExperimentError as error:
             messages += error.messages
     if messages:
@@ -115,14 +134,14 @@ def experiments(options: Namespace) -> list[Experiment]:
     return [experiment for experiment in found if experiment.name in options.variant]
 
 
-def single(options: Namespace) -> Experiment:
-    """The one experiment that the options choose.
+def single(options: Namespace, planning: bool = False) -> Experiment:
+    """The one experiment that the options choose, with its pool for `planning`.
 
     :raises ExperimentError: the file has several variants and none was chosen.
     """
     from simulator.experiment.messages import ExperimentError, Message
 
-    found = experiments(options)
+    found = experiments(options, planning)
     if len(found) > 1:
         names = [str(experiment.name) for experiment in found]
         text = f"the file has several variants; choose one with --variant: {', '.join(names)}"

@@ -72,8 +72,8 @@ class Campaign:
 
     `chosen` in the order of the pool, `done` those of them that have been read already. `value` is infinite where the
     selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
-    `drawn` is the criterion of the positions of the experiment itself, where these keep to the limits or not, None
-    without any. `plan` judges the experiment with the chosen candidates in full.
+    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to the
+    limits or not; None without any. `plan` judges the experiment with the chosen candidates in full.
     """
 
     experiment: Experiment
@@ -109,14 +109,16 @@ def campaign(
     experiment: Experiment,
     request: Request,
     done: Mapping[int, Candidate] | None = None,
+    earlier: Collection[int] | None = None,
     workers: int = 1,
     report: Callable[[str], None] = lambda step: None,
 ) -> Campaign:
     """Choose from the pool of an experiment.
 
     `done` are candidates that have been read already, by index, with the readings that were taken: they are kept and
-    cost nothing more. Without a budget the choice may cost what the experiment's own positions do, less what is done.
-    The result does not depend on the number of `workers`; `report` is told what is being done.
+    cost nothing more. `earlier` are the indices of an earlier choice, which the plan is compared with and never worse
+    than within the same budget; without it that is the experiment's own positions. Without a budget the choice may cost
+    what these do, less what is done. The result does not depend on the number of `workers`; `report` is told what is being done.
 
     :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
     """
@@ -129,7 +131,7 @@ def campaign(
     report(f"information of {len(candidates)} candidates")
     information = pool_information(experiment, candidates, is_about_balls(request.criterion))
     wanted = criterion(information, experiment, request.criterion)
-    drawn = [k for k, candidate in enumerate(candidates) if candidate.drawn]
+    drawn = sorted(earlier) if earlier else [k for k, candidate in enumerate(candidates) if candidate.drawn]
     free = constraints(candidates, pool.changes, Budget(), pool.must, pool.at_most, list(read))
     reference = sorted({*drawn, *free.must})
     budget = request.budget or _as_drawn(experiment, free, drawn, reference)

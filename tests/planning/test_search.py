@@ -99,7 +99,11 @@ def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limi
         return
     best = values(name)[allowed].min()
     losses = Losses(problem)
-    found = [improve(problem, start, losses, 2, thorough=True) for start in starts(problem, (), 8, 1) if limited.allows(start)]
+    found = [
+        improve(problem, start, losses, 2, thorough=True)
+        for start in starts(problem, (), 8, 1)
+        if limited.allows(start)
+    ]
     if np.isfinite(best):
         assert min(one.value for one in found) <= 1.01 * best
         below = bound(problem)

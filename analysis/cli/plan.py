@@ -1,0 +1,174 @@
+"""`ballplate plan`: positions and certificates chosen from a pool."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentTypeError, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .common import add_file, add_json, count, draw, picture, print_json, print_lines, seed, single, write
+
+if TYPE_CHECKING:
+    from simulator.experiment.model import Experiment
+
+    from ..planning.campaign import Campaign
+    from ..planning.schedule import RunSheet
+
+AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
+SHEETS = (".html", ".md", ".csv", ".txt")
+
+
+def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
+    parser = commands.add_parser(
+        "plan",
+        help="choose positions and certificates from a pool, and tell how far from the best possible they are",
+        description="Choose from the pool of an experiment file what makes a criterion smallest within a budget, and "
+        "bound what any choice could reach. Without a budget the choice may cost what the positions of the file "
+        "itself do. The exit status is 0 if the choice determines everything, otherwise 1.",
+    )
+    add_file(parser)
+    parser.add_argument(
+        "--criterion",
+        metavar="NAME",
+        type=_criterion,
+        default="U6",
+        help="U6 (default: average), U6-maximum, U5, U5-maximum, tasks, tasks-maximum, A, D, E or condition",
+    )
+    budget = parser.add_argument_group("budget")
+    budget.add_argument("--hours", metavar="H", type=_hours, help="of laboratory time, with changes between positions")
+    budget.add_argument("--positions", metavar="N", type=count, help="at most so many positions")
+    budget.add_argument("--readings", metavar="N", type=count, help="at most so many readings")
+    again = parser.add_argument_group("a campaign that has begun")
+    again.add_argument(
+        "--done",
+        metavar="CSV",
+        type=Path,
+        help="readings already taken; their positions are kept, and the budget is for the rest",
+    )
+    again.add_argument(
+        "--from",
+        dest="earlier",
+        metavar="FILE",
+        type=Path,
+        help="a design chosen from this pool before, to compare with and go on from; default: the positions as drawn",
+    )
+    output = parser.add_argument_group("output")
+    output.add_argument("-o", "--output", metavar="YAML", type=Path, help="write the choice as an experiment file")
+    output.add_argument(
+        "--sheet", metavar="FILE", type=_sheet, help="write the run sheet: .html to print, .md, .csv, .txt"
+    )
+    output.add_argument("--curve", action="store_true", help="plan for smaller and larger budgets as well")
+    output.add_argument("--plot", metavar="FILE", type=picture, help="draw the choice, its bound, gains, and the curve")
+    output.add_argument("--force", action="store_true", help="overwrite files that there are already")
+    add_json(parser)
+    parser.add_argument("--seed", type=seed, default=1, help="of the random starts of the search; default 1")
+    parser.add_argument(
+        "--workers", metavar="N", type=count, help="processes that share the work; default: one for each processor"
+    )
+    parser.set_defaults(run=run)
+
+
+def _criterion(text: str) -> str:
+    from ..planning.criteria import NAMES
+
+    if text not in NAMES:
+        raise ArgumentTypeError(f'choose from {", ".join(NAMES)}, not "{text}"')
+    return text
+
+
+def _hours(text: str) -> float:
+    try:
+        value = float(text.removesuffix("h").strip())
+    except ValueError:
+        value = float("nan")
+    if not 0.0 < value < 1e5:
+        raise ArgumentTypeError(f'expected hours above zero, such as 7.5, not "{text}"')
+    return value
+
+
+def _sheet(text: str) -> Path:
+    if not text.lower().endswith(SHEETS):
+        raise ArgumentTypeError(f'a run sheet\'s name ends in {", ".join(SHEETS)}, unlike "{text}"')
+    return Path(text)
+
+
+def run(options: Namespace) -> int:
+    """Choose, print and write; 1 if the choice leaves something undetermined."""
+    from simulator.experiment.load import load
+    from simulator.experiment.messages import ExperimentError
+
+    from ..planning.campaign import Request, campaign
+    from ..planning.constraints import HOUR, Budget
+    from ..planning.done import done_candidates
+    from ..planning.earlier import earlier_choice
+    from ..planning.schedule import run_sheet
+    from ..planning.tables import campaign_data, campaign_lines
+    from ..processes import processors
+
+    experiment = single(options, planning=True)
+    candidates = experiment.pool.candidates if experiment.pool is not None else ()
+    messages = []
+    done, earlier = {}, None
+    try:
+        if options.done is not None and candidates:
+            done = done_candidates(options.done, experiment, candidates)
+    except ExperimentError as error:
+        messages += error.messages
+    try:
+        if options.earlier is not None and candidates:
+            earlier = earlier_choice(load(options.earlier)[0], candidates)
+    except ExperimentError as error:
+        messages += error.messages
+    if messages:
+        raise ExperimentError(messages)
+    asked = (options.hours, options.readings, options.positions)
+    budget = None
+    if any(value is not None for value in asked):
+        seconds = None if options.hours is None else HOUR * options.hours
+        budget = Budget(seconds, options.readings, options.positions)
+    request = Request(options.criterion, budget, options.curve, options.seed)
+    found = campaign(experiment, request, done, earlier, options.workers or processors(), _report)
+    sheet = run_sheet(found.chosen, found.pool.changes, found.done)
+    if options.json:
+        print_json([campaign_data(found, sheet)])
+    else:
+        print_lines(campaign_lines(found, sheet))
+    if not _written(found, sheet, options):
+        return BAD_FILE
+    return AS_EXPECTED if found.is_determined and not found.plan.verdict.deficiency else NOT_AS_EXPECTED
+
+
+def _report(step: str) -> None:
+    if sys.stderr is not None and sys.stderr.isatty():
+        print(f"{step} ...", file=sys.stderr, flush=True)
+
+
+def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
+    """Write what was asked for; False if a picture could not be drawn."""
+    from ..report.campaign import draw_campaign
+
+    if options.output is not None:
+        from ..planning.experiment_file import experiment_text
+
+        header = (
+            f"Chosen by ballplate plan from {options.files[0].name}: {found.criterion}, no more than {found.budget}."
+        )
+        text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent)
+        write(options.output, text, options.force)
+    if options.sheet is not None:
+        write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)
+    return options.plot is None or draw(lambda path: draw_campaign(found, path), options.plot)
+
+
+def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:
+    from ..planning.sheet_forms import sheet_csv, sheet_lines, sheet_markdown, sheet_page
+
+    forms: dict[str, Callable[[Experiment, RunSheet], str]] = {
+        ".html": lambda experiment, sheet: sheet_page(sheet, experiment, experiment.title),
+        ".md": lambda experiment, sheet: sheet_markdown(sheet, experiment.title),
+        ".csv": lambda experiment, sheet: sheet_csv(sheet),
+        ".txt": lambda experiment, sheet: "\n".join([experiment.title, "", *sheet_lines(sheet), ""]),
+    }
+    return forms[suffix]

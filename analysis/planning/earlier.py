@@ -1,0 +1,44 @@
+"""A design that was chosen from the same pool before, found again among its candidates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.experiment.model import Calibration, Experiment, Position
+from simulator.experiment.pool import Candidate
+from simulator.settings import hint
+
+
+def earlier_choice(chosen: Experiment, candidates: Sequence[Candidate]) -> tuple[int, ...]:
+    """Indices of the candidates that an experiment consists of: its positions by name, calibration items by content.
+
+    Items of calibration that are no candidates belong to the experiment in any case.
+
+    :raises ExperimentError: a position is no candidate.
+    """
+    places = {one.name: k for k, one in enumerate(candidates) if isinstance(one.item, Position)}
+    unknown = [position.name for position in chosen.positions if position.name not in places]
+    if unknown:
+        messages = [
+            Message(
+                str(chosen.source), 0, 0, "positions", f'"{name}" is no candidate of the pool; {hint(name, places)}'
+            )
+            for name in unknown
+        ]
+        raise ExperimentError(messages)
+    found = [places[position.name] for position in chosen.positions]
+    for k, candidate in enumerate(candidates):
+        item = candidate.item
+        if not isinstance(item, Position) and any(_equal(item, other) for other in chosen.calibration):
+            found.append(k)
+    return tuple(sorted(found))
+
+
+def _equal(one: Calibration, other: Calibration) -> bool:
+    return type(one) is type(other) and all(
+        np.array_equal(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)
+    )

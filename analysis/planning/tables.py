@@ -1,0 +1,147 @@
+"""A plan of a campaign as lines of text and as data."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..tables import aligned, finite, number, plan_data, plan_lines
+from .campaign import Campaign, CurvePoint, Gain
+from .constraints import HOUR, Budget, Spent
+from .criteria import DESCRIPTIONS
+from .schedule import RunSheet
+from .sheet_forms import sheet_data, sheet_lines
+
+# Candidates left out, and reasons for leaving candidates out of the pool, that are told.
+TOLD = 5
+
+
+def campaign_lines(found: Campaign, sheet: RunSheet) -> list[str]:
+    """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the run sheet."""
+    lines = [
+        f"{found.plan.label}: {found.plan.title}",
+        f"{len(found.pool.candidates)} candidates{_dropped(found)}; no more than {found.budget}",
+        f"{found.criterion}: {DESCRIPTIONS[found.criterion]}",
+        "",
+        *_comparison(found),
+    ]
+    if not found.is_determined:
+        lines.append("no choice was found that determines everything; below is what the nearest one leaves open")
+    elif math.isnan(found.bound):
+        lines.append(f"there is no bound of {found.criterion}")
+    else:
+        lines.append(f"efficiency {_percent(found.efficiency)}: no choice within the limits can be better by more")
+    if found.excluded:
+        lines.append(f"left out of {found.criterion}: {found.excluded} that no choice from this pool determines")
+    if found.gains:
+        lines += ["", *_gain_table(found)]
+    if found.curve:
+        lines += ["", *_curve_table(found)]
+    return [*lines, "", *plan_lines(found.plan)[1:], "", *sheet_lines(sheet)]
+
+
+def _dropped(found: Campaign) -> str:
+    words = [f"{count} {reason}" for reason, count in sorted(found.pool.dropped.items(), key=lambda item: -item[1])]
+    if not words:
+        return ""
+    more = [f"{len(words) - TOLD} reasons more"] if len(words) > TOLD else []
+    return f" (and not offered: {'; '.join([*words[:TOLD], *more])})"
+
+
+def _comparison(found: Campaign) -> list[str]:
+    rows = [["", found.criterion, "", "hours", "readings", "positions"]]
+    rows.append(["chosen", *_value(found, found.value), *_spent(found.spent)])
+    if not math.isnan(found.bound):
+        rows.append(["bound of any choice", *_value(found, found.bound), "", "", ""])
+    if found.drawn is not None and found.drawn_spent is not None:
+        rows.append(["as drawn", *_value(found, found.drawn), *_spent(found.drawn_spent)])
+    if found.target is not None:
+        rows.append(["target", *_value(found, found.target), "", "", ""])
+    return aligned(rows, [False, True, False, True, True, True])
+
+
+def _value(found: Campaign, value: float) -> list[str]:
+    if math.isinf(value):
+        return ["-", "deficient"]
+    return [number(1e6 * value), "um"] if found.unit == "m" else [number(value), ""]
+
+
+def _spent(spent: Spent) -> list[str]:
+    return [f"{spent.seconds / HOUR:.2f}", str(spent.readings), str(spent.positions)]
+
+
+def _percent(ratio: float) -> str:
+    return f"{100 * ratio:.1f} %"
+
+
+def _gain_table(found: Campaign) -> list[str]:
+    rows = [["", f"{found.criterion} without it", "with it", "minutes"]]
+    rows += [["chosen: " + gain.candidate.name, *_gain(found, gain)] for gain in found.gains]
+    rows += [["left out: " + gain.candidate.name, *_gain(found, gain)] for gain in found.left_out[:TOLD]]
+    return aligned(rows, [False, True, True, True])
+
+
+def _gain(found: Campaign, gain: Gain) -> list[str]:
+    without, with_ = (" ".join(_value(found, value)).strip("- ").strip() for value in (gain.without, gain.with_))
+    return [without, with_, f"{gain.candidate.seconds / 60:.0f}"]
+
+
+def _curve_table(found: Campaign) -> list[str]:
+    rows = [["no more than", found.criterion, "", "bound", "hours", "readings", "positions"]]
+    for point in found.curve:
+        bound = "-" if math.isnan(point.bound) else _value(found, point.bound)[0]
+        rows.append([str(point.budget), *_value(found, point.value), bound, *_spent(point.spent)])
+    return aligned(rows, [False, True, False, True, True, True, True])
+
+
+def campaign_data(found: Campaign, sheet: RunSheet) -> dict[str, Any]:
+    """A campaign as data for JSON, in metres and seconds."""
+    return {
+        "experiment": found.plan.label,
+        "candidates": len(found.pool.candidates),
+        "dropped": dict(found.pool.dropped),
+        "criterion": found.criterion,
+        "unit": found.unit,
+        "budget": _budget_data(found.budget),
+        "value": finite(found.value),
+        "bound": finite(found.bound),
+        "drawn": None if found.drawn is None else finite(found.drawn),
+        "drawn_spent": None if found.drawn_spent is None else _spent_data(found.drawn_spent),
+        "target": found.target,
+        "excluded": found.excluded,
+        "spent": _spent_data(found.spent),
+        "chosen": [candidate.name for candidate in found.chosen],
+        "done": [candidate.name for candidate in found.done],
+        "gains": [_gain_data(gain) for gain in found.gains],
+        "left_out": [_gain_data(gain) for gain in found.left_out],
+        "curve": [_point_data(point) for point in found.curve],
+        "run_sheet": sheet_data(sheet),
+        "plan": plan_data(found.plan),
+    }
+
+
+def _budget_data(budget: Budget) -> dict[str, Any]:
+    return {"seconds": budget.seconds, "readings": budget.readings, "positions": budget.positions}
+
+
+def _spent_data(spent: Spent) -> dict[str, Any]:
+    return {"seconds": spent.seconds, "readings": spent.readings, "positions": spent.positions}
+
+
+def _gain_data(gain: Gain) -> dict[str, Any]:
+    return {
+        "name": gain.candidate.name,
+        "without": finite(gain.without),
+        "with": finite(gain.with_),
+        "seconds": gain.candidate.seconds,
+    }
+
+
+def _point_data(point: CurvePoint) -> dict[str, Any]:
+    return {
+        "budget": _budget_data(point.budget),
+        "spent": _spent_data(point.spent),
+        "chosen": [candidate.name for candidate in point.chosen],
+        "value": finite(point.value),
+        "bound": finite(point.bound),
+    }
