@@ -57,7 +57,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     output = parser.add_argument_group("output")
     output.add_argument("-o", "--output", metavar="YAML", type=Path, help="write the choice as an experiment file")
     output.add_argument(
-        "--sheet", metavar="FILE", type=_sheet, help="write the run sheet: .html to print, .md, .csv, .txt"
+        "--sheet", metavar="FILE", type=_sheet, help="write the run sheet: .html to print, .md, .csv or .txt"
     )
     output.add_argument("--curve", action="store_true", help="plan for smaller and larger budgets as well")
     output.add_argument("--plot", metavar="FILE", type=picture, help="draw the choice, its bound, gains, and the curve")
@@ -97,7 +97,7 @@ def _sheet(text: str) -> Path:
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
     from simulator.experiment.load import load
-    from simulator.experiment.messages import ExperimentError
+    from simulator.experiment.messages import ExperimentError, Message
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
@@ -109,7 +109,7 @@ def run(options: Namespace) -> int:
 
     experiment = single(options, planning=True)
     candidates = experiment.pool.candidates if experiment.pool is not None else ()
-    messages = []
+    messages: list[Message] = []
     done, earlier = {}, None
     try:
         if options.done is not None and candidates:
@@ -147,8 +147,6 @@ def _report(step: str) -> None:
 
 def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
     """Write what was asked for; False if a picture could not be drawn."""
-    from ..report.campaign import draw_campaign
-
     if options.output is not None:
         from ..planning.experiment_file import experiment_text
 
@@ -159,7 +157,13 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         write(options.output, text, options.force)
     if options.sheet is not None:
         write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)
-    return options.plot is None or draw(lambda path: draw_campaign(found, path), options.plot)
+    return options.plot is None or draw(lambda path: _draw(found, path), options.plot)
+
+
+def _draw(found: Campaign, path: Path) -> None:
+    from ..report.campaign import draw_campaign
+
+    draw_campaign(found, path)
 
 
 def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:

@@ -72,8 +72,8 @@ class Campaign:
 
     `chosen` in the order of the pool, `done` those of them that have been read already. `value` is infinite where the
     selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
-    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to the
-    limits or not; None without any. `plan` judges the experiment with the chosen candidates in full.
+    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
+    the limits or not; None without any. `plan` judges the experiment with the chosen candidates in full.
     """
 
     experiment: Experiment
@@ -118,7 +118,8 @@ def campaign(
     `done` are candidates that have been read already, by index, with the readings that were taken: they are kept and
     cost nothing more. `earlier` are the indices of an earlier choice, which the plan is compared with and never worse
     than within the same budget; without it that is the experiment's own positions. Without a budget the choice may cost
-    what these do, less what is done. The result does not depend on the number of `workers`; `report` is told what is being done.
+    what these do, less what is done. The result does not depend on the number of `workers`; `report` is told what is
+    being done.
 
     :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
     """
@@ -163,7 +164,7 @@ def campaign(
         wanted.target,
         _gains(problem, best, candidates),
         _left_out(unlimited, best, candidates),
-        plan(with_chosen(experiment, chosen)),
+        plan(replace(with_chosen(experiment, chosen), expected_rank_deficiency=None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
     )
 

@@ -197,8 +197,8 @@ def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: i
     """The best selection that exchanges lead to from a start within the limits.
 
     One candidate is taken out at a time and the gap filled anew until that gains nothing, then two, and so on up to
-    `at_once`. Where it is `thorough`, the gap is filled beginning with each candidate in turn, which gets out of traps that
-    tight limits set.
+    `at_once`. Where it is `thorough`, the gap is filled beginning with each candidate in turn, which gets out of traps
+    that tight limits set.
     """
     members = fill(problem, start, losses)
     size = 1

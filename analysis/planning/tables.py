@@ -30,7 +30,7 @@ def campaign_lines(found: Campaign, sheet: RunSheet) -> list[str]:
     elif math.isnan(found.bound):
         lines.append(f"there is no bound of {found.criterion}")
     else:
-        lines.append(f"efficiency {_percent(found.efficiency)}: no choice within the limits can be better by more")
+        lines.append(f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}")
     if found.excluded:
         lines.append(f"left out of {found.criterion}: {found.excluded} that no choice from this pool determines")
     if found.gains:
