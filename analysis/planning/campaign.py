@@ -21,7 +21,7 @@ from .information import pool_information
 from .search import Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
-FEW_STARTS, MANY_STARTS = 2, 8
+LARGE_STARTS, SMALL_STARTS = 10, 8
 SMALL_POOL, VERY_SMALL_POOL = 64, 24
 
 # Candidates left out that are told of.
@@ -202,7 +202,7 @@ def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: 
 def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> tuple[Found, Bound | None]:
     """The best selection found, and the bound of all."""
     is_small = problem.constraints.count <= SMALL_POOL
-    first = starts(problem, drawn, MANY_STARTS if is_small else FEW_STARTS, seed)
+    first = starts(problem, drawn, SMALL_STARTS if is_small else LARGE_STARTS, seed)
     # In a small pool most selections are met again and again, and one process remembers them.
     shares = [first] if is_small else [[start] for start in first]
     depth = 2 if is_small else 1

@@ -32,7 +32,9 @@ RIDGE = 1e-13
 # Above every criterion.
 LARGE = 1e12
 
-# Candidates that are evaluated in full at each exchange, all of them in pools no larger than this.
+# Candidates that are left at each exchange by the slope of the criterion, and of these by its tangent; all of them are
+# evaluated in full in pools no larger than this.
+SLOPED = 256
 SIEVED = 8
 SMALL_POOL = 24
 
@@ -133,13 +135,23 @@ def _deficient(factor: Array) -> Array:
     return np.where(pivots.min(axis=-1) < UNDETERMINED, LARGE * (1.0 + missing), 0.0)
 
 
-def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
-    """Tangent of the criterion (added,) for each candidate that is added to `information`, smaller being better."""
-    ridge = RIDGE * np.eye(len(information))
-    matrices = problem.information.matrices
-    about = np.asarray(np.linalg.cholesky(information + ridge + matrices[added].mean(axis=0)), float)
-    now = _inverse(_counted(problem, about)).T
-    half = square_root(problem.criterion.tangent(now)[2])
+def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integers, Array]:
+    """Candidates that may be the best to add to `information`, and the criterion's tangent with each of them.
+
+    The first sieve is the slope of the criterion where something of every candidate is added, the second its tangent
+    there with each candidate added by itself.
+    """
+    whole = np.eye(len(information))
+    ridge, matrices = RIDGE * whole, problem.information.matrices
+    # All candidates together have the identity, up to what the base has.
+    mean = (whole - problem.information.base) / len(matrices)
+    root = _inverse(np.asarray(np.linalg.cholesky(information + ridge + mean), float)).T
+    half = square_root(problem.criterion.tangent(counted_root(problem, root))[2])
+    own = slice(None) if problem.criterion.about_balls else problem.information.shared
+    if len(added) > SLOPED:
+        spread = root @ (root[own].T @ half)
+        slope = np.tensordot(matrices, spread @ spread.T, axes=2)[added]
+        added = np.sort(added[np.argsort(-slope, kind="stable")[:SLOPED]])
     found = np.zeros(len(added))
     for start in range(0, len(added), AT_ONCE):
         some = added[start : start + AT_ONCE]
@@ -147,7 +159,7 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> Array:
         solved = np.asarray(np.linalg.solve(_counted(problem, factor), half))
         deficient = _deficient(factor)
         found[start : start + len(some)] = np.where(deficient > 0.0, deficient, (solved**2).sum(axis=(1, 2)))
-    return found
+    return added, found
 
 
 def best_addition(
@@ -163,7 +175,7 @@ def best_addition(
     seconds = np.maximum(problem.constraints.seconds, 1.0)
     framed = np.isin(added, list(problem.information.frames.fixed))
     if len(added) > SMALL_POOL and not framed.any():
-        left = _sieve(problem, problem.information.of(members), added)
+        added, left = _sieve(problem, problem.information.of(members), added)
         if per_second:
             left = (left - left.max()) / seconds[added]
         added = added[np.argsort(left, kind="stable")[:SIEVED]]
@@ -173,12 +185,13 @@ def best_addition(
     return int(added[best]), float(after[best])
 
 
-def fill(problem: Problem, chosen: Collection[int], losses: Losses) -> frozenset[int]:
+def fill(problem: Problem, chosen: Collection[int], losses: Losses, thorough: bool = True) -> frozenset[int]:
     """Add candidates, the best first, as long as the limits allow one and it gains anything.
 
-    Where time is limited, what is best may also be what gains most for the time it takes, whichever ends better.
+    Where time is limited and the filling `thorough`, what is best may also be what gains most for the time it takes,
+    whichever ends better.
     """
-    timed = problem.constraints.budget.seconds is not None
+    timed = thorough and problem.constraints.budget.seconds is not None
     ways = (False, True) if timed else (False,)
     return min((_filled(problem, frozenset(chosen), losses, per_second) for per_second in ways), key=losses.of)
 
@@ -207,7 +220,7 @@ def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: i
         for gone in combinations(sorted(members - problem.constraints.must), size):
             if members.issuperset(gone):
                 left = members.difference(gone)
-                found = fill(problem, left, losses)
+                found = fill(problem, left, losses, thorough)
                 if thorough:
                     begun = [fill(problem, left | {int(k)}, losses) for k in problem.constraints.additions(left)]
                     found = min([found, *begun], key=losses.of)

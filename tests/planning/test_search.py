@@ -83,32 +83,45 @@ def test_there_are_enough_selections() -> None:
     assert np.isfinite(values("U6")).sum() > 2000
 
 
-@pytest.mark.parametrize("name", CRITERIA)
-@settings(
-    max_examples=12,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-    derandomize=True,
-    phases=[Phase.explicit, Phase.generate],
-)
-@given(limited=limits())
-def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limited: Constraints) -> None:
+def near_the_best_and_above_the_bound(name: CriterionName, limited: Constraints) -> None:
     problem = replace(problem_of(name), constraints=limited)
     allowed = np.array([limited.allows(chosen) for chosen in every()])
     if not allowed.any():
         return
     best = values(name)[allowed].min()
     losses = Losses(problem)
-    found = [
-        improve(problem, start, losses, 2, thorough=True)
-        for start in starts(problem, (), 8, 1)
-        if limited.allows(start)
-    ]
+    begun = [start for start in starts(problem, (), 8, 1) if limited.allows(start)]
+    found = [improve(problem, start, losses, 2, thorough=True) for start in begun]
     if np.isfinite(best):
         assert min(one.value for one in found) <= 1.01 * best
         below = bound(problem)
         if below is not None:
             assert 0.0 < below.value <= best
+
+
+def tried(examples: int) -> settings:
+    return settings(
+        max_examples=examples,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow],
+        derandomize=True,
+        phases=[Phase.explicit, Phase.generate],
+    )
+
+
+@pytest.mark.parametrize("name", CRITERIA)
+@tried(4)
+@given(limited=limits())
+def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limited: Constraints) -> None:
+    near_the_best_and_above_the_bound(name, limited)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [*CRITERIA, "U5-maximum", "tasks-maximum"])
+@tried(100)
+@given(limited=limits())
+def test_the_best_or_near_it_under_many_limits(name: CriterionName, limited: Constraints) -> None:
+    near_the_best_and_above_the_bound(name, limited)
 
 
 @pytest.mark.parametrize("name", ["U6", "U6-maximum", "E"])

@@ -1,0 +1,211 @@
+"""Plans as a user asks for them: what is drawn, what is done, what is chosen earlier, and what goes wrong."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.planning.campaign import Request, campaign
+from analysis.planning.constraints import HOUR, Budget
+from analysis.planning.done import done_candidates
+from analysis.planning.earlier import earlier_choice
+from analysis.study import plan
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment
+from simulator.experiment.pool import with_chosen
+
+from .small_pool import TEXT
+
+# Six positions of the pool as somebody drew them.
+DRAWN = """
+positions:
+  - {name: low, artefact: plate, plane: z, level: 50 mm, corner: {x: 0 mm, y: 100 mm}, probes: [down]}
+  - {name: high, artefact: plate, plane: z, level: 350 mm, corner: {x: 300 mm, y: 100 mm}, probes: [down]}
+  - name: left
+    artefact: plate
+    plane: x
+    level: 100 mm
+    corner: {y: 0 mm, z: 50 mm}
+    quarter_turns: 1
+    probes: [right, down]
+  - name: right
+    artefact: plate
+    plane: x
+    level: 500 mm
+    corner: {y: 0 mm, z: 50 mm}
+    quarter_turns: 1
+    probes: [right, down]
+  - {name: near, artefact: plate, plane: y, level: 100 mm, corner: {x: 0 mm, z: 50 mm}, probes: [back, down]}
+  - {name: far, artefact: plate, plane: y, level: 400 mm, corner: {x: 300 mm, z: 50 mm}, probes: [back, down]}
+"""
+
+
+@pytest.fixture
+def drawn(tmp_path: Path) -> Path:
+    path = tmp_path / "drawn.yaml"
+    path.write_text(TEXT + DRAWN)
+    return path
+
+
+def readings_of(path: Path, positions: int) -> Path:
+    """Simulated readings of the first positions."""
+    every = path.with_suffix(".csv")
+    assert main(["simulate", str(path), "-o", str(every), "--force"]) == 0
+    lines = every.read_text().splitlines()
+    names = [position.name for position in load(path)[0].positions[:positions]]
+    kept = [line for line in lines[1:] if next(csv.reader([line]))[0] in names]
+    some = path.with_name(f"first-{positions}.csv")
+    some.write_text("\n".join([lines[0], *kept, ""]))
+    return some
+
+
+def first(path: Path) -> Experiment:
+    return load(path, planning=True)[0]
+
+
+def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
+    found = campaign(first(drawn), Request("U6"))
+    reference = plan(load(drawn)[0])
+    assert found.drawn == pytest.approx(reference.quantities["U6"].average, rel=1e-9)
+    assert found.value <= found.drawn
+    assert found.drawn_spent is not None
+    assert found.spent.readings <= found.drawn_spent.readings
+    assert found.spent.positions <= 6 and found.spent.seconds <= found.drawn_spent.seconds + 1e-3
+    assert found.bound <= found.value
+    assert found.target == pytest.approx(2e-6 + 0.33e-6 / 0.1 * 0.3, rel=0.5)
+
+
+@pytest.mark.parametrize("read", [1, 3, 5])
+def test_an_interrupted_campaign_never_does_worse_than_its_remainder(drawn: Path, read: int) -> None:
+    experiment = first(drawn)
+    assert experiment.pool is not None
+    done = done_candidates(readings_of(drawn, read), experiment, experiment.pool.candidates)
+    assert len(done) == read
+    found = campaign(experiment, Request("U6"), done)
+    reference = plan(load(drawn)[0])
+    assert found.value <= reference.quantities["U6"].average * (1 + 1e-12)
+    names = [candidate.name for candidate in found.chosen]
+    assert {candidate.name for candidate in done.values()} <= set(names)
+    assert found.spent.positions <= 6 - read
+    # The rest of the budget is what the remaining positions take.
+    assert found.drawn_spent is not None and found.drawn_spent.positions == 6 - read
+
+
+def test_what_was_read_in_part_counts_as_it_was_read(drawn: Path) -> None:
+    experiment = first(drawn)
+    assert experiment.pool is not None
+    path = readings_of(drawn, 3)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(lines[:-7]) + "\n")
+    done = done_candidates(path, experiment, experiment.pool.candidates)
+    assert sum(candidate.readings for candidate in done.values()) == len(lines) - 1 - 7
+    partly = campaign(experiment, Request("U6"), done)
+    full = plan(with_chosen(experiment, partly.chosen))
+    assert partly.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
+
+
+def test_readings_of_a_position_that_is_no_candidate_are_refused(drawn: Path, tmp_path: Path) -> None:
+    experiment = first(drawn)
+    assert experiment.pool is not None
+    path = tmp_path / "other.csv"
+    path.write_text("position,ball,probe,x_mm,y_mm,z_mm\nlo,r1c1,down,1,2,3\nlo,r1c2,down,1,2,3\n")
+    with pytest.raises(ExperimentError, match='other.csv:2:1: no position "lo".*did you mean "low"'):
+        done_candidates(path, experiment, experiment.pool.candidates)
+
+
+def test_an_earlier_choice_is_found_again_and_gone_on_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, chosen = tmp_path / "pool.yaml", tmp_path / "chosen.yaml"
+    path.write_text(TEXT)
+    assert main(["plan", str(path), "--hours", "5", "-o", str(chosen), "--workers", "1", "--json"]) == 0
+    before = json.loads(capsys.readouterr().out)
+    experiment = first(path)
+    assert experiment.pool is not None
+    names = [experiment.pool.candidates[k].name for k in earlier_choice(load(chosen)[0], experiment.pool.candidates)]
+    assert names == before["chosen"]
+    # Three positions are read as planned; the rest is planned anew, at the cost of what was left.
+    some = readings_of(chosen, 3)
+    again = ["plan", str(path), "--done", str(some), "--from", str(chosen), "--workers", "1", "--json"]
+    assert main(again) == 0
+    after = json.loads(capsys.readouterr().out)
+    assert len(after["done"]) == 3 and set(after["done"]) <= set(after["chosen"])
+    assert after["value"] <= before["value"] * (1 + 1e-9)
+    assert after["drawn"] == pytest.approx(before["value"], rel=1e-9)
+
+
+def test_what_is_written_is_worth_what_was_told(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    chosen = drawn.with_name("chosen.yaml")
+    assert (
+        main(["plan", str(drawn), "--criterion", "tasks-maximum", "-o", str(chosen), "--workers", "1", "--json"]) == 0
+    )
+    found = json.loads(capsys.readouterr().out)
+    assert main(["run", str(chosen), "--json"]) == 0
+    worth = json.loads(capsys.readouterr().out)
+    assert max(task["standard_uncertainty"] for task in worth["tasks"].values()) == pytest.approx(
+        found["value"], rel=1e-9
+    )
+    # No other file is overwritten.
+    assert main(["plan", str(drawn), "-o", str(chosen), "--workers", "1"]) == 3
+    assert "--force" in capsys.readouterr().err
+
+
+def test_too_little_is_told_with_what_stays_open(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", str(drawn), "--positions", "1", "--workers", "1"]) == 1
+    told = capsys.readouterr().out
+    assert "no choice was found that determines everything" in told
+    assert "undetermined 1:" in told
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--criterion", "U7"], "choose from U6"),
+        (["--hours", "0"], "hours above zero"),
+        (["--hours", "soon"], "hours above zero"),
+        (["--positions", "-1"], "whole number"),
+        (["--sheet", "sheet.pdf"], "ends in .html"),
+    ],
+)
+def test_wrong_usage(drawn: Path, options: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["plan", str(drawn), *options])
+    assert left.value.code == 2
+    assert text in capsys.readouterr().err
+
+
+def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "designs/quickstart.yaml", "--positions", "3"]) == 3
+    assert "pool: missing; add candidates" in capsys.readouterr().err
+
+
+def test_sheets_of_all_forms(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for ending in ("html", "md", "csv", "txt"):
+        sheet = drawn.with_name(f"sheet.{ending}")
+        assert main(["plan", str(drawn), "--positions", "4", "--sheet", str(sheet), "--workers", "1"]) == 0
+        told = sheet.read_text()
+        assert told.count("right") >= 2 and "flatness" in told
+
+
+def test_the_curve_falls_and_keeps_above_its_bound(drawn: Path) -> None:
+    found = campaign(first(drawn), Request("U6", Budget(positions=6), curve=True))
+    values = np.array([point.value for point in found.curve])
+    bounds = np.array([point.bound for point in found.curve])
+    assert len(values) >= 5
+    assert (np.diff(values) <= 1e-12).all()
+    assert (bounds <= values).all()
+    assert found.value <= min(p.value for p in found.curve if p.budget == found.budget) * (1 + 1e-12)
+
+
+def test_hours_buy_certificates_too(tmp_path: Path) -> None:
+    path = tmp_path / "pool.yaml"
+    path.write_text(TEXT)
+    found = campaign(first(path), Request("U5", Budget(seconds=6 * HOUR)))
+    assert {"sides", "flatness"} & {candidate.name for candidate in found.chosen}
+    assert found.spent.seconds <= 6 * HOUR
+    full = found.plan.quantities["U5"]
+    assert found.value == pytest.approx(full.average, rel=1e-9)
