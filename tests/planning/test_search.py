@@ -118,7 +118,7 @@ def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limi
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", [*CRITERIA, "U5-maximum", "tasks-maximum"])
-@tried(100)
+@tried(25)
 @given(limited=limits())
 def test_the_best_or_near_it_under_many_limits(name: CriterionName, limited: Constraints) -> None:
     near_the_best_and_above_the_bound(name, limited)
