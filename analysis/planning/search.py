@@ -1,10 +1,9 @@
-"""Selections by local search: a greedy start, then exchanges of one candidate or two while any makes the criterion
-smaller.
+"""Selections by local search: a greedy start, then exchanges while any makes the criterion smaller.
 
 An exchange adds one matrix to that of the remaining selection and factors the sum. A position read with a whole plate
-changes nearly every direction that counts, so that an update of low rank would cost as much as the factor anew; what
-keeps a step cheap are the small matrices and the sieve: of all candidates that could come in, those are evaluated in
-full that do best by the tangent of the criterion at the present selection.
+changes about half of the directions that count, and an update of that rank costs as much as the factor anew. What
+keeps a step cheap are small matrices and a sieve: of all candidates that could come in, those are evaluated in full that
+do best by the tangent of the criterion at the present selection.
 """
 
 from __future__ import annotations
