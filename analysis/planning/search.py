@@ -2,8 +2,8 @@
 
 An exchange adds one matrix to that of the remaining selection and factors the sum. A position read with a whole plate
 changes about half of the directions that count, and an update of that rank costs as much as the factor anew. What
-keeps a step cheap are small matrices and a sieve: of all candidates that could come in, those are evaluated in full that
-do best by the tangent of the criterion at the present selection.
+keeps a step cheap are small matrices and a sieve: of all candidates that could come in, those are evaluated in full
+that do best by the tangent of the criterion at the present selection.
 """
 
 from __future__ import annotations
