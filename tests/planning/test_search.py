@@ -109,8 +109,8 @@ def tried(examples: int) -> settings:
     )
 
 
-@pytest.mark.parametrize("name", CRITERIA)
-@tried(4)
+@pytest.mark.parametrize("name", ["U6", "U6-maximum", "U5", "E"])
+@tried(3)
 @given(limited=limits())
 def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limited: Constraints) -> None:
     near_the_best_and_above_the_bound(name, limited)
@@ -133,7 +133,7 @@ def test_the_bound_is_near_for_some_positions(name: CriterionName) -> None:
     assert 0.9 * best < found.value <= best
 
 
-@pytest.mark.parametrize("name", CRITERIA[:-1])
+@pytest.mark.parametrize("name", ["U6", "U6-maximum", "U5", "E"])
 def test_the_bound_is_tight_where_everything_may_be_chosen(name: CriterionName) -> None:
     problem = problem_of(name)
     found = bound(problem)
@@ -183,7 +183,7 @@ def test_criteria_of_parameters_by_their_definitions() -> None:
 
 
 def test_the_number_of_workers_changes_nothing() -> None:
-    request = Request("U6", Budget(seconds=4 * HOUR))
+    request = Request("U6", Budget(seconds=2.5 * HOUR))
     one, two = (campaign(small(), request, workers=workers) for workers in (1, 2))
     assert [c.name for c in one.chosen] == [c.name for c in two.chosen]
     assert (one.value, one.bound) == (two.value, two.bound)
