@@ -21,8 +21,11 @@ from .information import pool_information
 from .search import Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
-LARGE_STARTS, SMALL_STARTS = 10, 8
+LARGE_STARTS, SMALL_STARTS = 24, 8
 SMALL_POOL, VERY_SMALL_POOL = 64, 24
+
+# The best results of a large pool from which the search goes deeper.
+BEST_STARTS = 4
 
 # Candidates left out that are told of.
 LEFT_OUT = 10
@@ -214,7 +217,7 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
         selections.append(improve(problem, starts(problem, by_weight, 0, seed)[-1], Losses(problem), depth))
     selections = sorted(set(selections), key=lambda one: (one.value, one.chosen))
     if not is_small:
-        again = in_processes(_task, [(problem, [one.chosen], 2) for one in selections[:2]], workers)
+        again = in_processes(_task, [(problem, [one.chosen], 2) for one in selections[:BEST_STARTS]], workers)
         selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: (one.value, one.chosen))
     return best, relaxed if isinstance(relaxed, Bound) else None

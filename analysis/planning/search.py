@@ -33,8 +33,8 @@ LARGE = 1e12
 
 # Candidates that are left at each exchange by the slope of the criterion, and of these by its tangent; all of them are
 # evaluated in full in pools no larger than this.
-SLOPED = 256
-SIEVED = 8
+SLOPED = 64
+SIEVED = 5
 SMALL_POOL = 24
 
 # Matrices factored at once.
