@@ -32,37 +32,43 @@ DARK = "#101010"
 def scene_svg(drawn: Scene, name: str, words: str) -> str:
     """The volume with the positions in it."""
     with drawing(330.0) as figure:
-        axes = blank_axes(figure)
-        for edge, is_hidden in zip(drawn.edges, drawn.hidden, strict=True):
-            axes.plot(*edge.T, color=MUTED, linewidth=0.8, linestyle=":" if is_hidden else "-")
-        taken = [_write_axis(axes, drawn, *axis) for axis in drawn.axes]
-        size = float(np.ptp(drawn.edges.reshape(-1, 2), axis=0).max())
-        for place in drawn.places:
-            _place(axes, place)
-        for place in drawn.places:
-            _name(axes, place, taken, size, len(drawn.places) > MOST_NAMES)
-        # Room for what is written around the volume and for plates that stand out of it.
-        drawn_points = np.concatenate([drawn.edges.reshape(-1, 2), *(place.outline for place in drawn.places)])
-        low, high = drawn_points.min(axis=0) - 0.11 * size, drawn_points.max(axis=0) + 0.11 * size
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
+        draw_scene(blank_axes(figure), drawn, len(drawn.places) > MOST_NAMES)
         return as_svg(figure, name, words)
 
 
-def _write_axis(axes: Axes, drawn: Scene, name: str, ends: Array, low: float, high: float) -> Array:
-    """The axis's name and ends beside its edge, away from the middle."""
+def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:
+    """The volume with the positions in it, which are told by their names or numbers, on axes without a frame."""
+    for edge, is_hidden in zip(drawn.edges, drawn.hidden, strict=True):
+        axes.plot(*edge.T, color=MUTED, linewidth=0.8, linestyle=":" if is_hidden else "-")
+    taken = [at for axis in drawn.axes for at in _write_axis(axes, drawn, *axis)]
+    size = float(np.ptp(drawn.edges.reshape(-1, 2), axis=0).max())
+    for place in drawn.places:
+        _place(axes, place)
+    for place in drawn.places:
+        _name(axes, place, taken, size, by_number)
+    # Room for what is written around the volume and for plates that stand out of it.
+    drawn_points = np.concatenate([drawn.edges.reshape(-1, 2), *(place.outline for place in drawn.places)])
+    low, high = drawn_points.min(axis=0) - 0.11 * size, drawn_points.max(axis=0) + 0.11 * size
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+
+
+def _write_axis(axes: Axes, drawn: Scene, name: str, ends: Array, low: float, high: float) -> list[Array]:
+    """Write the axis's name and ends beside its edge, away from the middle; where they stand."""
     middle = drawn.edges.reshape(-1, 2).mean(axis=0)
     centre = ends.mean(axis=0)
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     out = np.array([along[1], -along[0]])
     out = out if out @ (centre - middle) > 0 else -out
     size = float(np.ptp(drawn.edges.reshape(-1, 2), axis=0).max())
+    written: list[Array] = []
     for place, text in ((centre, f"{name}, mm"), (ends[0], _millimetres(low)), (ends[1], _millimetres(high))):
         # Ends are drawn in, so that those of two axes keep apart.
         inward = 0.05 * size * np.sign((centre - place) @ along) * along
-        x, y = place + inward + (0.06 * size) * out
-        axes.text(x, y, text, ha="center", va="center")
-    return np.asarray(centre + 0.06 * size * out)
+        at = place + inward + (0.06 * size) * out
+        axes.text(at[0], at[1], text, ha="center", va="center")
+        written.append(at)
+    return written
 
 
 def _millimetres(value: float) -> str:
@@ -98,7 +104,8 @@ def _name(axes: Axes, place: Place, taken: list[Array], size: float, by_number: 
     apart = [min((float(np.hypot(*((at - other) * [1.0, 3.0]))) for other in taken), default=0.0) for at in places]
     at = places[int(np.argmax(apart))]
     taken.append(at)
-    box = {"facecolor": PAPER, "alpha": 0.8, "edgecolor": "none", "boxstyle": "square,pad=0.12"}
+    edge = SERIES[(place.number - 1) % len(SERIES)] if by_number else "none"
+    box = {"facecolor": PAPER, "alpha": 0.8, "edgecolor": edge, "boxstyle": "square,pad=0.12"}
     axes.text(at[0], at[1], text, ha="center", va="center", bbox=box)
 
 
