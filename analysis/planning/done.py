@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from simulator.experiment.tables import column_names, read_table
 from simulator.layout import lay_out
 from simulator.readings import AXES, read_readings
 from simulator.settings import hint
+
+# What an experiment file says of the readings of a position.
+GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
 
 def done_candidates(path: Path, experiment: Experiment, candidates: Sequence[Candidate]) -> dict[int, Candidate]:
@@ -51,12 +56,35 @@ def done_candidates(path: Path, experiment: Experiment, candidates: Sequence[Can
             balls = groups.setdefault((design.probe_names[own.probe[i]], uncertainty), {})
             ball = int(own.ball[i]) - first
             balls[ball] = balls.get(ball, 0) + int(own.repeats[i])
-        readings = []
+        same: dict[tuple[tuple[float, ...] | None, int, tuple[int, ...]], list[str]] = {}
         for (probe, uncertainty), balls in groups.items():
             for repeats in sorted(set(balls.values())):
-                indices = np.array([ball for ball, count in balls.items() if count == repeats])
-                names = tuple(layout.names[ball] for ball in indices)
-                stated = None if uncertainty is None else np.array(uncertainty)
-                readings.append(ReadingGroup((probe,), names, indices, repeats, stated))
-        result[k] = replace(candidate, item=replace(item, readings=tuple(readings)))
+                read_so = tuple(sorted(ball for ball, count in balls.items() if count == repeats))
+                same.setdefault((uncertainty, repeats, read_so), []).append(probe)
+        readings = []
+        for (uncertainty, repeats, read_so), probes in same.items():
+            names = tuple(layout.names[ball] for ball in read_so)
+            stated = None if uncertainty is None else np.array(uncertainty)
+            readings.append(ReadingGroup(tuple(probes), names, np.array(read_so), repeats, stated))
+        settings = candidate.settings
+        if _amounts(readings) != _amounts(item.readings):
+            settings = _with_readings(settings, readings)
+        result[k] = replace(candidate, item=replace(item, readings=tuple(readings)), settings=settings)
     return result
+
+
+def _amounts(readings: Sequence[ReadingGroup]) -> dict[tuple[str, str], int]:
+    """How often each ball is read with each probe."""
+    found: dict[tuple[str, str], int] = {}
+    for group in readings:
+        for pair in product(group.probes, group.balls):
+            found[pair] = found.get(pair, 0) + group.repeats
+    return found
+
+
+def _with_readings(settings: Mapping[str, Any], readings: Sequence[ReadingGroup]) -> dict[str, Any]:
+    """What a file says of a position, with these readings."""
+    said = {key: value for key, value in settings.items() if key not in GROUP}
+    common = {"standard_uncertainty": settings["standard_uncertainty"]} if "standard_uncertainty" in settings else {}
+    groups = [{"probes": list(one.probes), "balls": list(one.balls), "repeats": one.repeats} for one in readings]
+    return {**said, "readings": [group | common for group in groups]}
