@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Points: of the drawing, its parts and what stands around them.
 WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
-CURVE, SCENE, ROW, LEGEND, UNDER = 180.0, 330.0, 17.0, 34.0, 20.0
+CURVE, SCENE, ROW, LEGEND, UNDER = 180.0, 330.0, 17.0, 42.0, 4.0
 # Room for a line of a value alone, and for its name.
 STRIP, LABELS = 22.0, 134.0
 # Room for a position's number on the left of the gains, and for their values on the right.
@@ -214,7 +214,7 @@ def _curve(axes: Axes, found: Campaign, marks: Sequence[_Mark]) -> None:
     _plain_numbers(axes.yaxis, axes.get_yscale() == "log")
     axes.grid(True)
     axes.legend(
-        loc="lower left", bbox_to_anchor=(-0.09, 1.0), ncols=3, borderaxespad=0.2, borderpad=0.2, columnspacing=1.2,
+        loc="lower left", bbox_to_anchor=(-0.09, 1.04), ncols=3, borderaxespad=0.2, borderpad=0.2, columnspacing=1.2,
         handlelength=2.0, handletextpad=0.5,
     )  # fmt: skip
 
