@@ -1,0 +1,117 @@
+"""The picture of a planned campaign."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.planning.campaign import Campaign, CurvePoint, Gain
+from analysis.planning.constraints import Budget, Spent
+from analysis.report.campaign import draw_campaign, words
+from analysis.study import plan
+from simulator.experiment.load import load
+from simulator.experiment.pool import with_chosen
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+
+@pytest.fixture(scope="module")
+def found() -> Campaign:
+    """A campaign with figures that were not searched for, so that drawing it takes no search."""
+    (experiment,) = load("designs/planning/campaign.yaml", planning=True)
+    pool = experiment.pool
+    assert pool is not None
+    by_name = {one.name: one for one in pool.candidates}
+    chosen = tuple(pool.candidates[k] for k in (0, 1, 5, 30, 55))
+    values = (math.inf, 9e-7, 8e-7, 7e-7, 6.5e-7)
+    gains = tuple(Gain(one, value, 6e-7) for one, value in zip(chosen, values, strict=True))
+    left_out = (Gain(by_name["better sides"], 6e-7, 5e-7),)
+    curve = tuple(
+        CurvePoint(Budget(3600.0 * hours), Spent(3500.0 * hours, 50, 2), chosen, 2.4e-6 / hours, bound)
+        for hours, bound in ((2.0, 6e-7), (4.0, 4e-7), (6.0, math.nan))
+    )
+    return Campaign(
+        experiment, pool, "U6", "m", 0, Budget(4 * 3600.0), chosen, (), Spent(14000.0, 175, 5), 6e-7, 4e-7, 1.2e-6,
+        Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, plan(with_chosen(experiment, chosen)), curve,
+    )  # fmt: skip
+
+
+def texts(campaign: Campaign, folder: Path) -> list[str]:
+    """The letters of a picture, which matplotlib tells in comments of a drawing whose letters are outlines."""
+    path = folder / "picture.svg"
+    draw_campaign(campaign, path)
+    return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
+
+
+def test_a_picture_with_a_curve_has_marks_gains_and_positions(found: Campaign, tmp_path: Path) -> None:
+    drawn = texts(found, tmp_path)
+    for text in ("best choice found", "bound of any choice", "chosen: 0.600", "as drawn: 1.20", "hours allowed"):
+        assert text in drawn
+    # Five times what is drawn is further off than the axis goes.
+    assert "target: 5.70 (above)" in drawn
+    gains = [drawn.index(text) for text in ("needed", "50 %", "33 %", "17 %", "8.3 %", "20 %")]
+    assert gains == sorted(gains)
+    for name in [one.name for one in found.chosen] + ["better sides"]:
+        assert name in drawn
+    # Every position has its number at its gain and in the volume.
+    for number in range(1, 6):
+        assert drawn.count(str(number)) >= 2
+
+
+def test_without_a_curve_marks_stand_alone(found: Campaign, tmp_path: Path) -> None:
+    drawn = texts(replace(found, curve=()), tmp_path)
+    assert {"chosen", "as drawn", "target", "0.600", "0.400", "1.20", "5.70"} <= set(drawn)
+    assert "hours allowed" not in drawn
+    assert "1.00" in texts(replace(found, curve=(), target=1e-6), tmp_path)
+
+
+def test_the_same_campaign_gives_the_same_bytes(found: Campaign, tmp_path: Path) -> None:
+    draw_campaign(found, tmp_path / "one.svg")
+    draw_campaign(found, tmp_path / "two.svg")
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+
+
+@pytest.mark.parametrize("curve", [True, False], ids=["curve", "no curve"])
+def test_what_is_undetermined_or_has_no_bound_is_drawn_as_such(found: Campaign, tmp_path: Path, curve: bool) -> None:
+    gains = tuple(Gain(one.candidate, math.inf, math.inf) for one in found.gains)
+    nothing = replace(found, value=math.inf, bound=math.nan, drawn=math.inf, gains=gains, left_out=gains[:1])
+    nothing = nothing if curve else replace(nothing, curve=())
+    drawn = texts(nothing, tmp_path)
+    assert "–" in drawn and "needed" not in drawn
+    assert any(text.startswith("left out") for text in drawn) is False
+    assert ("chosen: deficient" if curve else "deficient") in drawn
+    assert "deficient" in words(nothing) and "bound" not in words(nothing)
+    bare = replace(nothing, drawn=None, drawn_spent=None, target=None, gains=(), left_out=())
+    assert not {"as drawn", "target"} & set(texts(bare, tmp_path))
+
+
+def test_a_ratio_has_no_unit(found: Campaign, tmp_path: Path) -> None:
+    ratio = replace(found, criterion="condition", unit="1", value=310.0, bound=math.nan, drawn=900.0, target=None)
+    ratio = replace(ratio, curve=tuple(replace(point, value=1e3, bound=math.nan) for point in ratio.curve))
+    drawn = texts(ratio, tmp_path)
+    assert "chosen: 310" in drawn and not any("µm" in text for text in drawn)
+    assert "chosen 310, as drawn 900" in words(ratio)
+
+
+def test_positions_that_are_read_already_are_named(found: Campaign, tmp_path: Path) -> None:
+    done = replace(found, done=found.chosen[:2], gains=found.gains[2:])
+    drawn = texts(done, tmp_path)
+    assert drawn.count("read already") == 2 and "flat low" in drawn
+
+
+def test_many_chosen_ones_are_counted(found: Campaign, tmp_path: Path) -> None:
+    gains = tuple(Gain(one, 7e-7, 6e-7) for one in found.pool.candidates[:40])
+    drawn = texts(replace(found, gains=gains), tmp_path)
+    assert "… and 16 chosen ones more" in drawn and len(np.unique(drawn)) > 20
+
+
+def test_a_budget_of_positions_is_counted(found: Campaign, tmp_path: Path) -> None:
+    curve = tuple(replace(point, budget=Budget(positions=k)) for k, point in enumerate(found.curve, 2))
+    drawn = texts(replace(found, budget=Budget(positions=4), curve=curve), tmp_path)
+    assert "positions allowed" in drawn
+    assert not any(re.fullmatch(r"\d\.5", text) for text in drawn[: drawn.index("positions allowed")])
