@@ -19,7 +19,8 @@ NEAR = 2e-3
 
 def examples() -> dict[str, list[str]]:
     """Commands on the page that its build does not run, with the lines of their output that it shows."""
-    blocks = re.findall(r"^```console\n\$ ballplate ([^\n]*)\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)
+    page = PAGE.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```console\n\$ ballplate ([^\n]*)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     return {command: shown.splitlines() for command, shown in blocks}
 
 
