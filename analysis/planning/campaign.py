@@ -294,4 +294,5 @@ def _budgets(problem: Problem) -> list[Budget]:
         positions = None if budget.positions is None else max(round(budget.positions * factor), 1)
         readings = None if budget.readings is None else round(budget.readings * factor)
         found.append(Budget(None if budget.seconds is None else budget.seconds * factor, readings, positions))
-    return list(dict.fromkeys([*found, budget]))
+    found = list(dict.fromkeys([*found, budget]))
+    return sorted(found, key=lambda one: (one.seconds or 0.0, one.readings or 0, one.positions or 0))

@@ -2,7 +2,7 @@
 
 Information adds: that of a selection is the sum of its candidates' matrices. Two changes of basis keep the matrices
 small and the sums accurate. The first leaves out combinations of balls that no position ties to machine errors: on a
-plate read as a whole some sixty combinations matter, however many balls there are. The second makes the information
+plate read as a whole some fifty combinations matter, however many balls there are. The second makes the information
 of the whole pool the identity, by a triangular factor obtained from orthogonal transformations, so that nothing is
 lost where products of rows are formed; what the pool does not determine at all is left out of it.
 """
