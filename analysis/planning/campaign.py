@@ -76,7 +76,8 @@ class Campaign:
     `chosen` in the order of the pool, `done` those of them that have been read already. `value` is infinite where the
     selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
     `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
-    the limits or not; None without any. `plan` judges the experiment with the chosen candidates in full.
+    the limits or not, told as `drawn_words`; None without any. `plan` judges the experiment with the chosen candidates in
+    full.
     """
 
     experiment: Experiment
@@ -91,6 +92,7 @@ class Campaign:
     value: float
     bound: float
     drawn: float | None
+    drawn_words: str
     drawn_spent: Spent | None
     target: float | None
     gains: tuple[Gain, ...]
@@ -163,6 +165,7 @@ def campaign(
         best.value,
         np.nan if relaxed is None else relaxed.value,
         value(problem, reference) if drawn else None,
+        "chosen before" if earlier else "as drawn",
         limits.spent(reference) if drawn else None,
         wanted.target,
         _gains(problem, best, candidates),

@@ -31,7 +31,7 @@ STRIP, LABELS = 22.0, 134.0
 # Room for a position's number on the left of the gains, and for their values on the right.
 NUMBERS, VALUES = 26.0, 74.0
 
-CHOSEN, BOUND, DRAWN, TARGET = "chosen", "bound of any choice", "as drawn", "target"
+CHOSEN, BOUND, TARGET = "chosen", "bound of any choice", "target"
 
 # Candidates that are drawn, of the chosen ones and of those left out, and the letters of a name.
 MOST_CHOSEN, MOST_LEFT_OUT, MOST_LETTERS = 24, 5, 66
@@ -72,7 +72,7 @@ def words(found: Campaign) -> str:
     if not math.isnan(found.bound):
         told.append(f"bound of any choice {_told(found, found.bound)}")
     if found.drawn is not None:
-        told.append(f"as drawn {_told(found, found.drawn)}")
+        told.append(f"{found.drawn_words} {_told(found, found.drawn)}")
     if found.target is not None:
         told.append(f"target {_told(found, found.target)}")
     return f"{', '.join(told)}; {len(found.chosen)} chosen of {len(found.pool.candidates)} candidates"
@@ -133,7 +133,7 @@ def _marks(found: Campaign) -> list[_Mark]:
     if not math.isnan(found.bound):
         marks.append(_Mark(BOUND, found.bound, MUTED, "|"))
     if found.drawn is not None:
-        marks.append(_Mark(DRAWN, found.drawn, SERIES[1], MARKERS[3]))
+        marks.append(_Mark(found.drawn_words, found.drawn, SERIES[1], MARKERS[3]))
     if found.target is not None:
         marks.append(_Mark(TARGET, found.target, INK, "|"))
     return [replace(mark, value=_factor(found) * mark.value) for mark in marks]
@@ -196,7 +196,7 @@ def _curve(axes: Axes, found: Campaign, marks: Sequence[_Mark]) -> None:
     if BOUND in by_name and found.is_determined:
         ends_of_gap = [by_name[BOUND].value, by_name[CHOSEN].value]
         axes.plot([here, here], ends_of_gap, color=SERIES[0], linewidth=0.8, linestyle=DASHES[2])
-    for name, at_budget in ((CHOSEN, here), (DRAWN, drawn_at)):
+    for name, at_budget in ((CHOSEN, here), (found.drawn_words, drawn_at)):
         if name in by_name:
             mark = by_name[name]
             is_known = math.isfinite(mark.value)

@@ -37,7 +37,7 @@ def found() -> Campaign:
     )
     return Campaign(
         experiment, pool, "U6", "m", 0, Budget(4 * 3600.0), chosen, (), Spent(14000.0, 175, 5), 6e-7, 4e-7, 1.2e-6,
-        Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, plan(with_chosen(experiment, chosen)), curve,
+        "as drawn", Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, plan(with_chosen(experiment, chosen)), curve,
     )  # fmt: skip
 
 
