@@ -76,8 +76,7 @@ class Campaign:
     `chosen` in the order of the pool, `done` those of them that have been read already. `value` is infinite where the
     selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
     `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
-    the limits or not, told as `drawn_words`; None without any. `plan` judges the experiment with the chosen candidates in
-    full.
+    the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
     """
 
     experiment: Experiment
