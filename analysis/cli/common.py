@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
 
 
+EXISTS = "exists already; name a new file, or overwrite it with --force"
+
+
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
     """Add the experiment file, or several of them, and the choice of a variant."""
     parser.add_argument("files", metavar="FILE", nargs="+" if several else 1, type=Path, help="experiment file (YAML)")
@@ -89,6 +92,18 @@ def draw(draw_to: Callable[[Path], None], path: Path) -> bool:
     return True
 
 
+def refuse_existing(*paths: Path | None) -> None:
+    """Refuse to go on where a file that is to be written is there already, before the work and not after it.
+
+    :raises ExperimentError: one of the files is there already.
+    """
+    from simulator.experiment.messages import ExperimentError, Message
+
+    found = [path for path in paths if path is not None and path.exists()]
+    if found:
+        raise ExperimentError([Message(str(path), 0, 0, "", EXISTS) for path in found])
+
+
 def write(path: Path, text: str, force: bool = False) -> None:
     """Write a text file, no other in its place unless with `force`.
 
@@ -100,8 +115,7 @@ def write(path: Path, text: str, force: bool = False) -> None:
         with path.open("w" if force else "x", encoding="utf-8", newline="") as stream:
             stream.write(text)
     except FileExistsError:
-        told = "exists already; name a new file, or overwrite it with --force"
-        raise ExperimentError([Message(str(path), 0, 0, "", told)]) from None
+        raise ExperimentError([Message(str(path), 0, 0, "", EXISTS)]) from None
     except OSError as error:
         told = f"cannot be written ({error.strerror}); name another file"
         raise ExperimentError([Message(str(path), 0, 0, "", told)]) from None

@@ -5,10 +5,23 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, add_json, count, draw, picture, print_json, print_lines, seed, single, write
+from .common import (
+    add_file,
+    add_json,
+    count,
+    draw,
+    picture,
+    print_json,
+    print_lines,
+    refuse_existing,
+    seed,
+    single,
+    write,
+)
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -107,6 +120,11 @@ def run(options: Namespace) -> int:
     from ..planning.tables import campaign_data, campaign_lines
     from ..processes import processors
 
+    if not options.force:
+        refuse_existing(options.output, options.sheet)
+    elif options.output is not None and options.output.resolve() == options.files[0].resolve():
+        text = "is the file that the pool stands in; name another"
+        raise ExperimentError([Message(str(options.output), 0, 0, "", text)])
     experiment = single(options, planning=True)
     candidates = experiment.pool.candidates if experiment.pool is not None else ()
     messages: list[Message] = []
@@ -118,7 +136,11 @@ def run(options: Namespace) -> int:
         messages += error.messages
     try:
         if options.earlier is not None and candidates:
-            earlier = earlier_choice(load(options.earlier)[0], candidates)
+            before = load(options.earlier)
+            if len(before) > 1:
+                text = "the file has several variants; name a design that was chosen"
+                raise ExperimentError([Message(str(options.earlier), 0, 0, "variants", text)])
+            earlier = earlier_choice(before[0], candidates)
     except ExperimentError as error:
         messages += error.messages
     if messages:
@@ -157,7 +179,9 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         write(options.output, text, options.force)
     if options.sheet is not None:
         write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)
-    return options.plot is None or draw(lambda path: _draw(found, path), options.plot)
+    # Numbered as on the run sheet.
+    in_order = replace(found, chosen=sheet.chosen)
+    return options.plot is None or draw(lambda path: _draw(in_order, path), options.plot)
 
 
 def _draw(found: Campaign, path: Path) -> None:

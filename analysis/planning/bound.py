@@ -154,6 +154,8 @@ def _tangent(problem: Problem, weights: Array, power: float) -> _Tangent | None:
         return None
     own = slice(None) if problem.criterion.about_balls else information.shared
     smooth, value, weight = problem.criterion.tangent(counted_root(problem, root), power)
+    if value <= 0.0:
+        return None
     half = root @ (root[own].T @ square_root(weight))
     # By the covariance C the derivative is W, and by the information -C W C.
     squared = 2.0 * value**-3 * (half @ half.T)

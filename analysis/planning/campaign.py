@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import Candidate, Pool, with_chosen
+from simulator.experiment.model import Experiment, Position
+from simulator.experiment.pool import AtMost, Candidate, Pool, with_chosen
+from simulator.settings import listing
 from simulator.threads import single_threaded
 
 from ..processes import in_processes
@@ -22,7 +24,7 @@ from .search import Found, Losses, Problem, improve, ranked_additions, starts, v
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
-SMALL_POOL, VERY_SMALL_POOL = 64, 24
+SMALL_POOL, VERY_SMALL_POOL, TINY_POOL = 64, 24, 11
 
 # The best results of a large pool from which the search goes deeper.
 BEST_STARTS = 4
@@ -105,6 +107,12 @@ class Campaign:
         return self.bound / self.value
 
     @property
+    def drawn_is_within(self) -> bool:
+        """Whether what it is compared with keeps to the budget; then the choice is never worse."""
+        spent, budget = self.drawn_spent, self.budget
+        return spent is None or spent.is_within(budget)
+
+    @property
     def is_determined(self) -> bool:
         return bool(np.isfinite(self.value))
 
@@ -137,7 +145,7 @@ def campaign(
     information = pool_information(experiment, candidates, is_about_balls(request.criterion))
     wanted = criterion(information, experiment, request.criterion)
     drawn = sorted(earlier) if earlier else [k for k, candidate in enumerate(candidates) if candidate.drawn]
-    free = constraints(candidates, pool.changes, Budget(), pool.must, pool.at_most, list(read))
+    free = constraints(candidates, pool.changes, Budget(), pool.must, _limits(experiment, pool), list(read))
     reference = sorted({*drawn, *free.must})
     budget = request.budget or _as_drawn(experiment, free, drawn, reference)
     limits = replace(free, budget=budget)
@@ -146,9 +154,8 @@ def campaign(
 
     report("searching")
     best, relaxed = _search(problem, drawn, request.seed, workers)
-    if relaxed is not None and relaxed.value > best.value:
-        raise AssertionError(f"bound {relaxed.value} above {best.value}")
     chosen = [candidates[k] for k in best.chosen]
+    _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
     report("gains")
     return Campaign(
@@ -164,7 +171,7 @@ def campaign(
         best.value,
         np.nan if relaxed is None else relaxed.value,
         value(problem, reference) if drawn else None,
-        "chosen before" if earlier else "as drawn",
+        ("chosen before" if earlier else "as drawn") + (", with what is kept" if set(reference) - set(drawn) else ""),
         limits.spent(reference) if drawn else None,
         wanted.target,
         _gains(problem, best, candidates),
@@ -176,6 +183,35 @@ def campaign(
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
     return ExperimentError([Message(str(experiment.source), 0, 0, path, text)])
+
+
+def _limits(experiment: Experiment, pool: Pool) -> list[AtMost]:
+    """Limits of a pool, and that of several certificates of the same length only one counts."""
+    found = list(pool.at_most)
+    for name, artefact in experiment.artefacts.items():
+        own = tuple(
+            k
+            for k, one in enumerate(pool.candidates)
+            if not isinstance(one.item, Position) and one.item.artefact == name
+        )
+        if len(own) > 1 and artefact.role != "plate":
+            found.append(AtMost(own, 1))
+    return found
+
+
+def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget: Budget) -> None:
+    """Refuse a choice that is no experiment: without a position, or with balls that nobody reads."""
+    positions = [one.item for one in chosen if isinstance(one.item, Position)]
+    if not positions:
+        raise _impossible(experiment, "pool", f"no position can be read with {budget}; allow more")
+    for name in {position.artefact for position in positions}:
+        own = [position for position in positions if position.artefact == name]
+        read = {int(ball) for position in own for group in position.readings for ball in group.ball_indices}
+        unread = [ball for k, ball in enumerate(experiment.layouts[name].names) if k not in read]
+        if unread and experiment.artefacts[name].role == "plate":
+            balls = listing(f'"{ball}"' for ball in unread)
+            text = f"the best choice leaves {balls} of {name} unread, which no experiment may; keep a position of all"
+            raise _impossible(experiment, "pool.limits.keep", text)
 
 
 def _as_drawn(experiment: Experiment, free: Constraints, drawn: Sequence[int], reference: Sequence[int]) -> Budget:
@@ -206,6 +242,8 @@ def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: 
 
 def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> tuple[Found, Bound | None]:
     """The best selection found, and the bound of all."""
+    if problem.constraints.count <= TINY_POOL:
+        return _best_of_all(problem), bound(problem)
     is_small = problem.constraints.count <= SMALL_POOL
     first = starts(problem, drawn, SMALL_STARTS if is_small else LARGE_STARTS, seed)
     # In a small pool most selections are met again and again, and one process remembers them.
@@ -223,6 +261,16 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
         selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: (one.value, one.chosen))
     return best, relaxed if isinstance(relaxed, Bound) else None
+
+
+@single_threaded
+def _best_of_all(problem: Problem) -> Found:
+    """The best of all selections of a pool that has few."""
+    limits, losses = problem.constraints, Losses(problem)
+    members = range(limits.count)
+    every = (frozenset(chosen) for size in range(limits.count + 1) for chosen in combinations(members, size))
+    best = min((chosen for chosen in every if limits.allows(chosen)), key=lambda one: (losses.of(one), sorted(one)))
+    return Found(tuple(sorted(best)), value(problem, best))
 
 
 @single_threaded

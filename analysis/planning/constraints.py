@@ -47,6 +47,14 @@ class Spent:
     readings: int
     positions: int
 
+    def is_within(self, budget: Budget) -> bool:
+        """Whether a budget allows it."""
+        return (
+            (budget.seconds is None or self.seconds <= budget.seconds + SLACK)
+            and (budget.readings is None or self.readings <= budget.readings)
+            and (budget.positions is None or self.positions <= budget.positions)
+        )
+
 
 @dataclass(frozen=True)
 class Constraints:
@@ -86,15 +94,7 @@ class Constraints:
         return (
             self.must <= members
             and all(len(members.intersection(limit.members)) <= limit.count for limit in self.at_most)
-            and self._affords(self.spent(members))
-        )
-
-    def _affords(self, spent: Spent) -> bool:
-        budget = self.budget
-        return (
-            (budget.seconds is None or spent.seconds <= budget.seconds + SLACK)
-            and (budget.readings is None or spent.readings <= budget.readings)
-            and (budget.positions is None or spent.positions <= budget.positions)
+            and self.spent(members).is_within(self.budget)
         )
 
     def additions(self, chosen: Collection[int]) -> NDArray[np.int64]:

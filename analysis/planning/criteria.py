@@ -125,12 +125,18 @@ class Criterion:
         """
         if self.functions is not None:
             found = self.functions.uncertainties(root)
-            relative = found / found.max()
+            relative = found / max(float(found.max()), np.finfo(float).tiny)
             weights = relative ** (power - 1) if self.largest else np.ones(len(found))
             weights /= weights.sum()
             value = float(weights @ found)
             smooth = float(found.max() * (relative**power).mean() ** (1 / power)) if self.largest else value
-            return smooth, value, self.functions.squares(0.5 * weights / found)
+            # What is known without any uncertainty stays so.
+            known = found > 0.0
+            return (
+                smooth,
+                value,
+                self.functions.squares(np.where(known, 0.5 * weights, 0.0) / np.where(known, found, 1.0)),
+            )
         left, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
         n, value = len(sizes), self.value(root)
         if self.name == "A":

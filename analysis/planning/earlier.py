@@ -30,12 +30,27 @@ def earlier_choice(chosen: Experiment, candidates: Sequence[Candidate]) -> tuple
             for name in unknown
         ]
         raise ExperimentError(messages)
+    moved = [one.name for one in chosen.positions if not _same_place(one, candidates[places[one.name]].item)]
+    if moved:
+        texts = [
+            f'"{name}" stands elsewhere, or of another artefact, in the pool; give it another name' for name in moved
+        ]
+        raise ExperimentError([Message(str(chosen.source), 0, 0, "positions", text) for text in texts])
     found = [places[position.name] for position in chosen.positions]
     for k, candidate in enumerate(candidates):
         item = candidate.item
         if not isinstance(item, Position) and any(_equal(item, other) for other in chosen.calibration):
             found.append(k)
     return tuple(sorted(found))
+
+
+def _same_place(one: Position, other: object) -> bool:
+    return (
+        isinstance(other, Position)
+        and one.artefact == other.artefact
+        and np.allclose(one.pose.rotation, other.pose.rotation, atol=1e-9)
+        and np.allclose(one.pose.origin, other.pose.origin, atol=1e-9)
+    )
 
 
 def _equal(one: Calibration, other: Calibration) -> bool:

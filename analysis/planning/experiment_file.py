@@ -85,7 +85,7 @@ def experiment_text(
             # A text that is no YAML any more; without the parts kept it is.
             if not parts:
                 raise
-    return written
+    return written.rstrip("\n") + "\n"
 
 
 def to_list(value: Any) -> Any:
@@ -104,7 +104,9 @@ def _content(tree: MappingNode, experiment: Experiment, chosen: Sequence[Candida
     # Where there is one artefact, nothing says which.
     only = next(iter(said["artefacts"]))
     items = [one for one in said.get("calibration", []) if str(one.get("artefact", only)) in placed]
-    items += [to_list(one.settings) for one in chosen if not isinstance(one.item, Position)]
+    items += [
+        to_list(one.settings) for one in chosen if not isinstance(one.item, Position) and one.item.artefact in placed
+    ]
     said["artefacts"] = {name: one for name, one in said["artefacts"].items() if name in placed}
     said["positions"] = [to_list(one.settings) for one in positions]
     said["calibration"] = items

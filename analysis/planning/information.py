@@ -110,14 +110,24 @@ class Frames:
 
     `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the motions of the plates (m,
     motions), `base` the same for the experiment's own certificates. `rows` (motions, z) are the motions' rows.
+    `artefacts` holds, for each artefact, which candidates place it and the information (z, z) that holds its balls or
+    its length.
     """
 
     fixed: dict[int, Array]
     base: Array
     rows: Array
+    artefacts: tuple[tuple[frozenset[int], Array], ...] = ()
 
-    def held(self, members: Iterable[int]) -> Array:
-        """Information (z, z) that holds the motions that no member fixes."""
+    def held(self, members: Sequence[int]) -> Array:
+        """Information (z, z) that holds the motions that no member fixes, and artefacts that no member places."""
+        total = self._held_motions(members)
+        for placing, information in self.artefacts:
+            if placing.isdisjoint(members):
+                total = total + information
+        return total
+
+    def _held_motions(self, members: Iterable[int]) -> Array:
         if not self.fixed:
             return np.zeros((self.rows.shape[1],) * 2)
         told = np.concatenate([self.base, *(self.fixed[k] for k in members if k in self.fixed)])
@@ -172,7 +182,7 @@ def pool_information(experiment: Experiment, candidates: Sequence[Candidate], al
         transformed = in_basis(rows)
         matrices[k] = transformed.T @ transformed
     transformed = in_basis(base)
-    frames = _frames(drawn, known, items, basis)
+    frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis))
     return Information(drawn, tuple(candidates), basis, transformed.T @ transformed, matrices, open_, frames)
 
 
@@ -335,6 +345,30 @@ def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
             yield some
             some = []
     yield some
+
+
+def _unplaced(drawn: Drawn, candidates: Sequence[Candidate], basis: Basis) -> tuple[tuple[frozenset[int], Array], ...]:
+    """For each artefact, which candidates place it, and what holds the parameters that are its own."""
+    design, found = drawn.design, []
+    n, d = design.balls.shape
+    for number, name in enumerate(design.artefact_names):
+        placing = frozenset(
+            k for k, one in enumerate(candidates) if isinstance(one.item, Position) and one.item.artefact == name
+        )
+        own = np.flatnonzero(design.ball_artefact == number)
+        by_ball = basis.balls[own].reshape(len(own) * d, -1)
+        lengths = [k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name]
+        by_length = np.eye(drawn.shared)[[drawn.layout.lengths.start - drawn.own.start + k for k in lengths]]
+        rows = np.concatenate(
+            [
+                basis.rows(by_ball, np.zeros((len(by_ball), drawn.shared))),
+                basis.rows(np.zeros((len(by_length), by_ball.shape[1])), by_length),
+            ]
+        )
+        size = float(np.abs(rows).max(initial=0.0))
+        if size > 0.0:
+            found.append((placing, rows.T @ rows / size**2))
+    return tuple(found)
 
 
 def _frames(drawn: Drawn, known: list[Rows], items: dict[int, list[Rows]], basis: Basis) -> Frames:

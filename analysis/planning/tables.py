@@ -54,7 +54,8 @@ def _comparison(found: Campaign) -> list[str]:
     if not math.isnan(found.bound):
         rows.append(["bound of any choice", *_value(found, found.bound), "", "", ""])
     if found.drawn is not None and found.drawn_spent is not None:
-        rows.append([found.drawn_words, *_value(found, found.drawn), *_spent(found.drawn_spent)])
+        words = found.drawn_words + ("" if found.drawn_is_within else " (more than allowed)")
+        rows.append([words, *_value(found, found.drawn), *_spent(found.drawn_spent)])
     if found.target is not None:
         rows.append(["target", *_value(found, found.target), "", "", ""])
     return aligned(rows, [False, True, False, True, True, True])

@@ -100,17 +100,17 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     """The estimate from scale readings `x` (readings, d) and starting values of their own.
 
     What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as in NPL Report CISE
-    15/98, section 5.4, where the iteration wanders along it without leaving the neighbourhood, and held only if that
-    fails: poses a little off their nominal ones then call for steps of metres.
+    15/98, section 5.4, where the iteration wanders along it without leaving the neighbourhood, and held if that fails
+    or ends where less seems to be open than as drawn: poses a little off their nominal ones then call for steps of
+    metres.
     """
     start = initial_state(design, x)
-    held = open_as_drawn(design) if len(design.lengths) else None
-    solution = gauss_newton(design, x, start, settings, held)
-    if solution.status != "converged" and not len(design.lengths):
-        held = open_as_drawn(design)
-        if held is not None:
-            return gauss_newton(design, x, start, settings, held)
-    return solution
+    drawn = open_as_drawn(design)
+    solution = gauss_newton(design, x, start, settings, drawn if len(design.lengths) else None)
+    if drawn is None or len(design.lengths):
+        return solution
+    is_open = solution.status == "converged" and solution.spectrum.deficiency >= drawn.shape[1]
+    return solution if is_open else gauss_newton(design, x, start, settings, drawn)
 
 
 def open_as_drawn(design: Design) -> Array | None:

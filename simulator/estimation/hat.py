@@ -98,7 +98,7 @@ def hat_rows(
         common = widened(shared) + by_ball @ found.ball[ball]
         own = by_ball @ found.ball_own[ball]
         rows = d * some[:, None] + np.arange(d)
-        yield HatRows(rows.ravel(), common.reshape(-1, width), own.reshape(-1, d), np.repeat(ball, d))
+        yield HatRows(rows.ravel(), common.reshape(d * len(ball), width), own.reshape(-1, d), np.repeat(ball, d))
     if len(design.lengths):
         yield by_shared(places.lengths.start, length_shared_rows(design, layout, state, x)[1])
     if len(design.priors):

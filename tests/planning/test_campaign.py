@@ -209,3 +209,18 @@ def test_hours_buy_certificates_too(tmp_path: Path) -> None:
     assert found.spent.seconds <= 6 * HOUR
     full = found.plan.quantities["U5"]
     assert found.value == pytest.approx(full.average, rel=1e-9)
+
+
+def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "pool.yaml"
+    path.write_text(TEXT)
+    assert main(["plan", str(path), "--hours", "0.1", "--workers", "1"]) == 3
+    assert "no position can be read with 0.1 h; allow more" in capsys.readouterr().err
+
+
+def test_the_pool_is_not_overwritten_by_the_choice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "pool.yaml"
+    path.write_text(TEXT)
+    assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 3
+    assert "the pool stands in" in capsys.readouterr().err
+    assert path.read_text() == TEXT

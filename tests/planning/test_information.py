@@ -174,3 +174,36 @@ def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
     assert experiment.pool is not None
     with pytest.raises(ExperimentError, match="which a plan cannot weigh"):
         pool_information(experiment, experiment.pool.candidates)
+
+
+TWO_PLATES = """
+title: one of two plates
+machine: {volume: [500 mm, 400 mm], repeatability: 1 um}
+error_model: {kind: metric}
+probes: {tip: [0 mm, 0 mm]}
+artefacts:
+  small: {kind: grid, balls: [2, 2], size: [200 mm, 150 mm]}
+  large: {kind: grid, balls: [3, 2], size: [300 mm, 250 mm]}
+evaluation: {points: {random: 12, seed: 1}}
+pool:
+  candidates:
+    - {name: a, artefact: small, corner: {x: 50 mm, y: 50 mm}}
+    - {name: b, artefact: small, corner: {x: 250 mm, y: 100 mm}, quarter_turns: 1}
+    - {name: c, artefact: large, corner: {x: 50 mm, y: 50 mm}}
+    - {name: d, artefact: large, corner: {x: 150 mm, y: 50 mm}, quarter_turns: 1}
+  calibration:
+    - {name: of small, artefact: small, kind: distances, pairs: corner sides, standard_uncertainty: 0.5 um, price: 1 h}
+    - {name: of large, artefact: large, kind: distances, pairs: corner sides, standard_uncertainty: 0.5 um, price: 1 h}
+"""
+
+
+def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
+    (experiment,) = load(written(tmp_path, TWO_PLATES), planning=True)
+    assert experiment.pool is not None
+    problem = problem_of(experiment, "U6")
+    names = [candidate.name for candidate in experiment.pool.candidates]
+    for wanted in (["a", "b", "of small"], ["c", "d", "of large"], ["a", "d", "of small", "of large"]):
+        chosen = [names.index(name) for name in wanted]
+        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        assert full.verdict.deficiency == 0
+        assert value(problem, chosen) == pytest.approx(full.quantities["U6"].average, rel=1e-9)
