@@ -76,9 +76,14 @@ def spectrum(factor: Factor, exact: float = EXACT, held: Array | None = None) ->
     if held is not None:
         open_ = held / scale[:, None]
         root = root - (root @ open_) @ open_.T
-    _, values, rows = np.linalg.svd(root)
-    deficiency = int((values <= exact * values.max(initial=0.0)).sum())
-    return Spectrum(values, scale[:, None] * rows.T, scale, deficiency)
+    _, values, right = np.linalg.svd(root)
+    # Where nothing shared is determined, all values are rounding, of what the balls' rows have carried away.
+    largest = max(
+        float(values.max(initial=0.0)),
+        *(float(np.abs(rows * scale).max(initial=0.0)) for rows in (factor.ball_shared, factor.kept_shared)),
+    )
+    deficiency = int((values <= exact * largest).sum())
+    return Spectrum(values, scale[:, None] * right.T, scale, deficiency)
 
 
 def no_spectrum(layout: SharedLayout) -> Spectrum:

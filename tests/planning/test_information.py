@@ -202,8 +202,12 @@ def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
     assert experiment.pool is not None
     problem = problem_of(experiment, "U6")
     names = [candidate.name for candidate in experiment.pool.candidates]
-    for wanted in (["a", "b", "of small"], ["c", "d", "of large"], ["a", "d", "of small", "of large"]):
+    for wanted in (["a", "b", "of small"], ["c", "d", "of large"], ["a", "b", "c", "of small", "of large"]):
         chosen = [names.index(name) for name in wanted]
         full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         assert full.verdict.deficiency == 0
         assert value(problem, chosen) == pytest.approx(full.quantities["U6"].average, rel=1e-9)
+    # Neither the sides of the one nor those of the other tell squareness, and nothing else is shared.
+    chosen = [names.index(name) for name in ("a", "d", "of small", "of large")]
+    full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+    assert full.verdict.deficiency == 1 and value(problem, chosen) == np.inf
