@@ -18,6 +18,9 @@ from .parameters import shared_layout
 
 Status = Literal["converged", "not converged", "diverged"]
 
+# A step of more than this (m, rad) along what the drawn design leaves open has left the neighbourhood of the drawing.
+NEIGHBOURHOOD = 0.01
+
 
 @dataclass(frozen=True)
 class GaussNewtonSettings:
@@ -101,16 +104,18 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
 
     What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as in NPL Report CISE
     15/98, section 5.4, where the iteration wanders along it without leaving the neighbourhood, and held if that fails
-    or ends where less seems to be open than as drawn: poses a little off their nominal ones then call for steps of
-    metres.
+    or ends far away, where less seems to be open than as drawn: poses a little off their nominal ones then call for
+    steps of metres.
     """
     start = initial_state(design, x)
     drawn = open_as_drawn(design)
     solution = gauss_newton(design, x, start, settings, drawn if len(design.lengths) else None)
     if drawn is None or len(design.lengths):
         return solution
-    is_open = solution.status == "converged" and solution.spectrum.deficiency >= drawn.shape[1]
-    return solution if is_open else gauss_newton(design, x, start, settings, drawn)
+    is_open = solution.spectrum.deficiency >= drawn.shape[1]
+    went_far = max(one.step for one in solution.iterations) > NEIGHBOURHOOD
+    follows = solution.status == "converged" and (is_open or not went_far)
+    return solution if follows else gauss_newton(design, x, start, settings, drawn)
 
 
 def open_as_drawn(design: Design) -> Array | None:
