@@ -329,13 +329,13 @@ def rests_on(document: Document, section: str, quantity: str | None = None) -> s
 
 
 def common_factor(ratios: Iterable[float]) -> float:
-    """Geometric mid-range of ratios: none deviates from it by more than the two at the ends; NaN without any.
+    """Median of ratios, which a few that have other causes do not move; NaN without any.
 
-    >>> round(common_factor([0.9, 1.0, 1.6]), 6)
-    1.2
+    >>> common_factor([0.9, 1.0, 1.6])
+    1.0
     """
     values = list(ratios)
-    return math.sqrt(max(values) * min(values)) if values else math.nan
+    return float(np.median(values)) if values else math.nan
 
 
 def compare_column(document: Document, shipped: Shipped, column: Column) -> ComparedColumn:

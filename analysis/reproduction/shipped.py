@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from simulator.experiment.load import load
@@ -15,6 +15,7 @@ from simulator.readings import ObservedReadings
 from simulator.settings import hint
 
 from ..study import Fit, Plan, fit, plan
+from .quantities import tabulated_quantities
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,10 @@ def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
 
 
 def planned(shipped: Shipped, label: str) -> Plan:
-    """The plan of a shipped design, at zero machine error."""
+    """The plan of a shipped design, at zero machine error, with U2, U3 and U5 in the form of the document's tables."""
     if label not in shipped.plans:
-        shipped.plans[label] = plan(shipped_experiment(shipped, label))
+        found = plan(shipped_experiment(shipped, label))
+        shipped.plans[label] = replace(found, quantities=found.quantities | tabulated_quantities(found.design))
     return shipped.plans[label]
 
 
