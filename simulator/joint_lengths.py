@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .machines.protocol import Array
 from .whitening import Integers, Whitening, whitening
@@ -28,19 +29,24 @@ FLAT = 1e-4
 # another is beyond what lengths show to first order.
 EXACT_CERTIFICATE = 1e-3
 
+# Smaller uncertainties than this fraction of the noise, beside larger ones, make no difference any more.
+SMALLEST = 1e-6
+
 # Singular values of equations about certificates below this fraction of the largest are those of equations told twice.
 TOLD_TWICE = 1e-9
 
 
 @dataclass(frozen=True)
 class Together:
-    """Lengths `rows` (m,) of one position and probe: `root` (m, r) makes of them r uncorrelated ones of unit variance.
+    """Lengths `rows` (m,) of one position and probe, in the order of their certificates.
 
-    Rows stand in the order of their certificates.
+    `root` (m, r) makes of them r lengths whose noise is uncorrelated and has unit variance. `by_error` (r, m) is what
+    the errors of the certificates, in their uncertainties, change these by, less what the m lengths tell of them.
     """
 
     rows: Integers
     root: Array
+    by_error: Array
 
 
 @dataclass(frozen=True)
@@ -58,10 +64,10 @@ class Consistency:
 class JointWhitening:
     """Whitening of the lengths of one standard whose readings they share.
 
-    Of c certificates with errors e in their uncertainties, lengths that are read together tell q combinations without
-    noise: `known` (q, equations) makes these of the equations in `consistencies`. They come last, `by_known` (r, q) is what
-    they take from the r rows before, and `shared` (r, k) with `gain` (k,) the root of what the other errors leave
-    correlated, (1 - shared diag(gain) shared').
+    Of the errors of certificates, in their uncertainties, lengths that are read together tell q combinations without
+    noise: `known` (q, equations) makes these of the equations in `consistencies`. They come last, and `by_known` (r, q)
+    is what they take from the r rows before. `shared` (r, k) with `gain` (k,) is the root of what the other errors
+    leave correlated, (1 - shared diag(gain) shared').
     """
 
     together: tuple[Together, ...]
@@ -97,6 +103,19 @@ class JointWhitening:
             stop = start + len(one.equations)
             into[one.rows] += one.equations.T @ told[start:stop] / len(one.rows)
             start = stop
+
+
+@dataclass(frozen=True)
+class ByPosition:
+    """Rows of lengths, position by position, in units of the readings' noise alone.
+
+    `length` (r,) is a length of each row's position, `rows` (r, k) are uncorrelated and of unit variance but for the
+    errors of certificates, in their uncertainties, and `by_error` (r, certificates) is the derivative by these.
+    """
+
+    length: Integers
+    rows: Array
+    by_error: Array
 
 
 @dataclass(frozen=True)
@@ -136,6 +155,27 @@ class LengthWhitening:
             start += len(one)
         return result.reshape(-1, *rows.shape[1:])
 
+    def by_position(self, given: Lengths, rows: Array) -> ByPosition:
+        """Rows (r, k) of each position by itself, of lengths' `rows` (m, k).
+
+        No position makes use of what others tell of certificates that contradict one another; where all read the same
+        lengths of a standard there is nothing more to be told.
+        """
+        alone = self.alone
+        weight = 1.0 / np.where(given.with_repeatability, self.scatter, given.uncertainty)[alone]
+        of_errors = np.zeros((len(alone), int(given.certificate.max(initial=-1)) + 1))
+        scatters = np.flatnonzero(given.with_repeatability[alone])
+        common = alone[scatters]
+        of_errors[scatters, given.certificate[common]] = -weight[scatters] * given.uncertainty[common]
+        length, found, by_error = [alone], [weight[:, None] * rows[alone]], [of_errors]
+        for each in (one for joint in self.joint for one in joint.together):
+            count = each.root.shape[1]
+            length.append(np.repeat(each.rows[:1], count))
+            found.append(each.root.T @ rows[each.rows])
+            by_error.append(np.zeros((count, of_errors.shape[1])))
+            by_error[-1][:, given.certificate[each.rows]] = each.by_error
+        return ByPosition(np.concatenate(length), np.concatenate(found), np.concatenate(by_error))
+
 
 def length_whitening(given: Lengths, noise: Array, standard: Integers, place: Integers) -> LengthWhitening:
     """Whitening of lengths (m,) whose readings have the standard uncertainties `noise` (readings, d), in metres.
@@ -156,7 +196,7 @@ def length_whitening(given: Lengths, noise: Array, standard: Integers, place: In
     return LengthWhitening(scatter, alone, single, tuple(joint))
 
 
-def _shares_readings(given: Lengths, standard: Integers) -> Array:
+def _shares_readings(given: Lengths, standard: Integers) -> NDArray[np.bool_]:
     """Which lengths (m,) are of standards of which some reading is an end of several lengths."""
     chosen = np.flatnonzero(given.with_repeatability & ~given.to_pivot)
     ends = np.concatenate([given.first[chosen], given.second[chosen]])
@@ -167,12 +207,10 @@ def _shares_readings(given: Lengths, standard: Integers) -> Array:
 
 def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integers) -> JointWhitening:
     """Whitening of the lengths `chosen` (m,), all of one standard."""
-    _, certificate, count = np.unique(given.certificate[chosen], return_inverse=True, return_counts=True)
-    certificate = certificate.ravel()
-    together: list[Together] = []
+    numbers, inverse = np.unique(given.certificate[chosen], return_inverse=True)
+    certificate, count = inverse.ravel(), len(numbers)
+    groups: list[tuple[Integers, Array, Array]] = []
     alike: dict[bytes, list[int]] = {}
-    ranges: list[Array] = []
-    errors: list[Array] = []
     size = 0.0
     for k in np.unique(place[chosen]):
         own = np.flatnonzero(place[chosen] == k)
@@ -180,32 +218,30 @@ def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integ
         rows = chosen[own]
         along, of_noise = _directions(given, noise, rows)
         within = _range(along)
-        triangle = np.linalg.qr((within.T @ of_noise).T, mode="r")
+        triangle = np.asarray(np.linalg.qr(of_noise.T @ within, mode="r"))
         size = max(size, float(np.abs(triangle).max()))
-        # Solved, as an inverse of a triangle of some dozens.
         root = np.linalg.solve(triangle.T, within.T).T
-        alike.setdefault(certificate[own].tobytes(), []).append(len(together))
-        together.append(Together(rows, root))
-        ranges.append(within)
-        of_errors = np.zeros((root.shape[1], len(count)))
-        np.add.at(of_errors.T, certificate[own], given.uncertainty[rows][:, None] * root)
-        errors.append(of_errors)
-    consistencies, told = [], [np.zeros((0, len(count)))]
+        alike.setdefault(certificate[own].tobytes(), []).append(len(groups))
+        groups.append((rows, within, root))
+    together: list[Together] = []
+    consistencies, told, errors = [], [np.zeros((0, count))], []
     for members in alike.values():
-        rows = np.stack([together[k].rows for k in members])
-        uncertainty = given.uncertainty[rows[0]]
-        within = ranges[members[0]]
-        surplus = len(within) - within.shape[1]
-        if not surplus or uncertainty.max() < EXACT_CERTIFICATE * size:
-            continue
-        uncertainty = np.maximum(uncertainty, EXACT_CERTIFICATE**2 * size)
-        outside = np.linalg.qr(within / uncertainty[:, None], mode="complete")[0][:, within.shape[1] :].T
-        consistencies.append(Consistency(rows, outside / uncertainty))
-        about = np.zeros((surplus, len(count)))
-        about[:, certificate[np.searchsorted(chosen, rows[0])]] = outside
-        told.append(about)
+        same = np.stack([groups[k][0] for k in members])
+        uncertainty = given.uncertainty[same[0]]
+        own = certificate[np.searchsorted(chosen, same[0])]
+        outside = _outside(groups[members[0]][1], uncertainty, size)
+        if len(outside):
+            consistencies.append(Consistency(same, outside / np.maximum(uncertainty, SMALLEST * size)))
+            told.append(np.zeros((len(outside), count)))
+            told[-1][:, own] = outside
+        for k in members:
+            rows, _, root = groups[k]
+            by_error = -root.T * uncertainty
+            errors.append(np.zeros((root.shape[1], count)))
+            errors[-1][:, own] = by_error
+            together.append(Together(rows, root, by_error - (by_error @ outside.T) @ outside))
     known, directions = _independent(np.concatenate(told))
-    by_error = np.concatenate(errors)
+    by_error = -np.concatenate(errors)
     by_known = by_error @ directions
     left, values, _ = np.linalg.svd(by_error - by_known @ directions.T, full_matrices=False)
     gain = 1.0 - 1.0 / np.sqrt(1.0 + values**2)
@@ -228,6 +264,17 @@ def _range(along: Array) -> Array:
     """Orthonormal basis (m, r) of the changes of lengths that displacements (m, k) make."""
     vectors, values, _ = np.linalg.svd(along, full_matrices=False)
     return np.asarray(vectors[:, values > FLAT * values[0]])
+
+
+def _outside(within: Array, uncertainty: Array, size: float) -> Array:
+    """Orthonormal combinations (m - r, m) of m errors, in their `uncertainty` (m,), that no reading bears upon.
+
+    `within` (m, r) is the range of what readings change. None, where all certificates are exact.
+    """
+    if uncertainty.max() < EXACT_CERTIFICATE * size:
+        return np.zeros((0, len(within)))
+    scaled = within / np.maximum(uncertainty, SMALLEST * size)[:, None]
+    return np.asarray(np.linalg.qr(scaled, mode="complete")[0][:, within.shape[1] :].T)
 
 
 def _independent(equations: Array) -> tuple[Array, Array]:

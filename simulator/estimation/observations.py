@@ -137,8 +137,9 @@ def distance_rows(design: Design, state: State) -> BallRows:
 def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
     """Rows of length standards read in the volume: residual (r,) and derivative by the model (r, n).
 
-    There are as many rows as lengths that do not follow from others. `x` (readings, d) holds the scale readings of all readings, or is None for an error-free machine; the
-    length between corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
+    There are as many rows as lengths that do not follow from others. `x` (readings, d) holds the scale readings of all
+    readings, or is None for an error-free machine; the length between corrected points, or its projection, is
+    compared with the known one (NPL section 3.2.2).
     """
     residual, found = _length_residuals(design, state, x)
     rows = np.zeros((len(design.lengths), len(state.a)))
@@ -150,8 +151,17 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
 
 def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> tuple[Array, Array]:
     """The same residuals (r,), with the derivative (r, s) by all shared parameters."""
-    given = design.lengths
     residual, found = _length_residuals(design, state, x)
+    return residual, design.length_whitening.whitened(_length_derivative(design, layout, state, found))
+
+
+def length_derivative(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
+    """Derivative (m, s) of lengths less those expected by all shared parameters, in metres."""
+    return _length_derivative(design, layout, state, _measured_lengths(design, state, x))
+
+
+def _length_derivative(design: Design, layout: SharedLayout, state: State, found: _Measured) -> Array:
+    given = design.lengths
     # What is held goes to the extra column.
     rows = np.zeros((len(given), len(layout) + 1))
     for end in found.ends:
@@ -168,7 +178,7 @@ def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Ar
     if given.free is not None:
         free = np.flatnonzero(given.free >= 0)
         rows[free, layout.lengths.start + given.free[free]] -= 1.0
-    return residual, design.length_whitening.whitened(rows[:, :-1])
+    return rows[:, :-1]
 
 
 @dataclass(frozen=True)
