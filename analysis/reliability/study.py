@@ -50,9 +50,9 @@ class Reliability:
     `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands for the mean of its
     repeats, which have `among_repeats` degrees of freedom more among themselves. `left` (k,) is that of each pattern:
     of a single observation its redundancy number, otherwise the share of its square that is left in the residuals.
-    `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is nil. `effects` are by symbol, U4 to
-    U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma being known or estimated from the
-    observations, less the one suspected.
+    `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is
+    nil. `effects` are by symbol, U4 to U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
+    being known or estimated from the observations, less the one suspected.
     """
 
     label: str
