@@ -216,11 +216,9 @@ def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integ
         own = np.flatnonzero(place[chosen] == k)
         own = own[np.argsort(certificate[own], kind="stable")]
         rows = chosen[own]
-        along, of_noise = _directions(given, noise, rows)
-        within = _range(along)
-        triangle = np.asarray(np.linalg.qr(of_noise.T @ within, mode="r"))
+        within, triangle = _range_and_noise(given, noise, rows)
         size = max(size, float(np.abs(triangle).max()))
-        root = np.linalg.solve(triangle.T, within.T).T
+        root = np.asarray(np.linalg.solve(triangle.T, within.T).T, float)
         alike.setdefault(certificate[own].tobytes(), []).append(len(groups))
         groups.append((rows, within, root))
     together: list[Together] = []
@@ -246,6 +244,29 @@ def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integ
     left, values, _ = np.linalg.svd(by_error - by_known @ directions.T, full_matrices=False)
     gain = 1.0 - 1.0 / np.sqrt(1.0 + values**2)
     return JointWhitening(tuple(together), tuple(consistencies), known, by_known, left, gain)
+
+
+def equation_root(given: Lengths, rows: Integers) -> Array:
+    """Root (m, r) that makes uncorrelated equations of those of the squares of lengths `rows` (m,) read together.
+
+    Noise is the same in all readings. An equation that shared no reading would keep the weight 1, were its length the
+    root mean square of all.
+    """
+    size = given.value[rows] / np.sqrt(2.0 * (given.value[rows] ** 2).mean())
+    readings = int(max(given.first.max(), given.second.max())) + 1
+    within, triangle = _range_and_noise(given, np.ones((readings, 1)), rows, size)
+    return np.asarray(np.linalg.solve(triangle.T, within.T).T)
+
+
+def _range_and_noise(given: Lengths, noise: Array, rows: Integers, size: Array | float = 1.0) -> tuple[Array, Array]:
+    """Basis (m, r) of what readings change of lengths `rows` (m,), each times its `size`, with a triangle (r, r).
+
+    The noise of basis' lengths has the covariance triangle' triangle.
+    """
+    along, of_noise = _directions(given, noise, rows)
+    scale = np.broadcast_to(size, (len(rows),))[:, None]
+    within, of_noise = _range(scale * along), scale * of_noise
+    return within, np.asarray(np.linalg.qr(of_noise.T @ within, mode="r"))
 
 
 def _directions(given: Lengths, noise: Array, rows: Integers) -> tuple[Array, Array]:

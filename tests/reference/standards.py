@@ -19,7 +19,11 @@ PLATE: dict[str, Any] = {
         "position_coefficients": 3,
         "rotation_coefficients": 2,
     },
-    "probes": {"down": ["0 mm", "0 mm", "-80 mm"], "right": ["60 mm", "0 mm", "0 mm"], "back": ["0 mm", "60 mm", "0 mm"]},
+    "probes": {
+        "down": ["0 mm", "0 mm", "-80 mm"],
+        "right": ["60 mm", "0 mm", "0 mm"],
+        "back": ["0 mm", "60 mm", "0 mm"],
+    },
     "evaluation": {"points": {"random": 8, "seed": 1}, "probe": "down"},
 }
 PLATE_POSITIONS: list[dict[str, Any]] = [
