@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .joint_lengths import LengthWhitening, length_whitening
 from .machines.protocol import Array, ErrorModel
 from .quantities import LengthFunction
 
@@ -216,11 +217,23 @@ class Design:
         of_plates = np.flatnonzero(self.is_plate[self.position_artefact])
         return np.sort(np.concatenate([of_plates, self.gauge_positions]))
 
+    @cached_property
+    def length_whitening(self) -> LengthWhitening:
+        """What makes uncorrelated observations of unit variance of the lengths of standards."""
+        given, readings = self.lengths, self.readings
+        noise = reading_uncertainties(self, readings) / np.sqrt(readings.repeats)[:, None]
+        standard = self.ball_artefact[readings.ball[given.first]]
+        place = readings.position[given.first] * len(self.probe_names) + readings.probe[given.first]
+        return length_whitening(given, noise, standard, place)
+
     @property
     def observations(self) -> int:
-        """Number of scalar observations: co-ordinates of all readings of plates, and calibration items."""
+        """Number of scalar observations: co-ordinates of all readings of plates, and calibration items.
+
+        Of lengths that are read together only those count that do not follow from the others.
+        """
         count = int(self.readings.repeats[self.plate_readings].sum())
-        calibration = len(self.distances) + len(self.coordinates) + len(self.lengths)
+        calibration = len(self.distances) + len(self.coordinates) + len(self.length_whitening)
         return self.dimension * count + calibration + len(self.priors)
 
     @property

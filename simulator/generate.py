@@ -6,8 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from .design import Design, Priors, Readings, State, locations, nominal_state, probe_offsets, reading_uncertainties
+from .design import (
+    Design,
+    Integers,
+    Priors,
+    Readings,
+    State,
+    locations,
+    nominal_state,
+    probe_offsets,
+    reading_uncertainties,
+)
 from .estimation.observations import distance_rows, prior_values
+from .joint_lengths import FLAT
 from .machines.protocol import Array, ErrorModel
 from .machines.truth import TrueMachine
 
@@ -58,9 +69,9 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its uncertainty.
 
     Of all artefacts that differ so from their certificate, the nearest to the drawing; where there are more certified
-    items than can vary independently, as nearly as a real artefact can. For a length standard, each length moves the
-    second of its balls along the line between the two; for a Bryan gauge it moves the places of its ball. Lengths
-    without certificates are as drawn.
+    items than can vary independently, as nearly as a real artefact can. The length of a bar moves the second of its
+    balls along the line between the two, that of a Bryan gauge the places of its ball; lengths that share balls move
+    these together. Lengths without certificates are as drawn.
     """
     balls = design.balls.copy()
     tied = distance_rows(design, nominal_state(design))
@@ -101,12 +112,36 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     given = given.select(~given.to_pivot)
     ends = np.stack([design.readings.ball[given.first], design.readings.ball[given.second]])
     pairs, first = np.unique(ends, axis=1, return_index=True)
+    ball, times = np.unique(pairs, return_counts=True)
+    # Of artefacts whose lengths share balls.
+    shared = np.isin(design.ball_artefact[pairs[0]], design.ball_artefact[ball[times > 1]])
+    if shared.any():
+        of_shared = given.select(first[shared])
+        wanted = of_shared.value + of_shared.uncertainty * generator.standard_normal(len(of_shared))
+        balls += _moved_by_lengths(balls, pairs[:, shared], wanted, of_shared.uncertainty)
+        pairs, first = pairs[:, ~shared], first[~shared]
     for (one, other), k in zip(pairs.T.tolist(), first.tolist(), strict=True):
         between = balls[other] - balls[one]
         length = float(np.sqrt(between @ between))
         true = given.value[k] + given.uncertainty[k] * generator.standard_normal()
         balls[other] += between * (true / length - 1.0)
     return balls
+
+
+def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty: Array) -> Array:
+    """The least displacements (n, d) of balls that bring the lengths of `pairs` (2, m) nearest to those wanted (m,)."""
+    ends, place = np.unique(pairs, return_inverse=True)
+    place = place.reshape(pairs.shape)
+    moved = np.zeros_like(balls)
+    for _ in range(2):
+        between = balls[pairs[0]] + moved[pairs[0]] - balls[pairs[1]] - moved[pairs[1]]
+        length = np.sqrt((between**2).sum(axis=1))
+        rows = np.zeros((len(wanted), len(ends), balls.shape[1]))
+        rows[np.arange(len(wanted)), place[0]] = between / (length * uncertainty)[:, None]
+        rows[np.arange(len(wanted)), place[1]] = -rows[np.arange(len(wanted)), place[0]]
+        step = np.linalg.lstsq(rows.reshape(len(wanted), -1), (wanted - length) / uncertainty, rcond=FLAT)[0]
+        moved[ends] += step.reshape(len(ends), -1)
+    return moved
 
 
 def true_lengths(design: Design, truth: State) -> Array:

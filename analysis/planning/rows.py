@@ -15,8 +15,7 @@ from simulator.design import Design, Integers, State, nominal_state
 from simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
-    length_deviations,
-    length_shared_rows,
+    length_derivative,
     prior_rows,
     reading_blocks,
 )
@@ -52,16 +51,13 @@ class Rows:
 class Drawn:
     """All positions that may be chosen, laid out as one design, and the columns of shared parameters.
 
-    Shared columns are those of the layout less poses, then the error of each certificate that lengths have in common,
-    in its standard uncertainty. `certificate` (lengths,) counts these, `share` (lengths,) is what a unit of it
-    changes a length by, in the scatter of that length.
+    Shared columns are those of the layout less poses, then the error of each certificate of a length, in its standard
+    uncertainty.
     """
 
     design: Design
     layout: SharedLayout
     state: State
-    certificate: Integers
-    share: Array
 
     @property
     def own(self) -> slice:
@@ -70,7 +66,7 @@ class Drawn:
 
     @property
     def certificates(self) -> int:
-        return int(self.certificate.max(initial=-1)) + 1
+        return int(self.design.lengths.certificate.max(initial=-1)) + 1
 
     @property
     def shared(self) -> int:
@@ -96,20 +92,7 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> Drawn:
     if messages:
         raise ExperimentError(messages)
     design = lay_out(replace(experiment, positions=tuple(positions)))
-    state, lengths = nominal_state(design), design.lengths
-    # The scatter alone weighs a length, and the certificate's error gets a column. Where nothing scatters, the
-    # certificate's uncertainty is each length's own.
-    common = np.where(lengths.with_repeatability, lengths.uncertainty, 0.0)
-    design = replace(
-        design,
-        lengths=replace(
-            lengths,
-            uncertainty=np.where(lengths.with_repeatability, 0.0, lengths.uncertainty),
-            certificate=np.arange(len(lengths)),
-        ),
-    )
-    share = common / length_deviations(design, state, None)[1] if len(lengths) else common
-    return Drawn(design, shared_layout(design), state, lengths.certificate, share)
+    return Drawn(design, shared_layout(design), nominal_state(design))
 
 
 def position_rows(drawn: Drawn) -> Iterator[Rows]:
@@ -156,13 +139,12 @@ def _length_rows(drawn: Drawn) -> dict[int, Rows]:
     design, layout = drawn.design, drawn.layout
     if not len(design.lengths):
         return {}
-    _, derivative = length_shared_rows(design, layout, drawn.state, None)
-    own = derivative[:, drawn.own]
-    shared = np.zeros((len(derivative), drawn.shared))
-    shared[:, : own.shape[1]] = own
-    shared[np.arange(len(shared)), own.shape[1] + drawn.certificate] = -drawn.share
-    shared *= drawn.scale
-    place = design.readings.position[design.lengths.first]
+    by_position = design.length_whitening.by_position(
+        design.lengths, length_derivative(design, layout, drawn.state, None)
+    )
+    derivative = by_position.rows
+    shared = np.concatenate([derivative[:, drawn.own], by_position.by_error], axis=1) * drawn.scale
+    place = design.readings.position[design.lengths.first[by_position.length]]
     found = {}
     for k in np.unique(place).tolist():
         chosen, columns = np.flatnonzero(place == k), layout.pose_columns[k]

@@ -15,7 +15,7 @@ def name(given: Patterns, k: int) -> str:
     kind, subject = given.kind[k], int(given.subject[k])
     design, axis = given.design, int(given.axis[k])
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
-    if kind == "reading":
+    if kind in ("reading", "end"):
         return f"{reading_name(design, subject)}, {letter}"
     if kind == "length":
         return f"{length_name(design, subject)} in position {design.position_names[_position(design, subject)]}"

@@ -17,23 +17,28 @@ from simulator.design import Design, Integers, State, locations, probe_offsets
 from simulator.estimation.hat import RowPlaces, row_places
 from simulator.estimation.observations import (
     expected_readings,
-    length_geometry,
+    length_directions,
     length_values,
     offset_sensitivity,
     reading_weights,
     rotation_sensitivity,
 )
-from simulator.estimation.whitening import Whitening
 from simulator.machines.protocol import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
+    from simulator.whitening import Whitening
+
 Kind = Literal[
-    "reading", "length", "prior", "coordinate", "distance", "ball", "shift", "turn", "probe", "length value", "scale",
-    "expansion",
+    "reading", "length", "prior", "coordinate", "distance", "end", "ball", "shift", "turn", "probe", "length value",
+    "scale", "expansion",
 ]  # fmt: skip
 SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
+
+# Axes along which a reading changes lengths by less than this share of the most are left out, and so are those that
+# change all of them in a proportion equal to within the square of this.
+SLIGHT = 1e-3
 UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
 
 
@@ -42,7 +47,8 @@ class Block:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
     `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe or artefact;
-    of a certified length, the first that has it, and of a ball, its first reading in that position. `axis` (count,)
+    of a certified length, the first that has it, and of a ball, its first reading in that position. An `end` is a
+    reading of a standard whose lengths are read together, with which several of them are wrong. `axis` (count,)
     is along or about which, -1 without one; `start` (count,) the first reading after a slip, -1 without one.
     """
 
@@ -76,7 +82,7 @@ class Patterns:
     @cached_property
     def is_local(self) -> np.ndarray:
         """Which patterns (k,) are of rows that come together: of one ball at the most, or one kind."""
-        return np.isin(self.kind, [*SINGLE, "ball", "length value"])
+        return np.isin(self.kind, [*SINGLE, "end", "ball", "length value"])
 
     def of_kind(self, *kinds: Kind) -> Integers:
         """Indices of the patterns of some kinds."""
@@ -132,7 +138,7 @@ class _Place:
         self.readings = design.readings.select(self.chosen)
         self.weight = reading_weights(design, self.readings)
         self.x = expected_readings(design, state, design.readings) if x is None else x
-        self.unit, self.white = length_geometry(design, state, x)
+        self.unit, self.white = length_directions(design, state, x), design.length_whitening
         turned = locations(design, state, self.readings) - state.origins[self.readings.position]
         self.arm = turned
         self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
@@ -173,11 +179,33 @@ def _single_readings(at: _Place) -> Iterator[Block]:
 
 
 def _single_lengths(at: _Place) -> Iterator[Block]:
-    count = len(at.design.lengths)
-    row, column = _pairs_within(at.white, at.design.lengths.certificate)
-    own, along = at.white.own[column], at.white.direction
+    """Lengths that share no reading with others."""
+    alone, white = at.white.alone, at.white.single
+    row, column = _pairs_within(white, white.group)
+    own, along = white.own[column], white.direction
     value = ((row == column) - along[row] * along[column]) / own
-    yield _block("length", (at.places.lengths.start + row, column, value), np.arange(count))
+    yield _block("length", (at.places.lengths.start + row, column, value), alone)
+
+
+def _ends(at: _Place) -> Iterator[Block]:
+    """Readings of standards whose lengths are read together, each along the axes that change lengths differently."""
+    given = at.design.lengths
+    joint = np.setdiff1d(np.arange(len(given)), at.white.alone)
+    for reading in np.unique([given.first[joint], given.second[joint]]):
+        sign = (given.first == reading).astype(float) - (given.second == reading)
+        axes = _different(sign[:, None] * given.direction)
+        yield _block("end", at.of_lengths(sign[:, None] * at.unit[:, axes]), [reading] * len(axes), axes)
+
+
+def _different(columns: Array) -> list[int]:
+    """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of the first."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    chosen: list[int] = []
+    for k in np.argsort(-(size / size.max()).round(6), kind="stable").tolist():
+        cosine = np.abs(columns[:, chosen].T @ columns[:, k]) / (size[chosen] * max(size[k], np.finfo(float).tiny))
+        if size[k] > SLIGHT * size.max() and not (cosine > 1.0 - SLIGHT**2).any():
+            chosen.append(k)
+    return sorted(chosen)
 
 
 def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers]:
@@ -265,11 +293,12 @@ def _probes(at: _Place) -> Iterator[Block]:
 
 
 def _length_values(at: _Place) -> Iterator[Block]:
-    """Certified lengths that are stated too long and are read several times."""
+    """Certified lengths that are stated too long and are read several times, or together with others."""
     given = at.design.lengths
     known = np.ones(len(given), bool) if given.free is None else given.free < 0
-    numbers, count = np.unique(given.certificate[known], return_counts=True)
-    for number in numbers[count > 1]:
+    numbers, first, count = np.unique(given.certificate[known], return_index=True, return_counts=True)
+    is_alone = np.isin(np.flatnonzero(known)[first], at.white.alone)
+    for number in numbers[(count > 1) | ~is_alone]:
         entries = at.of_lengths(-1.0 * (given.certificate == number)[:, None])
         yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
 
@@ -313,6 +342,7 @@ BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (
     _single_readings,
     _single_lengths,
     _single_items,
+    _ends,
     _dirty_balls,
     _slips,
     _probes,

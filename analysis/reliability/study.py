@@ -48,10 +48,11 @@ class Reliability:
     """What a design notices of biases, for each of its patterns.
 
     `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands for the mean of its
-    repeats, which have `among_repeats` degrees of freedom more among themselves. `information` (k,) is what is left of
-    a pattern in the residuals, per unit of the bias squared, and 0 where that is nil. `effects` are by symbol, U4 to
-    U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma being known or estimated from the
-    observations, less the one suspected.
+    repeats, which have `among_repeats` degrees of freedom more among themselves. `left` (k,) is that of each pattern:
+    of a single observation its redundancy number, otherwise the share of its square that is left in the residuals.
+    `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is
+    nil. `effects` are by symbol, U4 to U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
+    being known or estimated from the observations, less the one suspected.
     """
 
     label: str
@@ -59,6 +60,7 @@ class Reliability:
     design: Design
     patterns: Patterns
     redundancy: Array
+    left: Array
     among_repeats: int
     information: Array
     effects: dict[str, Effects]
@@ -116,15 +118,26 @@ def reliability_of(
         "U6": point_distances(design, layout, state, spread),
     }
     balls_of = ball_distances(design, state, spread)
-    redundancy, information = np.zeros(len(row_places(design))), np.zeros(len(given))
+    places = row_places(design)
+    redundancy, left, information = np.zeros(len(places)), np.zeros(len(given)), np.zeros(len(given))
     effects = {symbol: _nothing(len(given)) for symbol in SYMBOLS}
     for one in responses(design, layout, state, None, spread, given):
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information
+        left[one.index] = one.information / np.where(one.square > 0.0, one.square, 1.0)
         asked = np.unique(one.own.indices // design.dimension) if len(one.rows) else np.zeros(0, np.int64)
         for symbol in SYMBOLS:
             of_symbol = balls_of(asked) if symbol == "U5" else functions[symbol]
             _put(effects[symbol], one.index, of_symbol, of_symbol.largest(one))
+    for kind, rows in (
+        ("reading", places.readings),
+        ("length", places.lengths),
+        ("prior", places.priors),
+        ("coordinate", places.coordinates),
+        ("distance", places.distances),
+    ):
+        own = np.flatnonzero(given.kind == kind)
+        left[own] = redundancy[rows][: len(own)]
     repeats = design.readings.repeats[design.plate_readings]
     freedom = design.observations - design.parameter_count + found_rank.deficiency
     return Reliability(
@@ -133,6 +146,7 @@ def reliability_of(
         design,
         given,
         redundancy,
+        left,
         design.dimension * int((repeats - 1).sum()),
         information,
         effects,

@@ -30,7 +30,7 @@ EVENTS: tuple[tuple[Kind, ...], ...] = (
     ("scale",),
     ("expansion",),
 )
-ITEMS: tuple[Kind, ...] = ("length", "prior", "coordinate", "distance")
+ITEMS: tuple[Kind, ...] = ("length", "end", "prior", "coordinate", "distance")
 
 
 def reliability_lines(result: Reliability, with_all: bool = False) -> list[str]:
@@ -88,8 +88,8 @@ def _positions(result: Reliability) -> list[str]:
             [
                 design.position_names[k],
                 str(len(own) // design.dimension),
-                number(result.redundancy[own].min(), 3),
-                number(result.redundancy[own].mean(), 3),
+                number(result.left[own].min(), 3),
+                number(result.left[own].mean(), 3),
                 _shown(result.detectable[by_bias], "m"),
                 _short(result, int(by_bias)),
                 u if known else "-",
@@ -115,7 +115,7 @@ def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundan
         unit = result.patterns.unit(k)
         cells = [name(result.patterns, k)]
         if with_redundancy:
-            cells.append(number(result.redundancy[k], 3))
+            cells.append(number(result.left[k], 3))
         cells += [_shown(result.detectable[k], unit), SHOWN[unit]]
         for symbol in SYMBOLS:
             effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
@@ -229,7 +229,7 @@ def _where(result: Reliability, symbol: str, k: int) -> str:
 
 def reliability_data(result: Reliability) -> dict[str, Any]:
     """Reliability as plain data in metres, radians and ratios; None where nothing can be detected or determined."""
-    singles = len(result.redundancy)
+    is_single = np.isin(result.patterns.kind, [*SINGLE, "end"])
     return {
         "experiment": result.label,
         "title": result.title,
@@ -244,9 +244,10 @@ def reliability_data(result: Reliability) -> dict[str, Any]:
         "redundancy": float(result.redundancy.sum()) + result.among_repeats,
         "redundancy_among_repeats": result.among_repeats,
         "observations_by_name": [
-            {**_pattern_data(result, k), "redundancy": float(result.redundancy[k])} for k in range(singles)
+            {**_pattern_data(result, k), "redundancy": float(result.left[k])}
+            for k in np.flatnonzero(is_single).tolist()
         ],
-        "events": [_pattern_data(result, k) for k in range(singles, len(result.patterns))],
+        "events": [_pattern_data(result, k) for k in np.flatnonzero(~is_single).tolist()],
     }
 
 
@@ -281,15 +282,15 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
     )
     design, given = result.design, result.patterns
     effects = {symbol: _effect(result, symbol) for symbol in SYMBOLS}
-    for k in np.flatnonzero(np.isin(given.kind, SINGLE)).tolist():
+    for k in np.flatnonzero(np.isin(given.kind, [*SINGLE, "end"])).tolist():
         names = ["", "", "", ""]
-        if given.kind[k] == "reading":
+        if given.kind[k] in ("reading", "end"):
             i = int(given.subject[k])
             readings = design.readings
             position, probe = design.position_names[readings.position[i]], design.probe_names[readings.probe[i]]
             names = [position, design.ball_label(int(readings.ball[i])), probe, AXIS_NAMES[given.axis[k]]]
         unit = given.unit(k)
-        cells: list[Any] = [given.kind[k], *names, name(given, k), repr(float(result.redundancy[k])), SHOWN[unit]]
+        cells: list[Any] = [given.kind[k], *names, name(given, k), repr(float(result.left[k])), SHOWN[unit]]
         cells.append(_cell(result.detectable[k]))
         for symbol in SYMBOLS:
             cells += [

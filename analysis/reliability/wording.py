@@ -56,7 +56,7 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     touched = _touched(one)
     lines = _lines(touched, marks)
     leave = f"check or leave out {lines}" if lines else "check or leave out the readings"
-    if kind == "reading":
+    if kind in ("reading", "end"):
         return f"{reading_name(design, subject)} read {size} too {high} in {letter}", leave
     if kind == "length":
         return f"{name(given, k)} read {size} too {long}", leave
@@ -98,7 +98,7 @@ def _touched(one: Suspect) -> list[int]:
     given, k = one.patterns, one.pattern
     design, kind, subject = given.design, given.kind[k], int(given.subject[k])
     readings = design.readings
-    if kind == "reading":
+    if kind in ("reading", "end"):
         return [subject]
     if kind == "length":
         ends = (int(design.lengths.first[subject]), int(design.lengths.second[subject]))

@@ -24,7 +24,10 @@ from .parameters import SharedLayout
 
 @dataclass(frozen=True)
 class RowPlaces:
-    """Where the whitened rows of each kind stand: d for each reading of a plate, one for each other observation."""
+    """Where the whitened rows of each kind stand: d for each reading of a plate, one for each other observation.
+
+    Of lengths read together there are as many rows as lengths that do not follow from others.
+    """
 
     readings: slice
     lengths: slice
@@ -50,7 +53,7 @@ def row_places(design: Design) -> RowPlaces:
     """Lay out the rows of all observations of a design."""
     counts = [
         design.dimension * len(design.plate_readings),
-        len(design.lengths),
+        len(design.length_whitening),
         len(design.priors),
         len(design.coordinates),
         len(design.distances),

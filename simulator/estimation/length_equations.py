@@ -4,8 +4,9 @@ With D the difference of two readings a known length d apart, and G = 1 + E the 
 
     d^2 = D' G D = (1 + e1) Dx^2 + 2 e2 Dx Dy + 2 e3 Dx Dz + (1 + e4) Dy^2 + 2 e5 Dy Dz + (1 + e6) Dz^2,
 
-equations (100) and (110), are solved for e1 to e6 by least squares, all with the same weight. Of a Bryan gauge one
-end is the pivot c, which is not read, and d its radius r. Two ways to the centre:
+equations (100) and (110), are solved for e1 to e6 by least squares, all with the same weight. Those of lengths that
+share readings are first reduced to as many as do not follow from others, uncorrelated where all readings have the same
+noise. Of a Bryan gauge one end is the pivot c, which is not read, and d its radius r. Two ways to the centre:
 
 sphere-then-metric
     the patent's: first c, and r where it is not known, from the equations of a sphere (108), |x - c|^2 = r^2, as if
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..design import Design
+from ..joint_lengths import equation_root
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
 from ..threads import single_threaded
@@ -91,7 +93,7 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
     pivoted = equations.pivot >= 0
     if estimator == "sphere-then-metric" and pivoted.any():
         of_spheres = np.unique(equations.free[pivoted])
-        at, _, _, _ = _solved(equations.select(pivoted), at, everything[6:])
+        at, _, _, _ = _solved(equations.gauges(), at, everything[6:])
         # Lengths of bars belong to the second step.
         bars = np.setdiff1d(np.arange(len(design.length_names)), of_spheres)
         second = np.concatenate([everything[:6], 6 + 3 * len(at.pivots) + bars])
@@ -145,7 +147,7 @@ class _Equations:
     """Rows: the difference of both ends or, of a gauge, the place read (m, 3); pivot, or -1, and length of each.
 
     `direction` (m, 3) is the design's. `known` (m,) are lengths in metres, `free` (m,) numbers of unknown ones,
-    -1 where the length is known.
+    -1 where the length is known. Of each group in `together`, rows and a root (m, r), r rows are made.
     """
 
     place: Array
@@ -153,10 +155,22 @@ class _Equations:
     pivot: np.ndarray
     known: Array
     free: np.ndarray
+    together: tuple[tuple[np.ndarray, Array], ...] = ()
 
-    def select(self, chosen: np.ndarray) -> _Equations:
+    def gauges(self) -> _Equations:
+        """The equations of Bryan gauges, whose lengths share no readings."""
+        chosen = self.pivot >= 0
         return _Equations(
             self.place[chosen], self.direction[chosen], self.pivot[chosen], self.known[chosen], self.free[chosen]
+        )
+
+    def reduced(self, rows: Array) -> Array:
+        """Of rows (m, ...) of all equations those that are uncorrelated."""
+        if not self.together:
+            return rows
+        joint = np.concatenate([chosen for chosen, _ in self.together])
+        return np.concatenate(
+            [np.delete(rows, joint, axis=0), *(root.T @ rows[chosen] for chosen, root in self.together)]
         )
 
     @property
@@ -181,7 +195,10 @@ def _equations(design: Design, x: Array) -> _Equations:
     number = np.full(len(design.position_names), -1)
     number[design.gauge_positions] = np.arange(len(design.gauge_positions))
     free = np.full(len(given), -1) if given.free is None else given.free
-    return _Equations(place, given.direction, np.where(given.to_pivot, number[position], -1), given.value, free)
+    pivot = np.where(given.to_pivot, number[position], -1)
+    groups = [one.rows for joint in design.length_whitening.joint for one in joint.together]
+    together = tuple((rows, equation_root(given, rows)) for rows in groups)
+    return _Equations(place, given.direction, pivot, given.value, free, together)
 
 
 def _start(design: Design, x: Array) -> _Unknowns:
@@ -216,10 +233,12 @@ def _differences(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
 
 
 def _rows(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
-    """D' G D - d^2 (m,) and its derivative by all unknowns (m, n)."""
+    """D' G D - d^2 (r,) and its derivative by all unknowns (r, n), reduced to uncorrelated equations."""
     difference, length = _differences(equations, at)
     pulled = difference @ _tensor(at.values[:6])
-    return (pulled * difference).sum(axis=1) - length**2, _derivative(equations, at, difference, pulled, length)
+    residual = (pulled * difference).sum(axis=1) - length**2
+    derivative = _derivative(equations, at, difference, pulled, length)
+    return equations.reduced(residual), equations.reduced(derivative)
 
 
 def _derivative(equations: _Equations, at: _Unknowns, difference: Array, pulled: Array, length: Array) -> Array:
@@ -241,7 +260,7 @@ def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
     """
     _, length = _differences(equations, at)
     exact = equations.direction * length[:, None]
-    rows = _derivative(equations, at, exact, exact, length) * MICROMETRE
+    rows = equations.reduced(_derivative(equations, at, exact, exact, length)) * MICROMETRE
     _, values, vh = np.linalg.svd(np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows)
     return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
 

@@ -25,7 +25,6 @@ from ..design import (
 from ..geometry.motions import vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel
 from .parameters import SharedLayout
-from .whitening import Whitening, whitening
 
 # Metres: of the size of probe offsets.
 OFFSET_STEP = 0.1
@@ -136,23 +135,33 @@ def distance_rows(design: Design, state: State) -> BallRows:
 
 
 def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
-    """Rows of a length standard read in the volume: residual (m,) and derivative by the model (m, n).
+    """Rows of length standards read in the volume: residual (r,) and derivative by the model (r, n).
 
-    `x` (readings, d) holds the scale readings of all readings, or is None for an error-free machine; the
-    length between corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
+    There are as many rows as lengths that do not follow from others. `x` (readings, d) holds the scale readings of all
+    readings, or is None for an error-free machine; the length between corrected points, or its projection, is
+    compared with the known one (NPL section 3.2.2).
     """
-    residual, found, white = _length_residuals(design, state, x)
-    rows = np.zeros((len(residual), len(state.a)))
+    residual, found = _length_residuals(design, state, x)
+    rows = np.zeros((len(design.lengths), len(state.a)))
     for end in found.ends:
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
         rows[end.rows] += end.sign * np.einsum("md,mdn->mn", found.unit[end.rows], by_model)
-    return residual, white.whitened(rows)
+    return residual, design.length_whitening.whitened(rows)
 
 
 def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> tuple[Array, Array]:
-    """The same residuals (m,), with the derivative (m, s) by all shared parameters."""
+    """The same residuals (r,), with the derivative (r, s) by all shared parameters."""
+    residual, found = _length_residuals(design, state, x)
+    return residual, design.length_whitening.whitened(_length_derivative(design, layout, state, found))
+
+
+def length_derivative(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
+    """Derivative (m, s) of lengths less those expected by all shared parameters, in metres."""
+    return _length_derivative(design, layout, state, _measured_lengths(design, state, x))
+
+
+def _length_derivative(design: Design, layout: SharedLayout, state: State, found: _Measured) -> Array:
     given = design.lengths
-    residual, found, white = _length_residuals(design, state, x)
     # What is held goes to the extra column.
     rows = np.zeros((len(given), len(layout) + 1))
     for end in found.ends:
@@ -169,7 +178,7 @@ def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Ar
     if given.free is not None:
         free = np.flatnonzero(given.free >= 0)
         rows[free, layout.lengths.start + given.free[free]] -= 1.0
-    return residual, white.whitened(rows[:, :-1])
+    return rows[:, :-1]
 
 
 @dataclass(frozen=True)
@@ -185,17 +194,16 @@ class _End:
 
 @dataclass(frozen=True)
 class _Measured:
-    """Lengths between corrected points (m,), their directions (m, d), the ends that are read, and the scatter (m,)."""
+    """Lengths between corrected points (m,), their directions (m, d), and the ends that are read."""
 
     length: Array
     unit: Array
     ends: tuple[_End, _End]
-    scatter: Array
 
 
 def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measured:
     given = design.lengths
-    difference, noise = np.zeros((2, len(given), design.dimension))
+    difference = np.zeros((len(given), design.dimension))
     pivoted = np.flatnonzero(given.to_pivot)
     pivot = state.origins[design.readings.position[given.first[pivoted]]]
     ends = []
@@ -214,22 +222,18 @@ def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measure
                 reach = length_values(design, state)[pivoted, None] * given.direction[pivoted]
                 points[pivoted] = pivot + reach - p[pivoted]
         difference[rows] += sign * (points + (p if x is None else design.model.error(points, state.a, p)))
-        noise[rows] += reading_weights(design, readings) ** -2
         ends.append(_End(sign, rows, points, p, readings.probe))
     difference[pivoted] -= pivot
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected[:, None], given.direction, unit)
     length = np.einsum("md,md->m", unit, difference)
-    # Along the nominal direction, so that weights stay what they are while parameters change.
-    scatter = np.einsum("md,md->m", given.direction**2, noise) * given.with_repeatability
-    return _Measured(length, unit, (ends[0], ends[1]), np.sqrt(scatter))
+    return _Measured(length, unit, (ends[0], ends[1]))
 
 
-def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Array, _Measured, Whitening]:
-    """Whitened residuals (m,) of lengths, what they are formed of, and the whitening."""
+def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Array, _Measured]:
+    """Whitened residuals (r,) of lengths, and what these are formed of."""
     found = _measured_lengths(design, state, x)
-    white = whitening(found.scatter, design.lengths.uncertainty, design.lengths.certificate)
-    return white.whitened(found.length - length_values(design, state)), found, white
+    return design.length_whitening.whitened(found.length - length_values(design, state)), found
 
 
 def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
@@ -240,16 +244,15 @@ def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Ar
     if not len(design.lengths):
         return np.zeros(0), np.ones(0)
     found = _measured_lengths(design, state, x)
-    return found.length - length_values(design, state), np.hypot(found.scatter, design.lengths.uncertainty)
+    scatter = design.length_whitening.scatter
+    return found.length - length_values(design, state), np.hypot(scatter, design.lengths.uncertainty)
 
 
-def length_geometry(design: Design, state: State, x: Array | None) -> tuple[Array, Whitening]:
-    """Directions (m, d) from the second end of lengths to the first, and what whitens their residuals."""
+def length_directions(design: Design, state: State, x: Array | None) -> Array:
+    """Directions (m, d) from the second end of lengths to the first."""
     if not len(design.lengths):
-        empty = np.zeros(0)
-        return np.zeros((0, design.dimension)), whitening(empty, empty, np.zeros(0, np.int64))
-    _, found, white = _length_residuals(design, state, x)
-    return found.unit, white
+        return np.zeros((0, design.dimension))
+    return _measured_lengths(design, state, x).unit
 
 
 def length_values(design: Design, state: State) -> Array:

@@ -20,7 +20,6 @@ from ..estimation.covariance import _solve_balls
 from ..estimation.elimination import Factor
 from ..estimation.observations import length_values
 from ..estimation.parameters import SharedLayout
-from ..estimation.whitening import whitening
 from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
 from .expansion import Single
@@ -327,10 +326,7 @@ def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squ
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(given.projected, given.direction.T, unit)
     length = (unit * difference).sum(axis=1)
-    noise = shared.end_noise[0] ** 2
-    noise[:, read] += shared.end_noise[1] ** 2
-    scatter = ((given.direction.T**2) * noise).sum(axis=0) * given.with_repeatability
-    white = whitening(np.sqrt(scatter), given.uncertainty, given.certificate)
+    white = design.length_whitening
     expected = length_values(design, shared.start) + drawn.lengths
     is_free = given.free is not None and len(design.length_names) > 0
     if given.free is not None and is_free:

@@ -27,6 +27,9 @@ Values = NDArray[Any]
 STEP = 1e-30
 OPEN = 1e-7
 
+# Eigenvalues of a covariance below this fraction of the largest are rounding.
+FOLLOWS = 1e-12
+
 
 @dataclass(frozen=True)
 class Function:
@@ -213,25 +216,49 @@ def residuals(problem: Problem, step: Values) -> Values:
     for i in range(len(given.ball)):
         rows.append((balls[given.ball[i], given.axis[i]] - given.value[i]) / given.uncertainty[i])
     given = design.lengths
+    if len(given.first):
+        rows.extend(length_root(design) @ length_errors(problem, points))
+    return np.array(rows)
+
+
+def length_errors(problem: Problem, points: Values) -> Values:
+    """Lengths of standards between corrected points, less those certified."""
+    given = problem.design.lengths
     errors: list[Any] = []
-    covariance = np.zeros((len(given.first), len(given.first)))
     for i in range(len(given.first)):
-        first, second = given.first[i], given.second[i]
-        between = points[first] - points[second]
-        along = given.direction[i]
-        variance = 0.0
-        if given.with_repeatability[i]:
-            for end in (first, second):
-                variance += ((along * design.repeatability) ** 2).sum() / readings.repeats[end]
-        measured = along @ between if given.projected[i] else length(between)
+        between = points[given.first[i]] - points[given.second[i]]
+        measured = given.direction[i] @ between if given.projected[i] else length(between)
         errors.append(measured - given.value[i])
-        covariance[i, i] += variance
-        for j in range(len(given.first)):
+    return np.array(errors)
+
+
+def length_covariance(design: Any) -> Real:
+    """Covariance of the lengths of standards: a reading's noise is in each of its lengths, a certificate's error, too.
+
+    A length whose repeatability is ignored has nothing in common with any other.
+    """
+    given = design.lengths
+    m, d = len(given.first), len(design.repeatability)
+    noise = np.zeros((m, d * len(design.readings)))
+    for i in range(m):
+        if not given.with_repeatability[i]:
+            continue
+        for sign, end in ((1.0, given.first[i]), (-1.0, given.second[i])):
+            u = design.repeatability / np.sqrt(design.readings.repeats[end])
+            noise[i, d * end : d * end + d] += sign * given.direction[i] * u
+    covariance = noise @ noise.T
+    for i in range(m):
+        for j in range(m):
             if given.certificate[i] == given.certificate[j]:
                 covariance[i, j] += given.uncertainty[i] * given.uncertainty[j]
-    if errors:
-        rows.extend(np.linalg.solve(np.linalg.cholesky(covariance), np.array(errors)))
-    return np.array(rows)
+    return np.asarray(covariance)
+
+
+def length_root(design: Any) -> Real:
+    """A root (r, m) of the pseudo-inverse of that covariance: what follows from other lengths tells nothing more."""
+    values, vectors = np.linalg.eigh(length_covariance(design))
+    kept = values > FOLLOWS * values[-1]
+    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
 
 
 def jacobian(function: Callable[[Values], Values], parameters: int) -> Real:

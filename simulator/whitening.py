@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..design import Integers
-from ..machines.protocol import Array
+from .machines.protocol import Array
+
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,9 @@ class Whitening:
     own: Array
     direction: Array
     group: Integers
+
+    def __len__(self) -> int:
+        return len(self.own)
 
     def whitened(self, rows: Array) -> Array:
         """`rows` (m, ...) in units of their standard uncertainty, uncorrelated."""
