@@ -134,6 +134,7 @@ def campaign(
     being done.
 
     :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
+    :raises InternalError: the choice is better than the bound of any choice.
     """
     pool, read = experiment.pool, dict(done or {})
     if pool is None:
@@ -154,6 +155,9 @@ def campaign(
 
     report("searching")
     best, relaxed = _search(problem, drawn, request.seed, workers)
+    if relaxed is not None:
+        relaxed.check(request.criterion, best.value)
+    _refuse_lacking(experiment, problem, best)
     chosen = [candidates[k] for k in best.chosen]
     _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
@@ -212,6 +216,16 @@ def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget
             balls = listing(f'"{ball}"' for ball in unread)
             text = f"the best choice leaves {balls} of {name} unread, which no experiment may; keep a position of all"
             raise _impossible(experiment, "pool.limits.keep", text)
+
+
+def _refuse_lacking(experiment: Experiment, problem: Problem, best: Found) -> None:
+    """Refuse a choice without a position of an artefact whose own distances are asked for."""
+    missing = [name for name, placing in problem.criterion.needed if set(placing).isdisjoint(best.chosen)]
+    if missing:
+        names, name = listing(f'"{one}"' for one in missing), problem.criterion.name
+        text = f"{name} takes in the distances of {names}, of which no position can be read with "
+        text += f"{problem.constraints.budget}; allow more, keep one, or take the artefact out of the pool"
+        raise _impossible(experiment, "pool", text)
 
 
 def _as_drawn(experiment: Experiment, free: Constraints, drawn: Sequence[int], reference: Sequence[int]) -> Budget:
@@ -329,6 +343,8 @@ def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
     selections = [improve(problem, start, losses, 1) for start in starts(problem, generous, 0, 1)]
     found = min(selections, key=lambda one: (one.value, one.chosen))
     relaxed = bound(problem) if np.isfinite(found.value) else None
+    if relaxed is not None:
+        relaxed.check(f"{problem.criterion.name} for {problem.constraints.budget}", found.value)
     return found, np.nan if relaxed is None else relaxed.value
 
 

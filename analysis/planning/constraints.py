@@ -62,7 +62,8 @@ class Constraints:
 
     `seconds`, `readings` and `positions` (n,) are each candidate's own, `kinds` what changes between positions depend
     on, None of calibration items, `must` what has to be chosen. Candidates that are `done` have taken their time
-    already: they cost nothing any more, and the budget is for the rest.
+    already: they cost nothing any more, and the budget is for the rest. Of each of `at_least` one member has to be
+    chosen.
     """
 
     budget: Budget
@@ -74,6 +75,7 @@ class Constraints:
     must: frozenset[int]
     at_most: tuple[AtMost, ...]
     done: frozenset[int] = frozenset()
+    at_least: tuple[tuple[int, ...], ...] = ()
 
     @property
     def count(self) -> int:
@@ -89,7 +91,7 @@ class Constraints:
         return [kind for k in own if (kind := self.kinds[k]) is not None]
 
     def allows(self, chosen: Collection[int]) -> bool:
-        """Whether a selection keeps to all limits."""
+        """Whether a selection keeps to all limits, or may be extended to one that has what is missing of `at_least`."""
         members = set(chosen)
         return (
             self.must <= members
@@ -155,19 +157,24 @@ class Constraints:
             row[list(one.members)] = 1.0
             rows.append(row)
             limits.append(float(one.count))
+        for members in self.at_least:
+            row = np.zeros(size)
+            row[list(members)] = -1.0
+            rows.append(row)
+            limits.append(-1.0)
         matrix = csr_array(np.array(rows).reshape(len(rows), size))
         if timed:
             place = {group: n + i for i, group in enumerate(groups)}
-            members = [k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done]
-            group = [place[kind.artefact, kind.plane] for k in members if (kind := self.kinds[k]) is not None]
-            at = np.arange(len(members))
-            entries = np.concatenate([np.ones(len(members)), -np.ones(len(members))])
-            columns = np.concatenate([members, group])
-            linked = csr_array((entries, (np.concatenate([at, at]), columns)), shape=(len(members), size))
+            moved = [k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done]
+            group = [place[kind.artefact, kind.plane] for k in moved if (kind := self.kinds[k]) is not None]
+            at = np.arange(len(moved))
+            entries = np.concatenate([np.ones(len(moved)), -np.ones(len(moved))])
+            columns = np.concatenate([moved, group])
+            linked = csr_array((entries, (np.concatenate([at, at]), columns)), shape=(len(moved), size))
             from scipy.sparse import vstack
 
             matrix = vstack([matrix, linked], format="csr")
-            limits += [0.0] * len(members)
+            limits += [0.0] * len(moved)
         low = np.zeros(size)
         low[list(self.must)] = 1.0
         return matrix, np.array(limits), low, np.ones(size)

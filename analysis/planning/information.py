@@ -92,6 +92,10 @@ class Information:
         """The last z, those of shared parameters."""
         return slice(self.basis.of_balls, self.basis.size)
 
+    def placing(self, artefact: str) -> tuple[int, ...]:
+        """Candidates that are positions of an artefact."""
+        return _placing(self.candidates, artefact)
+
     def of(self, chosen: Collection[int]) -> Array:
         """Information (z, z) of a selection; a frame that nothing fixes is held, which changes no distance."""
         members = sorted(chosen)
@@ -111,7 +115,7 @@ class Frames:
     `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the motions of the plates (m,
     motions), `base` the same for the experiment's own certificates. `rows` (motions, z) are the motions' rows.
     `artefacts` holds, for each artefact, which candidates place it and the information (z, z) that holds its balls or
-    its length.
+    its length; plates are not among them where balls themselves count.
     """
 
     fixed: dict[int, Array]
@@ -143,7 +147,8 @@ class Frames:
 def pool_information(experiment: Experiment, candidates: Sequence[Candidate], all_balls: bool = False) -> Information:
     """Information of every candidate of a pool.
 
-    With `all_balls` no combination of balls is left out, for criteria that are about balls.
+    With `all_balls` no combination of balls is left out, for criteria that are about balls, and no plate is held that a
+    selection does not place.
 
     :raises ExperimentError: no candidate is a position, the matrices are too large, or what cannot be planned is asked.
     """
@@ -182,7 +187,7 @@ def pool_information(experiment: Experiment, candidates: Sequence[Candidate], al
         transformed = in_basis(rows)
         matrices[k] = transformed.T @ transformed
     transformed = in_basis(base)
-    frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis))
+    frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis, all_balls))
     return Information(drawn, tuple(candidates), basis, transformed.T @ transformed, matrices, open_, frames)
 
 
@@ -347,14 +352,22 @@ def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
     yield some
 
 
-def _unplaced(drawn: Drawn, candidates: Sequence[Candidate], basis: Basis) -> tuple[tuple[frozenset[int], Array], ...]:
+def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:
+    return tuple(
+        k for k, one in enumerate(candidates) if isinstance(one.item, Position) and one.item.artefact == artefact
+    )
+
+
+def _unplaced(
+    drawn: Drawn, candidates: Sequence[Candidate], basis: Basis, all_balls: bool
+) -> tuple[tuple[frozenset[int], Array], ...]:
     """For each artefact, which candidates place it, and what holds the parameters that are its own."""
     design, found = drawn.design, []
     n, d = design.balls.shape
     for number, name in enumerate(design.artefact_names):
-        placing = frozenset(
-            k for k, one in enumerate(candidates) if isinstance(one.item, Position) and one.item.artefact == name
-        )
+        if all_balls and design.is_plate[number] and _placing(candidates, name):
+            continue
+        placing = frozenset(_placing(candidates, name))
         own = np.flatnonzero(design.ball_artefact == number)
         by_ball = basis.balls[own].reshape(len(own) * d, -1)
         lengths = [k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name]
