@@ -370,6 +370,8 @@ def _unplaced(
         placing = frozenset(_placing(candidates, name))
         own = np.flatnonzero(design.ball_artefact == number)
         by_ball = basis.balls[own].reshape(len(own) * d, -1)
+        # Of balls that no combination moves there is nothing to hold, and rounding must not be taken for it.
+        by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
         lengths = [k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name]
         by_length = np.eye(drawn.shared)[[drawn.layout.lengths.start - drawn.own.start + k for k in lengths]]
         rows = np.concatenate(
