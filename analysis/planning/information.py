@@ -9,7 +9,7 @@ lost where products of rows are formed; what the pool does not determine at all 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -73,6 +73,7 @@ class Information:
     `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z) what each adds.
     `deficiency` counts shared directions (c, deficiency), `open_` in micrometres, that even all candidates together
     leave undetermined. `frames` (candidates that calibrate co-ordinates) hold what each fixes of its plate's frame.
+    `pose_ranks` tells how many parameters of its own pose each candidate determines, were all else known.
     """
 
     drawn: Drawn
@@ -82,6 +83,7 @@ class Information:
     matrices: Array
     open_: Array
     frames: Frames
+    pose_ranks: tuple[int, ...] = ()
 
     @property
     def deficiency(self) -> int:
@@ -144,9 +146,16 @@ class Frames:
 
 
 @single_threaded
-def pool_information(experiment: Experiment, candidates: Sequence[Candidate], all_balls: bool = False) -> Information:
+def pool_information(
+    experiment: Experiment,
+    candidates: Sequence[Candidate],
+    all_balls: bool = False,
+    completed: Mapping[int, int] | None = None,
+) -> Information:
     """Information of every candidate of a pool.
 
+    A candidate that completes another, of which it has the readings as well, is given under `completed`: its
+    information is what it adds to that of the other, in the same pose.
     With `all_balls` no combination of balls is left out, for criteria that are about balls, and no plate is held that a
     selection does not place.
 
@@ -173,22 +182,32 @@ def pool_information(experiment: Experiment, candidates: Sequence[Candidate], al
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in known])
-    of_positions = (_reduced(_in_amounts(rows, balls)) for rows in position_rows(drawn))
+    of_positions = position_rows(drawn)
     own: list[Array] = []
+    pose_ranks: list[int] = []
     for k in range(len(candidates)):
-        own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]) if k in items else next(of_positions))
+        if k in items:
+            own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
+            pose_ranks.append(0)
+            continue
+        rows = next(of_positions)
+        own.append(_reduced(_in_amounts(rows, balls)))
+        pose_ranks.append(_range(rows.by_pose).shape[1])
     basis, open_ = _basis(balls, drawn.shared, [base, *own])
 
     def in_basis(rows: Array) -> Array:
         return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
 
     matrices = np.zeros((len(candidates), basis.size, basis.size))
-    for k, rows in enumerate(own):
-        transformed = in_basis(rows)
+    for k, reduced in enumerate(own):
+        transformed = in_basis(reduced)
         matrices[k] = transformed.T @ transformed
+    for whole, part in (completed or {}).items():
+        matrices[whole] -= matrices[part]
     transformed = in_basis(base)
     frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis, all_balls))
-    return Information(drawn, tuple(candidates), basis, transformed.T @ transformed, matrices, open_, frames)
+    own_base = transformed.T @ transformed
+    return Information(drawn, tuple(candidates), basis, own_base, matrices, open_, frames, tuple(pose_ranks))
 
 
 def _in_amounts(rows: Rows, balls: Array) -> Array:

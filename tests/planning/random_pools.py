@@ -6,7 +6,7 @@ Lengths are chosen so that whatever is drawn lies inside the volume.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +100,9 @@ def _said(generator: np.random.Generator) -> tuple[dict[str, Any], int]:
     positions = [_position(generator, d, k, names, artefacts) for k in range(count)]
     if drawn:
         said["positions"] = positions[:drawn]
-    calibration = [one for name in names if generator.random() < 0.6 for one in [_certificate(generator, name, artefacts)]]
+    calibration = [
+        one for name in names if generator.random() < 0.6 for one in [_certificate(generator, name, artefacts)]
+    ]
     if calibration:
         said["calibration"] = calibration
     offered = []
@@ -157,7 +159,11 @@ def _position(
         # Where a bar is turned it stays in the octant that it points to.
         turn = int(generator.integers(0, 91)) if kind == "two_spheres" else int(generator.integers(0, 20))
         origin = [f"{int(generator.integers(70, SIDES[axis] - 270))} mm" for axis in "xyz"[:d]]
-        rotation = ["0 deg", f"{-int(generator.integers(0, 60))} deg" if kind == "two_spheres" else "0 deg", f"{turn} deg"]
+        rotation = [
+            "0 deg",
+            f"{-int(generator.integers(0, 60))} deg" if kind == "two_spheres" else "0 deg",
+            f"{turn} deg",
+        ]
         said["pose"] = {"origin": origin, "rotation": rotation if d == 3 else rotation[2]}
     probes = list(PROBES) if generator.random() < 0.3 else [list(PROBES)[k % 3]]
     said["probes"] = probes[: d + 1]
@@ -202,8 +208,6 @@ def _readings(path: Path, drawn: int, generator: np.random.Generator) -> Path | 
 
 def write_some(experiment: Experiment, positions: Sequence[Position], path: Path, share: float) -> Path:
     """Write exact readings of positions, of the last of them only a share."""
-    from dataclasses import replace
-
     design = lay_out(replace(experiment, positions=tuple(positions)))
     readings, x = exact_readings(design, nominal_state(design))
     last = np.flatnonzero(readings.position == len(positions) - 1)
