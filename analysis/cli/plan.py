@@ -63,8 +63,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     again.add_argument(
         "--moved",
         action="store_true",
-        help="the artefact does not stand any more where it was read last: a position that was interrupted there is only "
-        "offered to be set up again",
+        help="the artefact does not stand any more where it was read last: a position interrupted there can only be set "
+        "up again",
     )
     again.add_argument(
         "--from",
@@ -160,7 +160,7 @@ def run(options: Namespace) -> int:
         budget = Budget(seconds, options.readings, options.positions)
     request = Request(options.criterion, budget, options.curve, options.seed)
     found = campaign(experiment, request, offered, earlier, options.workers or processors(), _report)
-    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed)
+    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
     if options.json:
         print_json([campaign_data(found, sheet)])
     else:

@@ -222,10 +222,7 @@ def _information(experiment: Experiment, offered: Offer, all_balls: bool) -> Inf
 
 
 def _together(offered: Offer, chosen: Sequence[int]) -> list[Candidate]:
-    """Chosen candidates in order, a position that is completed as one, those left interrupted at the end.
-
-    The first position holds the frame of its artefact, which one that was only begun may do badly.
-    """
+    """Chosen candidates in order, a position that is completed as one, those left interrupted at the end."""
     found = {k: offered.candidates[k] for k in chosen}
     for one in offered.interrupted:
         part = found.pop(one.part)

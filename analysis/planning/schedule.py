@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,8 @@ class Step:
 
     `change` says what is changed before it, in `change_seconds`; `seconds` is what it takes by itself, and `start` when
     its change-over begins, in seconds from the first position that is to be read. What is `done` has neither. Of a
-    position that is completed, `whole` has all readings and `candidate` those still to be taken.
+    position that is completed, `whole` has all readings and `candidate` those still to be taken. One that was
+    interrupted and is not completed is `left` so.
     """
 
     candidate: Candidate
@@ -43,6 +44,7 @@ class Step:
     start: float
     done: bool
     whole: Candidate | None = None
+    left: bool = False
 
     @property
     def name(self) -> str:
@@ -70,8 +72,12 @@ class RunSheet:
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
-        """All candidates, positions in the order of the sheet."""
-        return (*(step.whole or step.candidate for step in self.steps), *self.calibration)
+        """All candidates, positions in the order of the sheet, those left interrupted after the others.
+
+        The first position holds the frame of its artefact, which one that was only begun may do badly.
+        """
+        steps = sorted(self.steps, key=lambda step: step.left)
+        return (*(step.whole or step.candidate for step in steps), *self.calibration)
 
     @property
     def seconds(self) -> float:
@@ -90,16 +96,18 @@ def run_sheet(
     changes: ChangeTimes,
     done: Sequence[Candidate] = (),
     completed: Completion | None = None,
+    interrupted: Collection[Candidate] = (),
 ) -> RunSheet:
     """The run sheet of chosen candidates: the order that costs least, what is done already first and as it was.
 
     Candidates that are `done` may be among the chosen ones too. They take no time any more, and as before any first
     position nothing is changed before the first that is left. A position that is `completed` is that first one, as long
-    as its artefact stands; only its rest takes time.
+    as its artefact stands; only its rest takes time. What else is `interrupted` stays as it is.
     """
     again = set() if completed is None else {completed.whole.name}
     before = [one for one in done if isinstance(one.item, Position) and one.name not in again]
     names = {candidate.name for candidate in before} | again
+    left = {one.name for one in interrupted} - again
     positions = [one for one in chosen if isinstance(one.item, Position) and one.name not in names]
     sequence = ordered(positions, changes, before, None if completed is None else completed.rest)
     steps: list[Step] = []
@@ -115,7 +123,9 @@ def run_sheet(
             whole = completed.whole
             place = f"as it stands: {place}"
             balls = f"the rest, {candidate.readings} of {whole.readings} readings: {balls}"
-        steps.append(Step(candidate, place, probes, balls, words, change, seconds, elapsed, is_done, whole))
+        is_left = is_done and candidate.name in left
+        balls += "; left so" if is_left else ""
+        steps.append(Step(candidate, place, probes, balls, words, change, seconds, elapsed, is_done, whole, is_left))
         elapsed += change + seconds
     return RunSheet(tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position)))
 

@@ -13,8 +13,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from analysis.planning.campaign import Campaign, Request, campaign
 from analysis.planning.constraints import HOUR, Budget
 from analysis.planning.criteria import NAMES, CriterionName
+from analysis.planning.done import SetUp, done_candidates
+from analysis.planning.offer import offer
 from simulator.design import nominal_state
 from simulator.experiment.load import load
 from simulator.experiment.model import Experiment, Position
@@ -45,36 +48,50 @@ PROBES = {"down": [0, 0, -40], "right": [40, 0, 0], "back": [0, 40, 0]}
 class RandomPool:
     """A file with a pool and what is asked of it: criterion, budget, and readings of the first positions drawn.
 
-    `path` is the file's; `readings` the readings' that have been taken, None where nothing is done.
+    `path` is the file's; `readings` the readings' that have been taken, None where nothing is done, after which the
+    artefact may be `standing` where it was.
     """
 
     path: Path
     criterion: CriterionName
     budget: Budget
     readings: Path | None
+    standing: bool
 
     @property
     def experiment(self) -> Experiment:
         return load(self.path, planning=True)[0]
 
+    @property
+    def taken(self) -> tuple[SetUp, ...]:
+        return () if self.readings is None else done_candidates(self.readings, self.experiment)
+
+    def planned(self, taken: tuple[SetUp, ...], curve: bool = False) -> Campaign:
+        """The choice after some set-ups have been read."""
+        experiment = self.experiment
+        assert experiment.pool is not None
+        request = Request(self.criterion, self.budget, curve)
+        return campaign(experiment, request, offer(experiment.pool, taken, self.standing))
+
 
 def random_pool(folder: Path, seed: int) -> RandomPool:
     """Write the pool of a seed, and readings of some of its positions for every third."""
     generator = np.random.default_rng([13, seed])
-    said, drawn = _said(generator)
+    said = _said(generator)
     path = folder / f"pool-{seed}.yaml"
     path.write_text(yaml.safe_dump(said, sort_keys=False))
     name = NAMES[seed % len(NAMES)]
     limited = generator.integers(4)
     budget = Budget(
-        float(generator.uniform(2.0, 6.0)) * HOUR if limited in (0, 3) else None,
+        float(generator.uniform(1.5, 5.0)) * HOUR if limited in (0, 3) else None,
         int(generator.integers(25, 90)) if limited == 2 else None,
         int(generator.integers(3, 6)) if limited in (1, 3) else None,
     )
-    return RandomPool(path, name, budget, _readings(path, drawn, generator) if seed % 3 == 2 else None)
+    readings = _readings(path, generator) if seed % 3 == 2 else None
+    return RandomPool(path, name, budget, readings, bool(generator.random() < 0.7))
 
 
-def _said(generator: np.random.Generator) -> tuple[dict[str, Any], int]:
+def _said(generator: np.random.Generator) -> dict[str, Any]:
     d = 2 if generator.random() < 0.4 else 3
     axes = "xyz"[:d]
     kinematic = d == 3 and generator.random() < 0.4
@@ -96,8 +113,8 @@ def _said(generator: np.random.Generator) -> tuple[dict[str, Any], int]:
         }
     names = list(artefacts)
     drawn = int(generator.integers(0, 3))
-    count = drawn + int(generator.integers(4, 8))
-    positions = [_position(generator, d, k, names, artefacts) for k in range(count)]
+    count = drawn + int(generator.integers(4, 8 if generator.random() < 0.8 else 14))
+    positions = [_position(generator, d, k, names, artefacts) for k in range(max(count, len(names)))]
     if drawn:
         said["positions"] = positions[:drawn]
     calibration = [
@@ -130,7 +147,7 @@ def _said(generator: np.random.Generator) -> tuple[dict[str, Any], int]:
         "probe": "down",
         "tasks": [{"name": "long", "from": ends[0], "to": ends[1]}, {"name": "other", "from": ends[0], "to": across}],
     }
-    return said, drawn
+    return said
 
 
 def _artefacts(generator: np.random.Generator, d: int) -> dict[str, dict[str, Any]]:
@@ -145,7 +162,8 @@ def _artefacts(generator: np.random.Generator, d: int) -> dict[str, dict[str, An
 def _position(
     generator: np.random.Generator, d: int, k: int, names: Sequence[str], artefacts: dict[str, dict[str, Any]]
 ) -> dict[str, Any]:
-    name = names[k % len(names)] if generator.random() < 0.7 else names[int(generator.integers(len(names)))]
+    is_next = k < len(names) or generator.random() < 0.7
+    name = names[k % len(names)] if is_next else names[int(generator.integers(len(names)))]
     said: dict[str, Any] = {"name": f"place {k}", "artefact": name}
     at = {axis: f"{int(generator.integers(1, SIDES[axis] - 270))} mm" for axis in "xyz"[:d]}
     kind = artefacts[name]["kind"]
@@ -197,7 +215,7 @@ def _limits(generator: np.random.Generator, positions: Sequence[dict[str, Any]],
     return limits
 
 
-def _readings(path: Path, drawn: int, generator: np.random.Generator) -> Path | None:
+def _readings(path: Path, generator: np.random.Generator) -> Path:
     """Exact readings of some positions of the pool, the last of them perhaps in part."""
     (experiment,) = load(path, planning=True)
     assert experiment.pool is not None
