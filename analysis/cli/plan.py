@@ -63,8 +63,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     again.add_argument(
         "--moved",
         action="store_true",
-        help="the artefact does not stand any more where it was read last: a position interrupted there can only be set "
-        "up again",
+        help="the artefact does not stand any more where it was read last: a position interrupted there can only be "
+        "set up again",
     )
     again.add_argument(
         "--from",

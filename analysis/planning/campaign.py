@@ -360,9 +360,10 @@ def _task(problem: Problem, from_: Sequence[Collection[int]] | None, at_once: in
 
 
 def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
-    """What each chosen candidate gains, those first that gain most."""
+    """What each chosen candidate gains, those first that gain most, whether it has to be chosen or not."""
+    free = replace(problem, constraints=replace(problem.constraints, at_least=()))
     gains = [
-        Gain(candidates[k], value(problem, set(best.chosen) - {k}), best.value)
+        Gain(candidates[k], value(free, set(best.chosen) - {k}), best.value)
         for k in best.chosen
         if k not in problem.constraints.done
     ]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+from collections import Counter
 from collections.abc import Sequence
-from itertools import chain, combinations
+from itertools import chain, combinations, product
 from pathlib import Path
 
 import numpy as np
@@ -120,7 +122,14 @@ def check_choice(pool: RandomPool, folder: Path) -> bool:
     if pool.readings is not None:
         # What has been read is part of what the file plans, and with the rest of it nothing is missing.
         design = lay_out(experiment)
-        assert read_readings(pool.readings, design, every_ball=False).unplanned == ()
+        with pool.readings.open(newline="", encoding="utf-8") as stream:
+            read = Counter((row["position"], row["ball"], row["probe"]) for row in csv.DictReader(stream))
+        planned = Counter[tuple[str, str, str]]()
+        for position in experiment.positions:
+            for group in position.readings:
+                for ball, probe in product(group.balls, group.probes):
+                    planned[position.name, ball, probe] += group.repeats
+        assert read <= planned
         complete = read_readings(write_some(experiment, experiment.positions, folder / "all.csv", 1.0), design)
         assert complete.missing == complete.unplanned == ()
     return found.is_determined
@@ -141,8 +150,8 @@ def check_more_data(pool: RandomPool) -> bool:
 
 
 def test_pools_at_random(tmp_path: Path) -> None:
-    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(20)]
-    assert sum(fine) >= 16
+    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(12)]
+    assert sum(fine) >= 9
 
 
 def test_readings_of_an_interrupted_position_never_make_a_plan_worse(tmp_path: Path) -> None:
@@ -151,7 +160,7 @@ def test_readings_of_an_interrupted_position_never_make_a_plan_worse(tmp_path: P
 
 @pytest.mark.long
 def test_two_hundred_pools_at_random(tmp_path: Path) -> None:
-    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(20, 220)]
+    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(12, 212)]
     assert sum(fine) >= 160
 
 
