@@ -51,13 +51,14 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
         writer.writerow([positions[position], balls[ball], probes[probe], *map(repr, row)])
 
 
-def read_readings(path: Path, design: Design) -> ObservedReadings:
+def read_readings(path: Path, design: Design, every_ball: bool = True) -> ObservedReadings:
     """Readings of a file as observations of a design.
 
     The probe's column may be left out where there is one probe only. An optional column u, with a unit as in u_um,
     states the standard uncertainty of each co-ordinate of a reading; without it a reading has the uncertainty that
     the design plans for it, and one that is not planned the machine's repeatability. A reading stands in the file no
-    more often than the design plans it; one that is not planned, once.
+    more often than the design plans it; one that is not planned, once. Unless `every_ball` has to be read, some may be
+    missing.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that cannot be of the
         ball they name (`estimation.misreadings`); all of a kind at once.
@@ -83,7 +84,7 @@ def read_readings(path: Path, design: Design) -> ObservedReadings:
     readings = replace(readings, uncertainty=uncertainty)
     missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
-    if len(unread):
+    if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
         raise ExperimentError(
             [Message(str(path), 1, 1, "", f"no reading of the balls {names}; read each at least once")]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from .interruption import interruptions
 
-AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERRUPTED = 0, 1, 2, 3, 130
+AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 
 def parser() -> argparse.ArgumentParser:
@@ -66,6 +66,8 @@ def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], Non
     # Loaded only now, so that --help and wrong usage answer at once.
     from simulator.experiment.messages import ExperimentError
 
+    from ..internal_error import InternalError
+
     try:
         status = int(options.run(options))
         sys.stdout.flush()
@@ -73,6 +75,9 @@ def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], Non
     except ExperimentError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
+    except InternalError as error:
+        print(f"internal error: {error}. Please report it with the file and the command.", file=sys.stderr)
+        return INTERNAL
     except BrokenPipeError:
         # The reader has gone; say nothing, and keep the interpreter from flushing into the closed pipe.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -61,6 +61,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="readings already taken; their positions are kept, and the budget is for the rest",
     )
     again.add_argument(
+        "--moved",
+        action="store_true",
+        help="the artefact does not stand any more where it was read last: a position interrupted there can only be "
+        "set up again",
+    )
+    again.add_argument(
         "--from",
         dest="earlier",
         metavar="FILE",
@@ -116,6 +122,7 @@ def run(options: Namespace) -> int:
     from ..planning.constraints import HOUR, Budget
     from ..planning.done import done_candidates
     from ..planning.earlier import earlier_choice
+    from ..planning.offer import offer
     from ..planning.schedule import run_sheet
     from ..planning.tables import campaign_data, campaign_lines
     from ..processes import processors
@@ -126,21 +133,22 @@ def run(options: Namespace) -> int:
         text = "is the file that the pool stands in; name another"
         raise ExperimentError([Message(str(options.output), 0, 0, "", text)])
     experiment = single(options, planning=True)
-    candidates = experiment.pool.candidates if experiment.pool is not None else ()
+    offered = None if experiment.pool is None else offer(experiment.pool)
     messages: list[Message] = []
-    done, earlier = {}, None
+    earlier = None
     try:
-        if options.done is not None and candidates:
-            done = done_candidates(options.done, experiment, candidates)
+        if options.done is not None and experiment.pool is not None:
+            taken = done_candidates(options.done, experiment)
+            offered = offer(experiment.pool, taken, standing=not options.moved)
     except ExperimentError as error:
         messages += error.messages
     try:
-        if options.earlier is not None and candidates:
+        if options.earlier is not None and offered is not None:
             before = load(options.earlier)
             if len(before) > 1:
                 text = "the file has several variants; name a design that was chosen"
                 raise ExperimentError([Message(str(options.earlier), 0, 0, "variants", text)])
-            earlier = earlier_choice(before[0], candidates)
+            earlier = earlier_choice(before[0], offered)
     except ExperimentError as error:
         messages += error.messages
     if messages:
@@ -151,15 +159,16 @@ def run(options: Namespace) -> int:
         seconds = None if options.hours is None else HOUR * options.hours
         budget = Budget(seconds, options.readings, options.positions)
     request = Request(options.criterion, budget, options.curve, options.seed)
-    found = campaign(experiment, request, done, earlier, options.workers or processors(), _report)
-    sheet = run_sheet(found.chosen, found.pool.changes, found.done)
+    found = campaign(experiment, request, offered, earlier, options.workers or processors(), _report)
+    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
     if options.json:
         print_json([campaign_data(found, sheet)])
     else:
         print_lines(campaign_lines(found, sheet))
     if not _written(found, sheet, options):
         return BAD_FILE
-    return AS_EXPECTED if found.is_determined and not found.plan.verdict.deficiency else NOT_AS_EXPECTED
+    is_full = found.plan.verdict.deficiency == found.open_poses
+    return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
 
 
 def _report(step: str) -> None:
@@ -175,7 +184,8 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         header = (
             f"Chosen by ballplate plan from {options.files[0].name}: {found.criterion}, no more than {found.budget}."
         )
-        text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent)
+        deficiency = found.open_poses or None
+        text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent, None, deficiency)
         write(options.output, text, options.force)
     if options.sheet is not None:
         write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)

@@ -18,6 +18,7 @@ import numpy as np
 from simulator.machines.protocol import Array
 from simulator.threads import single_threaded
 
+from ..internal_error import InternalError
 from .search import Losses, Problem, counted_root, fill, full_root, square_root
 
 # Relative distance of bound and relaxation at which the weights are good enough, and steps at most.
@@ -39,6 +40,9 @@ MOST_NODES = 2000
 
 Limits = tuple[Any, Array, Array, Array]
 
+# What a selection may be below its bound by, relatively.
+ROUNDING = 1e-9
+
 # What solvers of linear programmes leave, relatively.
 TOLERANCE = 1e-7
 
@@ -53,6 +57,15 @@ class Bound:
     value: float
     relaxed: float
     weights: Array
+
+    def check(self, name: str, reached: float) -> None:
+        """Make sure that the criterion `name` of a selection is not better than the bound.
+
+        :raises InternalError: it is, by more than rounding.
+        """
+        if reached < self.value * (1 - ROUNDING):
+            text = f"{name} of the choice, {reached:.10g}, is below {self.value:.10g}, the bound of any choice"
+            raise InternalError(f"{text}; neither is to be trusted")
 
 
 @dataclass(frozen=True)
@@ -85,7 +98,7 @@ def bound(problem: Problem, start: Collection[int] | None = None, steps: int = M
     mixture = _first(problem, start)
     if mixture is None:
         return None
-    limits = problem.constraints.linear()
+    limits = problem.limits.linear()
     powers = list(POWERS if problem.criterion.is_sharp else POWERS[-1:])
     best = Bound(0.0, np.inf, mixture.weights)
     for _ in range(steps):
@@ -131,7 +144,7 @@ class _Mixture:
 def _first(problem: Problem, start: Collection[int] | None) -> _Mixture | None:
     """A mixture of vertices that leaves nothing undetermined; None where none is found."""
     n = problem.constraints.count
-    limits = problem.constraints.linear()
+    limits = problem.limits.linear()
     generator = np.random.default_rng(np.random.SeedSequence(0))
     selection = fill(problem, problem.constraints.must, Losses(problem)) if start is None else start
     vertices = [np.isin(np.arange(n), list(selection)).astype(float)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -19,7 +19,9 @@ from ..study import Plan, plan
 from .bound import Bound, bound
 from .constraints import Budget, Constraints, Spent, constraints
 from .criteria import CriterionName, criterion, is_about_balls
-from .information import pool_information
+from .information import Information, pool_information
+from .offer import Offer, offer
+from .schedule import Completion
 from .search import Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
@@ -75,7 +77,10 @@ class CurvePoint:
 class Campaign:
     """A selection and what is to be said of it; values in metres, those of `condition` ratios.
 
-    `chosen` in the order of the pool, `done` those of them that have been read already. `value` is infinite where the
+    `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
+    order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
+    `interrupted` are all that were read in part, and `open_poses` counts the directions of their poses that stay
+    undetermined where they are left so; nothing else depends on these. `value` is infinite where the
     selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
     `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
     the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
@@ -100,6 +105,9 @@ class Campaign:
     left_out: tuple[Gain, ...]
     plan: Plan
     curve: tuple[CurvePoint, ...] = ()
+    completed: Completion | None = None
+    interrupted: tuple[Candidate, ...] = ()
+    open_poses: int = 0
 
     @property
     def efficiency(self) -> float:
@@ -120,32 +128,44 @@ class Campaign:
 def campaign(
     experiment: Experiment,
     request: Request,
-    done: Mapping[int, Candidate] | None = None,
+    offered: Offer | None = None,
     earlier: Collection[int] | None = None,
     workers: int = 1,
     report: Callable[[str], None] = lambda step: None,
 ) -> Campaign:
     """Choose from the pool of an experiment.
 
-    `done` are candidates that have been read already, by index, with the readings that were taken: they are kept and
-    cost nothing more. `earlier` are the indices of an earlier choice, which the plan is compared with and never worse
-    than within the same budget; without it that is the experiment's own positions. Without a budget the choice may cost
-    what these do, less what is done. The result does not depend on the number of `workers`; `report` is told what is
+    `offered` is what may be chosen where some of it has been read already: that is kept and costs nothing more.
+    `earlier` are the indices of an earlier choice, which the plan is compared with and never worse than within the same
+    budget; without it that is the experiment's own positions. Without a budget the choice may cost what these do, less
+    what is done. The result does not depend on the number of `workers`; `report` is told what is
     being done.
 
     :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
+    :raises InternalError: the choice is better than the bound of any choice.
     """
-    pool, read = experiment.pool, dict(done or {})
+    pool = experiment.pool
     if pool is None:
         raise _impossible(
             experiment, "pool", "missing; add candidates to choose from, or see what check --suggest tells"
         )
-    candidates = [read.get(k, candidate) for k, candidate in enumerate(pool.candidates)]
+    offered = offered or offer(pool)
+    candidates, standing = offered.candidates, offered.standing
     report(f"information of {len(candidates)} candidates")
-    information = pool_information(experiment, candidates, is_about_balls(request.criterion))
+    information = _information(experiment, offered, is_about_balls(request.criterion))
     wanted = criterion(information, experiment, request.criterion)
-    drawn = sorted(earlier) if earlier else [k for k, candidate in enumerate(candidates) if candidate.drawn]
-    free = constraints(candidates, pool.changes, Budget(), pool.must, _limits(experiment, pool), list(read))
+    own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
+    drawn = sorted(earlier or own)
+    free = constraints(
+        candidates,
+        pool.changes,
+        Budget(),
+        offered.must,
+        _limits(experiment, pool, offered),
+        offered.done,
+        offered.at_least,
+        None if standing is None else standing.rest,
+    )
     reference = sorted({*drawn, *free.must})
     budget = request.budget or _as_drawn(experiment, free, drawn, reference)
     limits = replace(free, budget=budget)
@@ -154,7 +174,14 @@ def campaign(
 
     report("searching")
     best, relaxed = _search(problem, drawn, request.seed, workers)
-    chosen = [candidates[k] for k in best.chosen]
+    if relaxed is not None:
+        relaxed.check(request.criterion, best.value)
+    _refuse_lacking(experiment, problem, best)
+    completed = None
+    if standing is not None and standing.rest in best.chosen:
+        completed = Completion(candidates[standing.rest], standing.whole)
+    chosen = _together(offered, best.chosen)
+    open_poses = _open_poses(offered, information, best.chosen)
     _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
     report("gains")
@@ -166,7 +193,7 @@ def campaign(
         wanted.excluded,
         budget,
         tuple(chosen),
-        tuple(candidates[k] for k in sorted(read)),
+        tuple(candidates[k] for k in offered.done),
         limits.spent(best.chosen),
         best.value,
         np.nan if relaxed is None else relaxed.value,
@@ -176,18 +203,51 @@ def campaign(
         wanted.target,
         _gains(problem, best, candidates),
         _left_out(unlimited, best, candidates),
-        plan(replace(with_chosen(experiment, chosen), expected_rank_deficiency=None)),
+        plan(replace(with_chosen(experiment, chosen), expected_rank_deficiency=open_poses or None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
+        completed,
+        tuple(candidates[one.part] for one in offered.interrupted),
+        open_poses,
     )
+
+
+def _information(experiment: Experiment, offered: Offer, all_balls: bool) -> Information:
+    """Information of what is offered; the rest of an interrupted position is weighed together with its part."""
+    candidates, completed = list(offered.candidates), {}
+    for one in offered.interrupted:
+        if one.rest is not None:
+            candidates[one.rest] = one.whole
+            completed[one.rest] = one.part
+    return pool_information(experiment, candidates, all_balls, completed)
+
+
+def _together(offered: Offer, chosen: Sequence[int]) -> list[Candidate]:
+    """Chosen candidates in order, a position that is completed as one, those left interrupted at the end."""
+    found = {k: offered.candidates[k] for k in chosen}
+    for one in offered.interrupted:
+        part = found.pop(one.part)
+        if one.rest is not None and one.rest in found:
+            del found[one.rest]
+            found[one.part] = one.whole
+        else:
+            found[len(offered.candidates) + one.part] = part
+    return [found[k] for k in sorted(found)]
+
+
+def _open_poses(offered: Offer, information: Information, chosen: Collection[int]) -> int:
+    """Parameters of the poses of interrupted positions, not completed, that their readings leave undetermined."""
+    left = [one for one in offered.interrupted if one.rest is None or one.rest not in chosen]
+    ranks = information.pose_ranks
+    return sum(max(ranks[one.again] - ranks[one.part], 0) for one in left)
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
     return ExperimentError([Message(str(experiment.source), 0, 0, path, text)])
 
 
-def _limits(experiment: Experiment, pool: Pool) -> list[AtMost]:
-    """Limits of a pool, and that of several certificates of the same length only one counts."""
-    found = list(pool.at_most)
+def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
+    """Limits on what is offered, and that of several certificates of the same length only one counts."""
+    found = list(offered.at_most)
     for name, artefact in experiment.artefacts.items():
         own = tuple(
             k
@@ -212,6 +272,21 @@ def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget
             balls = listing(f'"{ball}"' for ball in unread)
             text = f"the best choice leaves {balls} of {name} unread, which no experiment may; keep a position of all"
             raise _impossible(experiment, "pool.limits.keep", text)
+
+
+def _refuse_lacking(experiment: Experiment, problem: Problem, best: Found) -> None:
+    """Refuse a choice without what every choice needs."""
+    for members in problem.constraints.at_least:
+        if set(members).isdisjoint(best.chosen):
+            name = problem.information.candidates[members[0]].name
+            text = f'"{name}" has to be chosen, but was interrupted, and cannot be read with'
+            raise _impossible(experiment, "pool.limits.keep", f"{text} {problem.constraints.budget}; allow more")
+    missing = [name for name, placing in problem.criterion.needed if set(placing).isdisjoint(best.chosen)]
+    if missing:
+        names, name = listing(f'"{one}"' for one in missing), problem.criterion.name
+        text = f"{name} takes in the distances of {names}, of which no position can be read with "
+        text += f"{problem.constraints.budget}; allow more, keep one, or take the artefact out of the pool"
+        raise _impossible(experiment, "pool", text)
 
 
 def _as_drawn(experiment: Experiment, free: Constraints, drawn: Sequence[int], reference: Sequence[int]) -> Budget:
@@ -242,7 +317,9 @@ def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: 
 
 def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> tuple[Found, Bound | None]:
     """The best selection found, and the bound of all."""
-    if problem.constraints.count <= TINY_POOL:
+    limits = problem.constraints
+    # An interrupted position, which has to be chosen, comes with two ways to go on.
+    if limits.count - len(limits.done) <= TINY_POOL + (limits.first is not None):
         return _best_of_all(problem), bound(problem)
     is_small = problem.constraints.count <= SMALL_POOL
     first = starts(problem, drawn, SMALL_STARTS if is_small else LARGE_STARTS, seed)
@@ -267,8 +344,8 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
 def _best_of_all(problem: Problem) -> Found:
     """The best of all selections of a pool that has few."""
     limits, losses = problem.constraints, Losses(problem)
-    members = range(limits.count)
-    every = (frozenset(chosen) for size in range(limits.count + 1) for chosen in combinations(members, size))
+    members = [k for k in range(limits.count) if k not in limits.done]
+    every = (limits.done.union(chosen) for size in range(len(members) + 1) for chosen in combinations(members, size))
     best = min((chosen for chosen in every if limits.allows(chosen)), key=lambda one: (losses.of(one), sorted(one)))
     return Found(tuple(sorted(best)), value(problem, best))
 
@@ -283,9 +360,10 @@ def _task(problem: Problem, from_: Sequence[Collection[int]] | None, at_once: in
 
 
 def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
-    """What each chosen candidate gains, those first that gain most."""
+    """What each chosen candidate gains, those first that gain most, whether it has to be chosen or not."""
+    free = replace(problem, constraints=replace(problem.constraints, at_least=()))
     gains = [
-        Gain(candidates[k], value(problem, set(best.chosen) - {k}), best.value)
+        Gain(candidates[k], value(free, set(best.chosen) - {k}), best.value)
         for k in best.chosen
         if k not in problem.constraints.done
     ]
@@ -329,6 +407,8 @@ def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
     selections = [improve(problem, start, losses, 1) for start in starts(problem, generous, 0, 1)]
     found = min(selections, key=lambda one: (one.value, one.chosen))
     relaxed = bound(problem) if np.isfinite(found.value) else None
+    if relaxed is not None:
+        relaxed.check(f"{problem.criterion.name} for {problem.constraints.budget}", found.value)
     return found, np.nan if relaxed is None else relaxed.value
 
 

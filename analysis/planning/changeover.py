@@ -56,19 +56,21 @@ def probes_of(position: Position) -> tuple[str, ...]:
     return tuple(dict.fromkeys(probe for group in position.readings for probe in group.probes))
 
 
-def changeover(kinds: Collection[Kind], changes: ChangeTimes) -> float:
+def changeover(kinds: Collection[Kind], changes: ChangeTimes, first: Kind | None = None) -> float:
     """Least total change-over, in seconds, of positions of these kinds; one listed twice stands for two positions.
+
+    A position of the kind `first` comes before all of them.
 
     >>> down, side = (Kind("plate", "z", frozenset({name})) for name in ("down", "side"))
     >>> changeover([down, side, down], ChangeTimes(probe=120.0, plane=1800.0))
     120.0
     """
-    return _least(_counted(kinds), changes)
+    return _least(_counted(kinds), changes, first)
 
 
 @lru_cache(maxsize=100_000)
-def _least(kinds: frozenset[tuple[Kind, int]], changes: ChangeTimes) -> float:
-    return cheapest(kinds, changes)[0]
+def _least(kinds: frozenset[tuple[Kind, int]], changes: ChangeTimes, first: Kind | None) -> float:
+    return cheapest(kinds, changes, first, is_paid=True).seconds
 
 
 def _counted(kinds: Iterable[Kind]) -> frozenset[tuple[Kind, int]]:
@@ -93,12 +95,22 @@ _NOWHERE: _Came = (0, (-1, -1), -1, -1)
 TIE = 1e-9
 
 
-def cheapest(
-    kinds: Iterable[tuple[Kind, int]], changes: ChangeTimes, after: Kind | None = None
-) -> tuple[float, tuple[Visit, ...]]:
-    """The cheapest order of kinds with their numbers of positions, and what it costs, in seconds.
+@dataclass(frozen=True)
+class Order:
+    """The cheapest order of kinds, what it costs in `seconds`, and the probe that is left from before, if any."""
 
-    Of orders that cost the same, one is preferred that goes on easily from positions read before, of the kind `after`.
+    seconds: float
+    visits: tuple[Visit, ...]
+    before: str | None
+
+
+def cheapest(
+    kinds: Iterable[tuple[Kind, int]], changes: ChangeTimes, after: Kind | None = None, is_paid: bool = False
+) -> Order:
+    """The cheapest order of kinds with their numbers of positions.
+
+    It begins after a position of the kind `after`, which may end with any of its probes. Unless going on from there
+    `is_paid`, that only decides between orders that cost the same.
     """
     # The order of a set differs from run to run.
     todo = sorted(kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes), one[1]))
@@ -119,7 +131,7 @@ def cheapest(
         start = {(probe_names.index(probe), here): (0.0, _NOWHERE) for probe in after.probes}
     # One layer for each number of kinds visited.
     layers: list[dict[int, _States]] = [{0: start}]
-    paid = ChangeTimes(TIE * changes.probe, TIE * changes.plane)
+    paid = changes if is_paid else ChangeTimes(TIE * changes.probe, TIE * changes.plane)
     for _ in stops:
         found: dict[int, _States] = {}
         for visited, states in layers[-1].items():
@@ -133,7 +145,7 @@ def cheapest(
         layers.append(found)
         paid = changes
     if not stops:
-        return 0.0, ()
+        return Order(0.0, (), None)
     ((visited, states),) = layers[-1].items()
     last = min(states, key=lambda one: states[one])
     visits: list[Visit] = []
@@ -142,7 +154,13 @@ def cheapest(
         visits.append(Visit(todo[i][0], probe_names[first], probe_names[last[0]]))
         last = before_that
     visits.reverse()
-    return sum(_between(one, other, changes) for one, other in zip(visits, visits[1:], strict=False)), tuple(visits)
+    seconds = sum(_between(one, other, changes) for one, other in zip(visits, visits[1:], strict=False))
+    if after is None:
+        return Order(seconds, tuple(visits), None)
+    probe = probe_names[last[0]]
+    if is_paid:
+        seconds += _between(Visit(after, probe, probe), visits[0], changes)
+    return Order(seconds, tuple(visits), probe)
 
 
 def _between(one: Visit, other: Visit, changes: ChangeTimes) -> float:

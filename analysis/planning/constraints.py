@@ -62,7 +62,8 @@ class Constraints:
 
     `seconds`, `readings` and `positions` (n,) are each candidate's own, `kinds` what changes between positions depend
     on, None of calibration items, `must` what has to be chosen. Candidates that are `done` have taken their time
-    already: they cost nothing any more, and the budget is for the rest.
+    already: they cost nothing any more, and the budget is for the rest. Of each of `at_least` one member has to be
+    chosen. The candidate `first` completes a position whose artefact still stands: it comes before all others.
     """
 
     budget: Budget
@@ -74,6 +75,8 @@ class Constraints:
     must: frozenset[int]
     at_most: tuple[AtMost, ...]
     done: frozenset[int] = frozenset()
+    at_least: tuple[tuple[int, ...], ...] = ()
+    first: int | None = None
 
     @property
     def count(self) -> int:
@@ -82,14 +85,17 @@ class Constraints:
     def spent(self, chosen: Collection[int]) -> Spent:
         """Cost of a selection, less what is done."""
         own = sorted(set(chosen) - self.done)
-        seconds = float(self.seconds[own].sum()) + changeover(self._kinds(own), self.changes)
+        seconds = float(self.seconds[own].sum()) + changeover(self._kinds(own), self.changes, self._first(own))
         return Spent(seconds, int(self.readings[own].sum()), int(self.positions[own].sum()))
 
     def _kinds(self, own: Iterable[int]) -> list[Kind]:
-        return [kind for k in own if (kind := self.kinds[k]) is not None]
+        return [kind for k in own if k != self.first and (kind := self.kinds[k]) is not None]
+
+    def _first(self, own: Collection[int]) -> Kind | None:
+        return None if self.first is None or self.first not in own else self.kinds[self.first]
 
     def allows(self, chosen: Collection[int]) -> bool:
-        """Whether a selection keeps to all limits."""
+        """Whether a selection keeps to all limits, or may be extended to one that has what is missing of `at_least`."""
         members = set(chosen)
         return (
             self.must <= members
@@ -113,11 +119,15 @@ class Constraints:
         if budget.seconds is not None:
             own = sorted(members - self.done)
             left = budget.seconds + SLACK - float(self.seconds[own].sum())
-            kinds = self._kinds(own)
+            kinds, first = self._kinds(own), self._first(own)
+            is_first = np.arange(self.count) == self.first
             for kind in dict.fromkeys(self.kinds):
-                within = left - changeover(kinds if kind is None else [*kinds, kind], self.changes)
+                within = left - changeover(kinds if kind is None else [*kinds, kind], self.changes, first)
                 too_long = np.array([other == kind for other in self.kinds]) & (self.seconds > within)
-                allowed &= ~too_long
+                allowed &= ~too_long | is_first
+            if self.first is not None and first is None:
+                within = left - changeover(kinds, self.changes, self.kinds[self.first])
+                allowed[self.first] &= bool(self.seconds[self.first] <= within)
         return np.flatnonzero(allowed)
 
     def linear(self) -> tuple[Any, Array, Array, Array]:
@@ -155,19 +165,24 @@ class Constraints:
             row[list(one.members)] = 1.0
             rows.append(row)
             limits.append(float(one.count))
+        for members in self.at_least:
+            row = np.zeros(size)
+            row[list(members)] = -1.0
+            rows.append(row)
+            limits.append(-1.0)
         matrix = csr_array(np.array(rows).reshape(len(rows), size))
         if timed:
             place = {group: n + i for i, group in enumerate(groups)}
-            members = [k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done]
-            group = [place[kind.artefact, kind.plane] for k in members if (kind := self.kinds[k]) is not None]
-            at = np.arange(len(members))
-            entries = np.concatenate([np.ones(len(members)), -np.ones(len(members))])
-            columns = np.concatenate([members, group])
-            linked = csr_array((entries, (np.concatenate([at, at]), columns)), shape=(len(members), size))
+            moved = [k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done]
+            group = [place[kind.artefact, kind.plane] for k in moved if (kind := self.kinds[k]) is not None]
+            at = np.arange(len(moved))
+            entries = np.concatenate([np.ones(len(moved)), -np.ones(len(moved))])
+            columns = np.concatenate([moved, group])
+            linked = csr_array((entries, (np.concatenate([at, at]), columns)), shape=(len(moved), size))
             from scipy.sparse import vstack
 
             matrix = vstack([matrix, linked], format="csr")
-            limits += [0.0] * len(members)
+            limits += [0.0] * len(moved)
         low = np.zeros(size)
         low[list(self.must)] = 1.0
         return matrix, np.array(limits), low, np.ones(size)
@@ -180,16 +195,21 @@ def constraints(
     must: Collection[int] = (),
     at_most: Sequence[AtMost] = (),
     done: Collection[int] = (),
+    at_least: Sequence[tuple[int, ...]] = (),
+    first: int | None = None,
 ) -> Constraints:
-    """Constraints of a pool's candidates."""
+    """Constraints of a pool's candidates; that to be read `first` completes a position, and counts as none itself."""
+    is_position = [isinstance(one.item, Position) and k != first for k, one in enumerate(candidates)]
     return Constraints(
         budget,
         np.array([one.seconds for one in candidates], float),
         np.array([one.readings for one in candidates], np.int64),
-        np.array([isinstance(one.item, Position) for one in candidates], np.int64),
+        np.array(is_position, np.int64),
         tuple(kind_of(one) if isinstance(one.item, Position) else None for one in candidates),
         changes,
         frozenset(must) | frozenset(done),
         tuple(at_most),
         frozenset(done),
+        tuple(at_least),
+        first,
     )

@@ -75,7 +75,8 @@ class Criterion:
     `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded` counts functions that
     the pool leaves open, whatever is chosen. `functions` are None of criteria that are about eigenvalues; these are of
     the model's parameters, `scaled` (n, z), in metres. `target` is the criterion at which the target accuracy is met on
-    the average, None where there is none.
+    the average, None where there is none. `needed` holds, for each artefact whose own distances count, its name and the
+    candidates that place it: without one of them the distances are undetermined, whatever certificates say of them.
     """
 
     name: CriterionName
@@ -84,6 +85,7 @@ class Criterion:
     scaled: Array
     excluded: int = 0
     target: float | None = None
+    needed: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     @property
     def largest(self) -> bool:
@@ -273,6 +275,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
     scaled = np.zeros((0, information.basis.size))
     functions: Functions | None = None
     about_balls, excluded = is_about_balls(name), 0
+    needed: list[tuple[str, tuple[int, ...]]] = []
     kind = name.partition("-")[0]
     if kind == "U6":
         displacement, touched = _of_points(information)
@@ -280,6 +283,11 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
     elif kind == "U5":
         parts = []
         for artefact in np.flatnonzero(drawn.design.is_plate):
+            plate = drawn.design.artefact_names[artefact]
+            placing = information.placing(plate)
+            if not placing:
+                continue
+            needed.append((plate, placing))
             own = np.flatnonzero(drawn.design.ball_artefact == artefact)
             n, d = drawn.design.balls[own].shape
             amounts = basis.balls[own].reshape(n * d, -1)
@@ -304,7 +312,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         scaled = _of_shared(information, STEP * units)
     if functions is not None and not functions.count:
         raise _impossible(experiment, f"{name} has nothing to make small: " + _nothing(kind, excluded))
-    return Criterion(name, about_balls, functions, scaled, excluded, _target(experiment, name, functions))
+    target = _target(experiment, name, functions)
+    return Criterion(name, about_balls, functions, scaled, excluded, target, tuple(needed))
 
 
 def _target(experiment: Experiment, name: str, functions: Functions | None) -> float | None:

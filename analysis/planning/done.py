@@ -1,90 +1,234 @@
-"""Positions that have been read already, as a file of readings tells."""
+"""Positions that have been read already, in full or in part, as a file of readings tells."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from simulator.design import Readings
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment, Position, ReadingGroup
 from simulator.experiment.pool import Candidate, with_chosen
 from simulator.experiment.tables import column_names, read_table
 from simulator.layout import lay_out
+from simulator.machines.protocol import Array
+from simulator.quantities import length_text
 from simulator.readings import AXES, read_readings
 from simulator.settings import hint
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
+AGAIN = re.compile(r"(.*) again(?: ([1-9][0-9]*))?", re.DOTALL)
 
-def done_candidates(path: Path, experiment: Experiment, candidates: Sequence[Candidate]) -> dict[int, Candidate]:
-    """Candidates that a file of readings has readings of, by index, each with the readings that were taken.
+# How often a ball is read with a probe, by ball and probe.
+Amounts = dict[tuple[int, str], int]
 
-    :raises ExperimentError: the file is wrong, names a position that is no candidate, or leaves balls of a plate
-    unread.
+
+@dataclass(frozen=True)
+class SetUp:
+    """Readings of one set-up of the candidate `base` of a pool.
+
+    `read` has the readings that were taken, `whole` those that were planned as well, and `rest` what is still missing,
+    None where nothing is. `is_last` marks the set-up that was read last.
     """
+
+    base: int
+    read: Candidate
+    whole: Candidate
+    rest: Candidate | None
+    is_last: bool
+
+    @property
+    def name(self) -> str:
+        return self.read.name
+
+
+def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
+    """Set-ups of a pool's candidates that a file of readings has readings of, in its order.
+
+    A position may have been set up more than once: "low again" is another set-up of the candidate "low".
+
+    :raises ExperimentError: the file is wrong, or names a position that is no candidate.
+    """
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
     places = {c.name: k for k, c in enumerate(candidates) if isinstance(c.item, Position)}
     texts = ["position", "ball", "probe"] if "probe" in column_names(path) else ["position", "ball"]
     messages: dict[str, Message] = {}
     found: dict[str, int] = {}
+    name = ""
     for row in read_table(path, texts, AXES[: experiment.dimension], ["u"]):
         name = row.texts[0]
-        if name in places:
-            found[name] = places[name]
+        base = _base(name, places)
+        if base is not None:
+            found[name] = base
         elif name not in messages:
             text = f'no position "{name}" in the file or its pool; {hint(name, places)}'
             messages[name] = row.mark.message("", text)
     if messages:
         raise ExperimentError(list(messages.values()))
-    read = [candidates[k] for k in found.values()]
-    design = read_readings(path, lay_out(with_chosen(experiment, read))).design
-    result = {}
-    for number, (candidate, k) in enumerate(zip(read, found.values(), strict=True)):
-        item = candidate.item
-        assert isinstance(item, Position)
-        own = design.readings.select(np.flatnonzero(design.readings.position == number))
-        layout = experiment.layouts[item.artefact]
-        groups: dict[tuple[str, tuple[float, ...] | None], dict[int, int]] = {}
+    drawn = [renamed(candidates[base], own) for own, base in found.items()]
+    design = read_readings(path, lay_out(with_chosen(experiment, drawn)), every_ball=False).design
+    result = []
+    for number, (candidate, base) in enumerate(zip(drawn, found.values(), strict=True)):
+        item = _position(candidate)
+        own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
         first = int(np.flatnonzero(design.ball_artefact == list(design.artefact_names).index(item.artefact))[0])
-        for i in range(len(own)):
-            uncertainty = None if own.uncertainty is None else tuple(own.uncertainty[i].tolist())
-            balls = groups.setdefault((design.probe_names[own.probe[i]], uncertainty), {})
-            ball = int(own.ball[i]) - first
-            balls[ball] = balls.get(ball, 0) + int(own.repeats[i])
-        same: dict[tuple[tuple[float, ...] | None, int, tuple[int, ...]], list[str]] = {}
-        for (probe, uncertainty), balls in groups.items():
-            for repeats in sorted(set(balls.values())):
-                read_so = tuple(sorted(ball for ball, count in balls.items() if count == repeats))
-                same.setdefault((uncertainty, repeats, read_so), []).append(probe)
-        readings = []
-        for (uncertainty, repeats, read_so), probes in same.items():
-            names = tuple(layout.names[ball] for ball in read_so)
-            stated = None if uncertainty is None else np.array(uncertainty)
-            readings.append(ReadingGroup(tuple(probes), names, np.array(read_so), repeats, stated))
-        settings = candidate.settings
-        if _amounts(readings) != _amounts(item.readings):
-            settings = _with_readings(settings, readings)
-        result[k] = replace(candidate, item=replace(item, readings=tuple(readings)), settings=settings)
-    return result
+        taken = tuple(_groups(own_readings, first, design.probe_names, experiment, item))
+        result.append(_set_up(experiment, candidate, base, taken, candidate.name == name))
+    return tuple(result)
 
 
-def _amounts(readings: Sequence[ReadingGroup]) -> dict[tuple[str, str], int]:
+def renamed(candidate: Candidate, name: str) -> Candidate:
+    """A position under another name."""
+    if candidate.name == name:
+        return candidate
+    settings = {**candidate.settings, "name": name}
+    return replace(candidate, name=name, item=replace(_position(candidate), name=name), settings=settings, drawn=False)
+
+
+def next_name(name: str, taken: Sequence[str]) -> str:
+    """The name of a further set-up of a position, which nothing else has.
+
+    >>> next_name("low", ["low"]), next_name("low", ["low", "low again"])
+    ('low again', 'low again 2')
+    """
+    found, k = f"{name} again", 1
+    while found in taken:
+        k += 1
+        found = f"{name} again {k}"
+    return found
+
+
+def _base(name: str, places: Mapping[str, int]) -> int | None:
+    """The candidate that a position's name stands for."""
+    return places.get(name, places.get(base_name(name)))
+
+
+def base_name(name: str) -> str:
+    """The name of a position that another set-up of it has, too.
+
+    >>> base_name("low again 2"), base_name("low")
+    ('low', 'low')
+    """
+    again = AGAIN.fullmatch(name)
+    return name if again is None else again[1]
+
+
+def _position(candidate: Candidate) -> Position:
+    assert isinstance(candidate.item, Position)
+    return candidate.item
+
+
+def _groups(
+    own: Readings, first: int, probes: Sequence[str], experiment: Experiment, item: Position
+) -> Iterator[ReadingGroup]:
+    """Readings as groups, of those of equal uncertainty and repeats; balls are counted from `first` on."""
+    names = experiment.layouts[item.artefact].names
+    by_probe: dict[tuple[str, tuple[float, ...] | None], dict[int, int]] = {}
+    for i in range(len(own)):
+        stated = None if own.uncertainty is None else tuple(own.uncertainty[i].tolist())
+        balls = by_probe.setdefault((probes[own.probe[i]], stated), {})
+        ball = int(own.ball[i]) - first
+        balls[ball] = balls.get(ball, 0) + int(own.repeats[i])
+    same: dict[tuple[tuple[float, ...] | None, int, tuple[int, ...]], list[str]] = {}
+    for (probe, stated), balls in by_probe.items():
+        for repeats in sorted(set(balls.values())):
+            read_so = tuple(sorted(ball for ball, count in balls.items() if count == repeats))
+            same.setdefault((stated, repeats, read_so), []).append(probe)
+    for (stated, repeats, read_so), with_probes in same.items():
+        uncertainty = None if stated is None else np.array(stated)
+        if stated == tuple(experiment.machine.repeatability.tolist()):
+            uncertainty = None
+        yield ReadingGroup(
+            tuple(with_probes), tuple(names[k] for k in read_so), np.array(read_so), repeats, uncertainty
+        )
+
+
+def _set_up(
+    experiment: Experiment, candidate: Candidate, base: int, taken: tuple[ReadingGroup, ...], is_last: bool
+) -> SetUp:
+    assert experiment.pool is not None
+    item = _position(candidate)
+    planned = item.readings
+    missing = tuple(_missing(planned, taken, experiment.layouts[item.artefact].names))
+    read = candidate if not missing and _same(taken, planned) else _with_readings(candidate, taken)
+    if not missing:
+        return SetUp(base, read, read, None, is_last)
+    whole = candidate if _same((*taken, *missing), planned) else _with_readings(candidate, (*taken, *missing))
+    rest = _with_readings(candidate, missing)
+    probes = {probe for group in missing for probe in group.probes}
+    seconds = rest.readings * candidate.reading_seconds + (len(probes) - 1) * experiment.pool.changes.probe
+    rest = replace(rest, name=f"rest of {candidate.name}", seconds=seconds, drawn=False)
+    return SetUp(base, read, whole, rest, is_last)
+
+
+def _missing(
+    planned: Sequence[ReadingGroup], taken: Sequence[ReadingGroup], names: Sequence[str]
+) -> Iterator[ReadingGroup]:
+    """What of the planned readings has not been taken, whatever their uncertainty; balls left alike make a group."""
+    left = _amounts(taken)
+    for group in planned:
+        alike: dict[tuple[int, tuple[int, ...]], list[str]] = {}
+        for probe in group.probes:
+            by_count: dict[int, list[int]] = {}
+            for ball in group.ball_indices.tolist():
+                done = min(left.get((ball, probe), 0), group.repeats)
+                if done:
+                    left[ball, probe] -= done
+                if done < group.repeats:
+                    by_count.setdefault(group.repeats - done, []).append(ball)
+            for count, balls in by_count.items():
+                alike.setdefault((count, tuple(balls)), []).append(probe)
+        for (count, chosen), probes in alike.items():
+            yield ReadingGroup(
+                tuple(probes), tuple(names[k] for k in chosen), np.array(chosen), count, group.standard_uncertainty
+            )
+
+
+def _amounts(readings: Sequence[ReadingGroup]) -> Amounts:
     """How often each ball is read with each probe."""
-    found: dict[tuple[str, str], int] = {}
+    found: Amounts = {}
     for group in readings:
-        for pair in product(group.probes, group.balls):
+        for pair in product(group.ball_indices.tolist(), group.probes):
             found[pair] = found.get(pair, 0) + group.repeats
     return found
 
 
-def _with_readings(settings: Mapping[str, Any], readings: Sequence[ReadingGroup]) -> dict[str, Any]:
-    """What a file says of a position, with these readings."""
-    said = {key: value for key, value in settings.items() if key not in GROUP}
-    common = {"standard_uncertainty": settings["standard_uncertainty"]} if "standard_uncertainty" in settings else {}
-    groups = [{"probes": list(one.probes), "balls": list(one.balls), "repeats": one.repeats} for one in readings]
-    return {**said, "readings": [group | common for group in groups]}
+def _same(one: Sequence[ReadingGroup], other: Sequence[ReadingGroup]) -> bool:
+    """Whether both read the same balls as often with the same probes and uncertainties."""
+
+    def by_uncertainty(groups: Sequence[ReadingGroup]) -> dict[tuple[float, ...] | None, Amounts]:
+        kinds: dict[tuple[float, ...] | None, list[ReadingGroup]] = {}
+        for group in groups:
+            stated = group.standard_uncertainty
+            kinds.setdefault(None if stated is None else tuple(stated.tolist()), []).append(group)
+        return {stated: _amounts(some) for stated, some in kinds.items()}
+
+    return by_uncertainty(one) == by_uncertainty(other)
+
+
+def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> Candidate:
+    """A position with these readings, and what a file says of it."""
+    said = {key: value for key, value in candidate.settings.items() if key not in GROUP}
+    groups = []
+    for one in readings:
+        group: dict[str, Any] = {"probes": list(one.probes), "balls": list(one.balls), "repeats": one.repeats}
+        if one.standard_uncertainty is not None:
+            group["standard_uncertainty"] = _exactly(one.standard_uncertainty)
+        groups.append(group)
+    item = replace(_position(candidate), readings=readings)
+    return replace(candidate, item=item, settings={**said, "readings": groups})
+
+
+def _exactly(lengths: Array) -> str | list[str]:
+    """Lengths (d,) as a file says them, one for all axes where they are the same."""
+    texts = [length_text(length) for length in lengths.tolist()]
+    return texts[0] if len(set(texts)) == 1 else texts

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import fields
 
 import numpy as np
 
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Calibration, Experiment, Position
-from simulator.experiment.pool import Candidate
 from simulator.settings import hint
 
+from .offer import Offer
 
-def earlier_choice(chosen: Experiment, candidates: Sequence[Candidate]) -> tuple[int, ...]:
+
+def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
     """Indices of the candidates that an experiment consists of: its positions by name, calibration items by content.
 
-    Items of calibration that are no candidates belong to the experiment in any case.
+    A position that was interrupted since stands for what completes it, or sets it up again, unless no more was to be
+    read of it than has been. Items of calibration that are no candidates belong to the experiment in any case.
 
     :raises ExperimentError: a position is no candidate.
     """
-    places = {one.name: k for k, one in enumerate(candidates) if isinstance(one.item, Position)}
+    candidates = offered.candidates
+    rests = {one.rest for one in offered.interrupted}
+    places = {one.name: k for k, one in enumerate(candidates) if isinstance(one.item, Position) and k not in rests}
     unknown = [position.name for position in chosen.positions if position.name not in places]
     if unknown:
         messages = [
@@ -36,12 +39,23 @@ def earlier_choice(chosen: Experiment, candidates: Sequence[Candidate]) -> tuple
             f'"{name}" stands elsewhere, or of another artefact, in the pool; give it another name' for name in moved
         ]
         raise ExperimentError([Message(str(chosen.source), 0, 0, "positions", text) for text in texts])
-    found = [places[position.name] for position in chosen.positions]
+    found = [_now(offered, places[position.name], position) for position in chosen.positions]
     for k, candidate in enumerate(candidates):
         item = candidate.item
         if not isinstance(item, Position) and any(_equal(item, other) for other in chosen.calibration):
             found.append(k)
-    return tuple(sorted(found))
+    return tuple(sorted(set(found)))
+
+
+def _now(offered: Offer, k: int, wanted: Position) -> int:
+    for one in offered.interrupted:
+        if one.part == k and _readings(wanted) > offered.candidates[k].readings:
+            return one.again if one.rest is None else one.rest
+    return k
+
+
+def _readings(position: Position) -> int:
+    return sum(len(group.probes) * len(group.balls) * group.repeats for group in position.readings)
 
 
 def _same_place(one: Position, other: object) -> bool:

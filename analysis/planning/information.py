@@ -9,7 +9,7 @@ lost where products of rows are formed; what the pool does not determine at all 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -73,6 +73,7 @@ class Information:
     `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z) what each adds.
     `deficiency` counts shared directions (c, deficiency), `open_` in micrometres, that even all candidates together
     leave undetermined. `frames` (candidates that calibrate co-ordinates) hold what each fixes of its plate's frame.
+    `pose_ranks` tells how many parameters of its own pose each candidate determines, were all else known.
     """
 
     drawn: Drawn
@@ -82,6 +83,7 @@ class Information:
     matrices: Array
     open_: Array
     frames: Frames
+    pose_ranks: tuple[int, ...] = ()
 
     @property
     def deficiency(self) -> int:
@@ -91,6 +93,10 @@ class Information:
     def shared(self) -> slice:
         """The last z, those of shared parameters."""
         return slice(self.basis.of_balls, self.basis.size)
+
+    def placing(self, artefact: str) -> tuple[int, ...]:
+        """Candidates that are positions of an artefact."""
+        return _placing(self.candidates, artefact)
 
     def of(self, chosen: Collection[int]) -> Array:
         """Information (z, z) of a selection; a frame that nothing fixes is held, which changes no distance."""
@@ -111,7 +117,7 @@ class Frames:
     `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the motions of the plates (m,
     motions), `base` the same for the experiment's own certificates. `rows` (motions, z) are the motions' rows.
     `artefacts` holds, for each artefact, which candidates place it and the information (z, z) that holds its balls or
-    its length.
+    its length; plates are not among them where balls themselves count.
     """
 
     fixed: dict[int, Array]
@@ -140,10 +146,18 @@ class Frames:
 
 
 @single_threaded
-def pool_information(experiment: Experiment, candidates: Sequence[Candidate], all_balls: bool = False) -> Information:
+def pool_information(
+    experiment: Experiment,
+    candidates: Sequence[Candidate],
+    all_balls: bool = False,
+    completed: Mapping[int, int] | None = None,
+) -> Information:
     """Information of every candidate of a pool.
 
-    With `all_balls` no combination of balls is left out, for criteria that are about balls.
+    A candidate that completes another, of which it has the readings as well, is given under `completed`: its
+    information is what it adds to that of the other, in the same pose.
+    With `all_balls` no combination of balls is left out, for criteria that are about balls, and no plate is held that a
+    selection does not place.
 
     :raises ExperimentError: no candidate is a position, the matrices are too large, or what cannot be planned is asked.
     """
@@ -168,22 +182,32 @@ def pool_information(experiment: Experiment, candidates: Sequence[Candidate], al
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in known])
-    of_positions = (_reduced(_in_amounts(rows, balls)) for rows in position_rows(drawn))
+    of_positions = position_rows(drawn)
     own: list[Array] = []
+    pose_ranks: list[int] = []
     for k in range(len(candidates)):
-        own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]) if k in items else next(of_positions))
+        if k in items:
+            own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
+            pose_ranks.append(0)
+            continue
+        rows = next(of_positions)
+        own.append(_reduced(_in_amounts(rows, balls)))
+        pose_ranks.append(_range(rows.by_pose).shape[1])
     basis, open_ = _basis(balls, drawn.shared, [base, *own])
 
     def in_basis(rows: Array) -> Array:
         return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
 
     matrices = np.zeros((len(candidates), basis.size, basis.size))
-    for k, rows in enumerate(own):
-        transformed = in_basis(rows)
+    for k, reduced in enumerate(own):
+        transformed = in_basis(reduced)
         matrices[k] = transformed.T @ transformed
+    for whole, part in (completed or {}).items():
+        matrices[whole] -= matrices[part]
     transformed = in_basis(base)
-    frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis))
-    return Information(drawn, tuple(candidates), basis, transformed.T @ transformed, matrices, open_, frames)
+    frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis, all_balls))
+    own_base = transformed.T @ transformed
+    return Information(drawn, tuple(candidates), basis, own_base, matrices, open_, frames, tuple(pose_ranks))
 
 
 def _in_amounts(rows: Rows, balls: Array) -> Array:
@@ -347,16 +371,26 @@ def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
     yield some
 
 
-def _unplaced(drawn: Drawn, candidates: Sequence[Candidate], basis: Basis) -> tuple[tuple[frozenset[int], Array], ...]:
+def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:
+    return tuple(
+        k for k, one in enumerate(candidates) if isinstance(one.item, Position) and one.item.artefact == artefact
+    )
+
+
+def _unplaced(
+    drawn: Drawn, candidates: Sequence[Candidate], basis: Basis, all_balls: bool
+) -> tuple[tuple[frozenset[int], Array], ...]:
     """For each artefact, which candidates place it, and what holds the parameters that are its own."""
     design, found = drawn.design, []
     n, d = design.balls.shape
     for number, name in enumerate(design.artefact_names):
-        placing = frozenset(
-            k for k, one in enumerate(candidates) if isinstance(one.item, Position) and one.item.artefact == name
-        )
+        if all_balls and design.is_plate[number] and _placing(candidates, name):
+            continue
+        placing = frozenset(_placing(candidates, name))
         own = np.flatnonzero(design.ball_artefact == number)
         by_ball = basis.balls[own].reshape(len(own) * d, -1)
+        # Of balls that no combination moves there is nothing to hold, and rounding must not be taken for it.
+        by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
         lengths = [k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name]
         by_length = np.eye(drawn.shared)[[drawn.layout.lengths.start - drawn.own.start + k for k in lengths]]
         rows = np.concatenate(

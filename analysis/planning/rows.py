@@ -128,8 +128,8 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
                 ball,
                 np.full(len(ball), -1),
                 STEP * blocks.by_ball[own].reshape(len(ball), d),
-                by_shared[own].reshape(len(ball), -1),
-                blocks.by_pose[own].reshape(len(ball), -1),
+                by_shared[own].reshape(len(ball), drawn.shared),
+                blocks.by_pose[own].reshape(len(ball), blocks.by_pose.shape[2]),
             )
         first = last
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,15 @@ from simulator.settings import listing
 
 from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of
 
-__all__ = ["Kind", "RunSheet", "Step", "changeover", "kind_of", "ordered", "run_sheet"]
+__all__ = ["Completion", "Kind", "RunSheet", "Step", "changeover", "kind_of", "ordered", "run_sheet"]
+
+
+@dataclass(frozen=True)
+class Completion:
+    """What is missing of a position whose artefact still stands, and the position with all its readings."""
+
+    rest: Candidate
+    whole: Candidate
 
 
 @dataclass(frozen=True)
@@ -21,7 +29,9 @@ class Step:
     """A position of a run sheet: what to set up, in words, and what to read, with the probes in order.
 
     `change` says what is changed before it, in `change_seconds`; `seconds` is what it takes by itself, and `start` when
-    its change-over begins, in seconds from the first position that is to be read. What is `done` has neither.
+    its change-over begins, in seconds from the first position that is to be read. What is `done` has neither. Of a
+    position that is completed, `whole` has all readings and `candidate` those still to be taken. One that was
+    interrupted and is not completed is `left` so.
     """
 
     candidate: Candidate
@@ -33,10 +43,12 @@ class Step:
     seconds: float
     start: float
     done: bool
+    whole: Candidate | None = None
+    left: bool = False
 
     @property
     def name(self) -> str:
-        return self.candidate.name
+        return (self.whole or self.candidate).name
 
     @property
     def artefact(self) -> str:
@@ -60,8 +72,12 @@ class RunSheet:
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
-        """All candidates, positions in the order of the sheet."""
-        return (*(step.candidate for step in self.steps), *self.calibration)
+        """All candidates, positions in the order of the sheet, those left interrupted after the others.
+
+        The first position holds the frame of its artefact, which one that was only begun may do badly.
+        """
+        steps = sorted(self.steps, key=lambda step: step.left)
+        return (*(step.whole or step.candidate for step in steps), *self.calibration)
 
     @property
     def seconds(self) -> float:
@@ -75,16 +91,25 @@ class RunSheet:
         return self.seconds / 3600.0
 
 
-def run_sheet(chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[Candidate] = ()) -> RunSheet:
+def run_sheet(
+    chosen: Sequence[Candidate],
+    changes: ChangeTimes,
+    done: Sequence[Candidate] = (),
+    completed: Completion | None = None,
+    interrupted: Collection[Candidate] = (),
+) -> RunSheet:
     """The run sheet of chosen candidates: the order that costs least, what is done already first and as it was.
 
     Candidates that are `done` may be among the chosen ones too. They take no time any more, and as before any first
-    position nothing is changed before the first that is left.
+    position nothing is changed before the first that is left. A position that is `completed` is that first one, as long
+    as its artefact stands; only its rest takes time. What else is `interrupted` stays as it is.
     """
-    before = [candidate for candidate in done if isinstance(candidate.item, Position)]
-    names = {candidate.name for candidate in before}
+    again = set() if completed is None else {completed.whole.name}
+    before = [one for one in done if isinstance(one.item, Position) and one.name not in again]
+    names = {candidate.name for candidate in before} | again
+    left = {one.name for one in interrupted} - again
     positions = [one for one in chosen if isinstance(one.item, Position) and one.name not in names]
-    sequence = ordered(positions, changes, before)
+    sequence = ordered(positions, changes, before, None if completed is None else completed.rest)
     steps: list[Step] = []
     elapsed = 0.0
     for k, (candidate, probes) in enumerate(sequence):
@@ -93,8 +118,14 @@ def run_sheet(chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[
         if k > len(before):
             change, words = _change(sequence[k - 1], sequence[k], changes)
         seconds = 0.0 if is_done else candidate.seconds
-        place, balls = _place(candidate), _balls(candidate)
-        steps.append(Step(candidate, place, probes, balls, words, change, seconds, elapsed, is_done))
+        place, balls, whole = _place(candidate), _balls(candidate), None
+        if completed is not None and candidate is completed.rest:
+            whole = completed.whole
+            place = f"as it stands: {place}"
+            balls = f"the rest, {candidate.readings} of {whole.readings} readings: {balls}"
+        is_left = is_done and candidate.name in left
+        balls += "; left so" if is_left else ""
+        steps.append(Step(candidate, place, probes, balls, words, change, seconds, elapsed, is_done, whole, is_left))
         elapsed += change + seconds
     return RunSheet(tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position)))
 
@@ -157,22 +188,33 @@ def _balls(candidate: Candidate) -> str:
 
 
 def ordered(
-    chosen: Sequence[Candidate], changes: ChangeTimes, done: Sequence[Candidate] = ()
+    chosen: Sequence[Candidate],
+    changes: ChangeTimes,
+    done: Sequence[Candidate] = (),
+    first: Candidate | None = None,
 ) -> tuple[tuple[Candidate, tuple[str, ...]], ...]:
     """Positions, those `done` first, in the order that costs least change-over, each with the order of its probes.
 
-    Positions of equal kind keep the order they are given in.
+    Positions of equal kind keep the order they are given in. Of those that are not done, one may have to be `first`.
     """
     own = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
-    _, visits = cheapest(Counter(map(kind_of, own)).items(), changes, kind_of(done[-1]) if done else None)
+    after = first if first is not None else done[-1] if done else None
+    order = cheapest(
+        Counter(map(kind_of, own)).items(),
+        changes,
+        None if after is None else kind_of(after),
+        is_paid=first is not None,
+    )
     found = [(one, probes_of(one.item)) for one in done if isinstance(one.item, Position)]
-    for visit in visits:
+    if first is not None:
+        found.append((first, _ending_with(first, order.before)))
+    for visit in order.visits:
         members = [candidate for candidate in own if kind_of(candidate) == visit.kind]
-        first = visit.first
+        begun = visit.first
         for k, candidate in enumerate(members):
-            last = visit.last if k == len(members) - 1 else _handed_on(visit, first, len(members) - k)
-            found.append((candidate, _sequence(candidate, first, last)))
-            first = last
+            last = visit.last if k == len(members) - 1 else _handed_on(visit, begun, len(members) - k)
+            found.append((candidate, _sequence(candidate, begun, last)))
+            begun = last
     return tuple(found)
 
 
@@ -182,6 +224,13 @@ def _handed_on(visit: Visit, first: str, left: int) -> str:
     # The last position must not begin with the probe that it is to end with.
     suited = [probe for probe in others if probe != visit.last] if left == 2 else others
     return (suited or others)[0]
+
+
+def _ending_with(candidate: Candidate, last: str | None) -> tuple[str, ...]:
+    """The probes of a position, the last one last."""
+    assert isinstance(candidate.item, Position)
+    probes = probes_of(candidate.item)
+    return probes if last is None else (*(probe for probe in probes if probe != last), last)
 
 
 def _sequence(candidate: Candidate, first: str, last: str) -> tuple[str, ...]:

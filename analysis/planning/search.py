@@ -9,7 +9,7 @@ that do best by the tangent of the criterion at the present selection.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -52,6 +52,18 @@ class Problem:
     criterion: Criterion
     constraints: Constraints
 
+    @property
+    def limits(self) -> Constraints:
+        """The constraints with what the criterion needs of every choice."""
+        needed = tuple(placing for _, placing in self.criterion.needed)
+        return replace(self.constraints, at_least=(*self.constraints.at_least, *needed))
+
+    def lacking(self, chosen: Collection[int]) -> list[tuple[int, ...]]:
+        """Sets of candidates of which one has to be chosen, and none is."""
+        members = frozenset(chosen)
+        needed = [placing for _, placing in self.criterion.needed]
+        return [one for one in (*self.constraints.at_least, *needed) if members.isdisjoint(one)]
+
 
 @dataclass(frozen=True)
 class Found:
@@ -81,7 +93,9 @@ def counted_root(problem: Problem, root: Array) -> Array:
 
 
 def value(problem: Problem, chosen: Collection[int]) -> float:
-    """Criterion of a selection, infinite if it leaves something undetermined."""
+    """Criterion of a selection, infinite if it leaves something undetermined, or lacks what every choice needs."""
+    if problem.lacking(chosen):
+        return np.inf
     root = full_root(problem.information.of(chosen))
     return np.inf if root is None else problem.criterion.value(counted_root(problem, root))
 
@@ -117,7 +131,7 @@ class Losses:
         if found is None:
             information = self._problem.information.of(members)
             factor = np.asarray(np.linalg.cholesky(information + RIDGE * np.eye(len(information))), float)
-            found = float(_deficient(factor))
+            found = float(_deficient(factor)) + LARGE * 2 * len(self._problem.lacking(members))
             if found == 0.0:
                 found = self._problem.criterion.value(_inverse(_counted(self._problem, factor)).T)
             self._known[members] = found
@@ -169,6 +183,11 @@ def best_addition(
     None if none may be added. With `per_second` the gain is divided by what a candidate takes.
     """
     added = problem.constraints.additions(members)
+    lacking = problem.lacking(members)
+    if lacking:
+        # What every choice needs comes first, as long as there is room for it.
+        wanted = added[np.isin(added, [k for one in lacking for k in one])]
+        added = wanted if len(wanted) else added
     if not len(added):
         return None
     seconds = np.maximum(problem.constraints.seconds, 1.0)

@@ -9,6 +9,7 @@ from ..tables import aligned, finite, number, plan_data, plan_lines
 from .campaign import Campaign, CurvePoint, Gain
 from .constraints import HOUR, Budget, Spent
 from .criteria import DESCRIPTIONS
+from .done import base_name
 from .schedule import RunSheet
 from .sheet_forms import sheet_data, sheet_lines
 
@@ -33,11 +34,31 @@ def campaign_lines(found: Campaign, sheet: RunSheet) -> list[str]:
         lines.append(f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}")
     if found.excluded:
         lines.append(f"left out of {found.criterion}: {found.excluded} that no choice from this pool determines")
+    lines += _interrupted(found)
     if found.gains:
         lines += ["", *_gain_table(found)]
     if found.curve:
         lines += ["", *_curve_table(found)]
     return [*lines, "", *plan_lines(found.plan)[1:], "", *sheet_lines(sheet)]
+
+
+def _interrupted(found: Campaign) -> list[str]:
+    """What becomes of positions that were read in part."""
+    names = {one.name for one in found.chosen}
+    lines = []
+    for one in found.interrupted:
+        text = f"{one.name} was interrupted after {one.readings} reading{'' if one.readings == 1 else 's'}"
+        if found.completed is not None and found.completed.whole.name == one.name:
+            text += f"; {found.completed.rest.readings} more complete it"
+        elif again := [name for name in names if name != one.name and base_name(name) == base_name(one.name)]:
+            text += f'; it is set up again as "{again[0]}"'
+        else:
+            text += "; it is left so"
+        lines.append(text)
+    if found.open_poses:
+        count = "one direction" if found.open_poses == 1 else f"{found.open_poses} directions"
+        lines.append(f"too little was read there to determine {count} of where it stood; nothing else depends on that")
+    return lines
 
 
 def _dropped(found: Campaign) -> str:
@@ -113,6 +134,9 @@ def campaign_data(found: Campaign, sheet: RunSheet) -> dict[str, Any]:
         "spent": _spent_data(found.spent),
         "chosen": [candidate.name for candidate in found.chosen],
         "done": [candidate.name for candidate in found.done],
+        "interrupted": [{"name": one.name, "readings": one.readings} for one in found.interrupted],
+        "completed": None if found.completed is None else found.completed.whole.name,
+        "open_poses": found.open_poses,
         "gains": [_gain_data(gain) for gain in found.gains],
         "left_out": [_gain_data(gain) for gain in found.left_out],
         "curve": [_point_data(point) for point in found.curve],

@@ -21,8 +21,8 @@ from .goals import Goal, Judgement, check_goal, judge
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
 
-# Numbers of balls up to which every one is tried, and the step beyond; values of a size that are tried first, and
-# about the best of them if none does.
+# Columns of balls up to which every number is tried, and the ratio beyond; values of a size that are tried first,
+# and about the best of them if none does.
 EVERY, RATIO, SIZES, REFINED = 12, 1.25, 16, 12
 # Change of the goal's figure from ten times the extreme to it, up to which it is as good as exact.
 CONVERGED = 1e-3
@@ -259,6 +259,9 @@ def _scanned(trials: _Trials) -> Answer:
     """The smallest value that does, where larger ones need not be better."""
     one = trials.one
     probes = _probes(trials)
+    if one.name == "balls":
+        # More balls than do cost time, and need not be looked at.
+        probes = probes[: _first_met(trials, probes, len(probes) - 1) + 1]
     usable = [step for step in probes if not trials.at(step).refusal]
     if not usable:
         refusal = trials.at(one.drawn).refusal or trials.at(probes[0]).refusal
@@ -276,8 +279,8 @@ def _scanned(trials: _Trials) -> Answer:
         ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
         probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
         usable = [step for step in probes if not trials.at(step).refusal]
-    good = next((k for k, step in enumerate(probes) if trials.at(step).is_met), None)
-    if good is None:
+    good = _first_met(trials, probes, -1)
+    if good < 0:
         if one.name == "balls":
             remarks.append(f"more than {one.words(one.last)} were not looked at")
         best = min(usable, key=trials.distance)
@@ -295,13 +298,20 @@ def _scanned(trials: _Trials) -> Answer:
     return _found(trials, probes[good], probes[good - 1], remarks)
 
 
+def _first_met(trials: _Trials, probes: list[int], otherwise: int) -> int:
+    """Place of the first value with which the goal is met."""
+    return next((k for k, step in enumerate(probes) if trials.at(step).is_met), otherwise)
+
+
 def _probes(trials: _Trials) -> list[int]:
     """Values that are tried first, in order, within the range in which the file is right."""
     one = trials.one
     if one.name == "balls":
-        found = list(range(one.first, min(EVERY, one.last) + 1))
+        every = range(one.first, one.last + 1)
+        found = [step for step in every if one.value(step) <= max(EVERY, one.value(one.first))]
         while found[-1] < one.last:
-            found.append(min(int(RATIO * found[-1]), one.last))
+            least = RATIO * one.value(found[-1])
+            found.append(next((step for step in every[found[-1] + 1 :] if one.value(step) >= least), one.last))
         return found
     if not trials.is_right(one.drawn):
         return []

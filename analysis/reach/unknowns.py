@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from itertools import product
 from typing import Literal
 
 from simulator.experiment.model import Experiment
@@ -216,26 +217,38 @@ def _of_plate(name: UnknownName, experiment: Experiment, root: Node, artefact: s
 
 
 def _balls(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknown:
-    """Balls per side of a plate of the same size; rows in proportion to columns."""
-    mark = root.mark
-
-    def sides(step: int) -> list[int]:
-        if isinstance(plate, SquareSettings):
-            return [step]
-        columns, rows = plate.balls
-        return [step, max(2, round(step * rows / columns))]
+    """Balls of a plate of the same size, in the order of their number."""
+    mark, present = root.mark, plate.balls
+    every: list[tuple[int, ...]]
+    if isinstance(present, int):
+        every = [(side,) for side in range(2, max(MOST_BALLS, present) + 1)]
+    else:
+        every = list(_grids(*present))
 
     def tree(step: int) -> Node:
-        scalars = tuple(Scalar(mark, count) for count in sides(step))
-        node = scalars[0] if isinstance(plate, SquareSettings) else Sequence(mark, scalars)
+        scalars = tuple(Scalar(mark, count) for count in every[step])
+        node = scalars[0] if isinstance(present, int) else Sequence(mark, scalars)
         return override(root, path, node, mark)
 
     def words(step: int) -> str:
-        return " x ".join(map(str, sides(step))) if isinstance(plate, GridSettings) else f"{step} a side"
+        return f"{every[step][0]} a side" if isinstance(present, int) else " x ".join(map(str, every[step]))
 
-    present = plate.balls if isinstance(plate, SquareSettings) else plate.balls[0]
-    most = max(MOST_BALLS, present)
-    return Unknown("balls", "balls of the plate", words(present), present, 2, most, True, False, tree, words, int)
+    def value(step: int) -> float:
+        return every[step][0]
+
+    drawn = every.index((present,) if isinstance(present, int) else present)
+    last = len(every) - 1
+    return Unknown("balls", "balls of the plate", words(drawn), drawn, 0, last, True, False, tree, words, value)
+
+
+def _grids(columns: int, rows: int) -> Iterator[tuple[int, int]]:
+    """Columns and rows with which one side is within a ball of being in proportion to the other, by their number.
+
+    Of as many balls, those nearest to the proportion come first.
+    """
+    sides = range(2, max(MOST_BALLS, columns, rows) + 1)
+    near = [(n, m) for n, m in product(sides, sides) if abs(m * columns - n * rows) <= max(columns, rows)]
+    yield from sorted(near, key=lambda grid: (grid[0] * grid[1], abs(grid[1] * columns - grid[0] * rows), -grid[0]))
 
 
 def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknown:

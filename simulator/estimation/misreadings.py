@@ -25,6 +25,8 @@ from .consensus import consensus_motion, distances
 from .initial import initial_state
 
 AGAINST_DRAWING = 0.3
+# Extent across a line, as a fraction of that along it, below which balls are in one line.
+FLAT = 1e-6
 AGAINST_READINGS = 0.02
 TIMES_USUAL = 10.0
 TIMES_OFFSET = 6.0
@@ -135,11 +137,17 @@ def _against_drawing(design: Design, seen: Array, pitch: Array) -> tuple[_Motion
         count = int(agreeing[rows].sum())
         if 2 * count <= len(rows):
             wrong.append(WrongPosition(int(k), "", count, len(rows)))
-        elif design.is_plate[design.position_artefact[k]]:
+        elif design.is_plate[design.position_artefact[k]] and not _in_line(nominal):
             turned = _turned_onto_itself(design, int(k), rotations[k], pitch)
             if turned:
                 wrong.append(WrongPosition(int(k), turned, count, len(rows)))
     return _Motions(rotations, origins, agreeing), wrong
+
+
+def _in_line(places: Array) -> bool:
+    """Whether places (m, d) lie in one line in space, about which any turn fits."""
+    extent = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    return places.shape[1] == 3 and bool(extent[1] < FLAT * extent[0])
 
 
 def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: Array) -> str:

@@ -24,7 +24,7 @@ class Candidate:
     `seconds` is what it takes by itself: set-up, readings and changes of probe within it, or the price of a
     calibration item. `plane` names the axis that the artefact stands across, empty where the pose is free and for a
     calibration item. `group` is the entry of the pool that it comes from, empty for positions that are `drawn`, in the
-    experiment's own list. `settings` is what an experiment file says of it.
+    experiment's own list. `settings` is what an experiment file says of it. `reading_seconds` is what a reading takes.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Candidate:
     group: str
     drawn: bool
     settings: Mapping[str, Any]
+    reading_seconds: float = 0.0
 
     @property
     def readings(self) -> int:

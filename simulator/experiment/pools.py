@@ -215,7 +215,7 @@ def _candidate(
     seconds = set_up + readings * reading + (len(probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
     across = "" if plane is None or references.dimension == 2 else plane
     stated = {key: value for key, value in stated.items() if key != "times"}
-    return Candidate(position.name, position, seconds, across, group, drawn, stated)
+    return Candidate(position.name, position, seconds, across, group, drawn, stated, reading)
 
 
 def _or(value: float | None, default: float) -> float:

@@ -14,6 +14,7 @@ from analysis.planning.campaign import Request, campaign
 from analysis.planning.constraints import HOUR, Budget
 from analysis.planning.done import done_candidates
 from analysis.planning.earlier import earlier_choice
+from analysis.planning.offer import offer
 from analysis.study import plan
 from simulator.experiment.load import load
 from simulator.experiment.messages import ExperimentError
@@ -85,13 +86,13 @@ def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
 def test_an_interrupted_campaign_never_does_worse_than_its_remainder(drawn: Path, read: int) -> None:
     experiment = first(drawn)
     assert experiment.pool is not None
-    done = done_candidates(readings_of(drawn, read), experiment, experiment.pool.candidates)
+    done = done_candidates(readings_of(drawn, read), experiment)
     assert len(done) == read
-    found = campaign(experiment, Request("U6"), done)
+    found = campaign(experiment, Request("U6"), offer(experiment.pool, done))
     reference = plan(load(drawn)[0])
     assert found.value <= reference.quantities["U6"].average * (1 + 1e-12)
     names = [candidate.name for candidate in found.chosen]
-    assert {candidate.name for candidate in done.values()} <= set(names)
+    assert {one.name for one in done} <= set(names)
     assert found.spent.positions <= 6 - read
     # The rest of the budget is what the remaining positions take.
     assert found.drawn_spent is not None and found.drawn_spent.positions == 6 - read
@@ -103,9 +104,9 @@ def test_what_was_read_in_part_counts_as_it_was_read(drawn: Path) -> None:
     path = readings_of(drawn, 3)
     lines = path.read_text().splitlines()
     path.write_text("\n".join(lines[:-7]) + "\n")
-    done = done_candidates(path, experiment, experiment.pool.candidates)
-    assert sum(candidate.readings for candidate in done.values()) == len(lines) - 1 - 7
-    partly = campaign(experiment, Request("U6"), done)
+    done = done_candidates(path, experiment)
+    assert sum(one.read.readings for one in done) == len(lines) - 1 - 7
+    partly = campaign(experiment, Request("U6"), offer(experiment.pool, done))
     full = plan(with_chosen(experiment, partly.chosen))
     assert partly.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
 
@@ -116,7 +117,7 @@ def test_readings_of_a_position_that_is_no_candidate_are_refused(drawn: Path, tm
     path = tmp_path / "other.csv"
     path.write_text("position,ball,probe,x_mm,y_mm,z_mm\nlo,r1c1,down,1,2,3\nlo,r1c2,down,1,2,3\n")
     with pytest.raises(ExperimentError, match='other.csv:2:1: no position "lo".*did you mean "low"'):
-        done_candidates(path, experiment, experiment.pool.candidates)
+        done_candidates(path, experiment)
 
 
 def test_an_earlier_choice_is_found_again_and_gone_on_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -126,7 +127,7 @@ def test_an_earlier_choice_is_found_again_and_gone_on_from(tmp_path: Path, capsy
     before = json.loads(capsys.readouterr().out)
     experiment = first(path)
     assert experiment.pool is not None
-    names = [experiment.pool.candidates[k].name for k in earlier_choice(load(chosen)[0], experiment.pool.candidates)]
+    names = [experiment.pool.candidates[k].name for k in earlier_choice(load(chosen)[0], offer(experiment.pool))]
     assert names == before["chosen"]
     # Three positions are read as planned; the rest is planned anew, at the cost of what was left.
     some = readings_of(chosen, 3)

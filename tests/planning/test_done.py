@@ -5,13 +5,12 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from analysis.planning.done import done_candidates
+from analysis.planning.done import SetUp, done_candidates
 from analysis.planning.experiment_file import experiment_text
 from analysis.planning.schedule import run_sheet
 from simulator.design import nominal_state
 from simulator.experiment.load import load
 from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate
 from simulator.generate import exact_readings
 from simulator.layout import lay_out
 from simulator.readings import write_readings
@@ -19,7 +18,7 @@ from simulator.readings import write_readings
 CAMPAIGN = Path("designs/planning/campaign.yaml")
 
 
-def read_of(folder: Path, kept: dict[str, int]) -> tuple[Experiment, dict[int, Candidate]]:
+def read_of(folder: Path, kept: dict[str, int]) -> tuple[Experiment, tuple[SetUp, ...]]:
     """The campaign, and what is done when of its drawn positions only so many readings have been taken."""
     design = lay_out(load(CAMPAIGN)[0])
     stream = io.StringIO()
@@ -30,22 +29,24 @@ def read_of(folder: Path, kept: dict[str, int]) -> tuple[Experiment, dict[int, C
     path.write_text("\n".join([head, *chosen]) + "\n", encoding="utf-8")
     (experiment,) = load(CAMPAIGN, planning=True)
     assert experiment.pool is not None
-    return experiment, done_candidates(path, experiment, experiment.pool.candidates)
+    return experiment, done_candidates(path, experiment)
 
 
 def test_what_was_read_as_planned_is_told_as_planned(tmp_path: Path) -> None:
     experiment, done = read_of(tmp_path, {"flat low": 25, "upright": 50})
-    assert experiment.pool is not None and sorted(done) == [0, 1]
-    for k, one in done.items():
-        assert one.settings is experiment.pool.candidates[k].settings
-    sheet = run_sheet(list(done.values()), experiment.pool.changes, done=list(done.values()))
+    assert experiment.pool is not None and [one.base for one in done] == [0, 1]
+    for one in done:
+        assert one.read.settings is experiment.pool.candidates[one.base].settings and one.rest is None
+    read = [one.read for one in done]
+    sheet = run_sheet(read, experiment.pool.changes, done=read)
     assert [step.balls for step in sheet.steps] == ["all 25", "all 25"]
 
 
 def test_a_position_read_in_part_is_told_and_written_with_its_balls(tmp_path: Path) -> None:
     experiment, done = read_of(tmp_path, {"flat low": 3, "upright": 50})
     assert experiment.pool is not None
-    sheet = run_sheet(list(done.values()), experiment.pool.changes, done=list(done.values()))
+    read = [one.read for one in done]
+    sheet = run_sheet(read, experiment.pool.changes, done=read)
     assert sheet.steps[0].balls == "r1c1, r1c2, r1c3"
     path = tmp_path / "chosen.yaml"
     path.write_text(experiment_text(experiment, sheet.chosen, "", tmp_path), encoding="utf-8")

@@ -113,8 +113,8 @@ def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
     began = process_time()
     assert changeover(many, CHANGES) == 5 * CHANGES.plane
     assert process_time() - began < 10.0
-    total, visits = cheapest([(kind, 1) for kind in many], CHANGES)
-    assert total == 5 * CHANGES.plane and {visit.kind for visit in visits} == set(many)
+    order = cheapest([(kind, 1) for kind in many], CHANGES)
+    assert order.seconds == 5 * CHANGES.plane and {visit.kind for visit in order.visits} == set(many)
 
 
 def test_six_kinds_take_a_moment() -> None:
