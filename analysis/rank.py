@@ -15,7 +15,7 @@ from simulator.estimation.covariance import Covariance, Spectrum
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array, HasLines
-from simulator.quantities import LengthFunction
+from simulator.quantities import Target
 
 from .bar_directions import reasons
 
@@ -140,7 +140,7 @@ def verdict(
     found: Spectrum,
     spread: Covariance,
     expected: int | None = None,
-    target: LengthFunction | None = None,
+    target: Target | None = None,
 ) -> Verdict:
     """Judge a design from its spectrum; `spread` supplies how the balls follow the undetermined directions."""
     columns, effect = _weak_columns(design, layout, found, target)
@@ -178,14 +178,14 @@ def independent_mixture(spread: Covariance) -> Array:
 
 
 def weak_directions(
-    design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
+    design: Design, layout: SharedLayout, found: Spectrum, target: Target | None
 ) -> tuple[Direction, ...]:
     """Determined directions whose standard deviation spoils the error map, weakest first."""
     return _weak_directions(design, layout, found, *_weak_columns(design, layout, found, target))
 
 
 def _weak_columns(
-    design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
+    design: Design, layout: SharedLayout, found: Spectrum, target: Target | None
 ) -> tuple[Integers, Array]:
     """Columns of the root that are weak, weakest first, and what one standard deviation along each of all adds."""
     effect = effects(design, layout, found)
@@ -206,7 +206,7 @@ def effects(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
     return np.asarray(np.sqrt(2.0 * (change**2).mean(axis=(0, 1))))
 
 
-def weak_limit(design: Design, target: LengthFunction | None) -> float:
+def weak_limit(design: Design, target: Target | None) -> float:
     """The effect, in metres, beyond which a direction is weak."""
     if target is None:
         return WEAK * float(design.repeatability.max())

@@ -47,6 +47,24 @@ def number(value: float, digits: int = 4) -> str:
     return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
 
 
+def percent(share: float) -> str:
+    """A share in words, never rounded up.
+
+    >>> percent(0.99999), percent(0.125)
+    ('99.99 %', '12.5 %')
+    """
+    return f"{math.floor(1e4 * share + 1e-9) / 100:g} %"
+
+
+def uncertainty_words(coverage_factor: float) -> str:
+    """The uncertainty that a target is compared with.
+
+    >>> uncertainty_words(1.0), uncertainty_words(2.0)
+    ('standard uncertainty u', 'expanded uncertainty U = 2 u')
+    """
+    return "standard uncertainty u" if coverage_factor == 1.0 else f"expanded uncertainty U = {coverage_factor:g} u"
+
+
 def to_uncertainty(value: float, uncertainty: float) -> str:
     """A value to the third digit of its standard uncertainty.
 
@@ -96,14 +114,15 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
     lines = aligned(rows, [False, False, True, True, False, False, False])
     for quantity in quantities.values():
         if quantity.within_target is not None:
-            share = number(100 * quantity.within_target)
-            lines.append(f"within the target accuracy (one standard uncertainty): {share} % of {quantity.symbol}")
+            by = uncertainty_words(quantity.coverage_factor)
+            lines.append(f"within the target accuracy ({by}): {percent(quantity.within_target)} of {quantity.symbol}")
     return lines
 
 
 def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
     """Measuring tasks as lines of text."""
-    rows = [["task", "length, mm", "standard uncertainty, um", "expanded (k = 2), um", "target, um", "within target"]]
+    expanded = f"expanded (k = {tasks[0].expansion:g}), um"
+    rows = [["task", "length, mm", "standard uncertainty, um", expanded, "target, um", "within target"]]
     for task in tasks:
         rows.append(
             [
@@ -115,7 +134,8 @@ def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
             ]
         )
     with_target = any(task.target is not None for task in tasks)
-    note = ["(the target is compared with the standard uncertainty)"] if with_target else []
+    by = next((uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), "")
+    note = [f"(the target is compared with the {by})"] if with_target else []
     return [*aligned(rows, [False, True, True, True, True, False]), *note]
 
 
@@ -132,7 +152,9 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
             "length": task.length,
             "standard_uncertainty": finite(task.standard_uncertainty),
             "expanded_uncertainty": finite(task.expanded_uncertainty),
+            "coverage_factor": task.expansion,
             "target": task.target,
+            **({} if task.target is None else {"target_coverage_factor": task.coverage_factor}),
             "within_target": task.is_within,
             "unit": "m",
         }
@@ -360,7 +382,11 @@ def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
             "count": q.count,
             "undetermined": q.undetermined,
             "largest_at": q.largest,
-            **({} if q.within_target is None else {"within_target": q.within_target}),
+            **(
+                {}
+                if q.within_target is None
+                else {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
+            ),
             "description": q.description,
         }
         for symbol, q in quantities.items()

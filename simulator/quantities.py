@@ -410,7 +410,7 @@ def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False
         told = constant.strip() if at_zero else "0 um"
         by = float(1000 * slope)
         grows = f"{by:.4g} mm" if by < 1e6 else f"{by / 1000:.4g} m"
-        if not in_metres:
+        if not in_metres or slope / 1000 >= STEEPEST:
             raise QuantityError(f'"{text}" grows by {grows} per metre of length; give less than 100 um/m')
         raise QuantityError(
             f'"{text}" grows by {grows} per metre of length, since L is in metres; where L is in millimetres and the '
