@@ -118,15 +118,11 @@ def uncertainties(
         result["U5"] = _of_pairs("U5", pairs, sigma, lambda i: f"ball {design.ball_label(i)}")
 
     if len(design.points):
-        # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
-        limit = None if target is None else Target(target.standard, sigma).standard
-        of_points, points = point_pairs(design, layout, state, found, limit)
+        of_points, lengths = _of_points(design, layout, state, found, sigma, target)
         point_names = [f"point {i + 1} {axis}" for i in range(len(design.points)) for axis in axes]
         add("U4", of_points.ravel(), "m", point_names)
-        if points.count:
-            share = None if target is None else points.within / points.count
-            of_pairs = _of_pairs("U6", points, sigma, lambda i: f"point {i + 1}", share)
-            result["U6"] = of_pairs if target is None else replace(of_pairs, coverage_factor=target.coverage_factor)
+        if lengths is not None:
+            result["U6"] = lengths
     tasks = task_uncertainties(design, layout, state, found, sigma)
     if tasks:
         values = np.array([task.standard_uncertainty for task in tasks])
@@ -134,6 +130,28 @@ def uncertainties(
         result["tasks"] = replace(quantity, within_target=share_within(tasks), coverage_factor=tasks[0].coverage_factor)
     order = list(DESCRIPTIONS)
     return dict(sorted(result.items(), key=lambda item: order.index(item[0])))
+
+
+@single_threaded
+def length_uncertainties(
+    design: Design, layout: SharedLayout, state: State, found: Covariance, target: Target | None = None
+) -> Quantity | None:
+    """U6 alone, as `uncertainties` has it; None where there are no two evaluation points."""
+    return _of_points(design, layout, state, found, 1.0, target)[1] if len(design.points) else None
+
+
+def _of_points(
+    design: Design, layout: SharedLayout, state: State, found: Covariance, sigma: float, target: Target | None
+) -> tuple[Array, Quantity | None]:
+    """U4 (points, d), not multiplied by sigma, and U6."""
+    # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
+    limit = None if target is None else Target(target.standard, sigma).standard
+    of_points, pairs = point_pairs(design, layout, state, found, limit)
+    if not pairs.count:
+        return of_points, None
+    share = None if target is None else pairs.within / pairs.count
+    lengths = _of_pairs("U6", pairs, sigma, lambda i: f"point {i + 1}", share)
+    return of_points, lengths if target is None else replace(lengths, coverage_factor=target.coverage_factor)
 
 
 def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> Quantity:
