@@ -23,6 +23,7 @@ from simulator.machines.protocol import Array
 from simulator.settings import listing
 
 from .corrections import correction_rows
+from .pairs import PairSummary
 from .uncertainty import point_pairs
 
 # The standard uncertainty of offsets for which a design that rests on them is told what becomes of it.
@@ -67,13 +68,15 @@ class Scale:
 
     Scale is the mean relative change of the distances between corrected points, weighted by their squares.
     `rests_on_offsets`: whether, but for probe offsets that are held exact, it would be undetermined or at least
-    three times as uncertain; `loosened` then tells what becomes of U6.
+    three times as uncertain; `loosened` then tells what becomes of U6. Without `has_scale` the error model cannot
+    stretch the volume, so that the scale is that of the machine.
     """
 
     uncertainty: float
     carriers: tuple[Carrier, ...]
     rests_on_offsets: bool = False
     loosened: Loosened | None = None
+    has_scale: bool = True
 
 
 def scale_of(
@@ -84,8 +87,8 @@ def scale_of(
     uncertainty = float(spread.of_shared(row[None])[0])
     if np.isnan(uncertainty):
         return None
-    if not has_scale(design, state):
-        return Scale(uncertainty, (Carrier("the machine's own scales, which the error model does not change", np.inf),))
+    if not can_stretch(design, state):
+        return Scale(uncertainty, (), has_scale=False)
     groups = list(_groups(experiment))
     if not groups:
         return None
@@ -101,7 +104,7 @@ def scale_of(
     return Scale(uncertainty, tuple(carriers), rests, loosened)
 
 
-EXACT_OFFSETS = "the probe offsets, held exact"
+EXACT_OFFSETS = "the exact probe offsets"
 
 
 def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
@@ -156,7 +159,7 @@ def scale_row(design: Design, layout: SharedLayout, state: State) -> Array:
     return np.asarray(np.einsum("nd,nds->s", centred, rows) / (centred**2).sum())
 
 
-def has_scale(design: Design, state: State) -> bool:
+def can_stretch(design: Design, state: State) -> bool:
     """Whether the error model can stretch the volume by the same ratio along all axes."""
     points = _points(design)
     offsets = np.broadcast_to(probe_offsets(design, state)[design.point_probe], points.shape)
@@ -192,10 +195,17 @@ def _loosened(
     experiment: Experiment, design: Design, layout: SharedLayout, state: State, spread: Covariance
 ) -> Loosened | None:
     """What becomes of U6 once the exact offsets have an uncertainty; None where something of it is undetermined."""
-    found = _solved(with_offsets(experiment, OFFSET_TRIAL))
-    if found is None or not len(design.points):
+    after = lengths_with_offsets(experiment, OFFSET_TRIAL)
+    if after is None:
         return None
-    before, after = (point_pairs(*one)[1] for one in ((design, layout, state, spread), found))
-    if not after.count or after.undetermined or before.undetermined:
-        return None
+    before = point_pairs(design, layout, state, spread)[1]
     return Loosened(OFFSET_TRIAL, after.total / after.count, after.maximum, before.total / before.count)
+
+
+def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSummary | None:
+    """U6 where exact offsets, but for one, have an uncertainty in metres; None where something of it is open."""
+    found = _solved(with_offsets(experiment, uncertainty))
+    if found is None or not len(found[0].points):
+        return None
+    pairs = point_pairs(*found)[1]
+    return None if pairs.undetermined or not pairs.count else pairs

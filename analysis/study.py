@@ -162,7 +162,9 @@ def _plan(experiment: Experiment, design: Design, with_quantities: bool, with_sc
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
     found = spectrum(factor)
-    spread = covariance(design, factor, found) if with_quantities or found.deficiency else shared_covariance(design, found)
+    spread = (
+        covariance(design, factor, found) if with_quantities or found.deficiency else shared_covariance(design, found)
+    )
     judged = verdict(design, layout, found, spread, experiment.expected_rank_deficiency, experiment.target_accuracy)
     quantities: dict[str, Quantity] = {}
     tasks: tuple[TaskUncertainty, ...] = ()

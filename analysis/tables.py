@@ -9,6 +9,7 @@ from typing import Any
 from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates
 from .rank import Verdict
+from .scale import Scale
 from .study import Fit, Plan
 from .tasks import TaskUncertainty, is_determined
 from .uncertainty import Quantity
@@ -162,8 +163,8 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
     }
 
 
-def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
-    """A verdict on rank as lines of text."""
+def verdict_lines(judged: Verdict, with_values: bool = False, lengths: Quantity | None = None) -> list[str]:
+    """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of them."""
     lines = []
     rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
     if judged.expected is not None or not judged.as_expected:
@@ -185,13 +186,76 @@ def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
             lines.append(f"{title} {k}: {direction}")
         if len(directions) > 20:
             lines.append(f"{title}: {len(directions) - 20} directions more")
+    if judged.weak and lengths is not None:
+        lines.append(f"all directions together: {_lengths_words(lengths)}")
     lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
 
 
+def _lengths_words(lengths: Quantity) -> str:
+    if math.isnan(lengths.average):
+        return "all are undetermined"
+    words = f"U6 {number(1e6 * lengths.average)} um on the average, {number(1e6 * lengths.maximum)} um at most"
+    open_ = f", {lengths.undetermined} of {lengths.count} distances undetermined" if lengths.undetermined else ""
+    return words + open_
+
+
+def target_lines(lengths: Quantity | None) -> list[str]:
+    """The share of lengths within the target accuracy, with U6, as a line of text; none where nothing is compared."""
+    if lengths is None or lengths.within_target is None:
+        return []
+    by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
+    return [f"within the target accuracy ({by}): {share} of {lengths.count} lengths; {_lengths_words(lengths)}"]
+
+
+def scale_lines(found: Scale | None) -> list[str]:
+    """What carries scale as lines of text, and a warning where it rests on offsets that are held exact."""
+    if found is None:
+        return []
+    if not found.has_scale:
+        return ["scale: the machine's own, which the error model does not change"]
+    told = []
+    for one in found.carriers:
+        without = "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
+        told.append(f"{one.words} ({without} without)")
+    lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm, from {' and '.join(told)}"]
+    if not found.rests_on_offsets:
+        return lines
+    warning = "warning: the scale rests on probe offsets that are held exact"
+    if found.loosened is not None:
+        loose = found.loosened
+        average, most, before = (number(1e6 * value) for value in (loose.average, loose.maximum, loose.before))
+        warning += (
+            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but one, U6 would be "
+            f"{average} um on the average and {most} um at most instead of {before} um on the average"
+        )
+    return [*lines, f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets"]
+
+
+def scale_data(found: Scale | None) -> dict[str, Any] | None:
+    """What carries scale as plain data, relative standard uncertainties, and U6 in metres."""
+    if found is None:
+        return None
+    loose = found.loosened
+    return {
+        "standard_uncertainty": found.uncertainty,
+        "carried_by": [{"text": one.words, "without": finite(one.without)} for one in found.carriers],
+        "rests_on_exact_offsets": found.rests_on_offsets,
+        "with_uncertain_offsets": None
+        if loose is None
+        else {
+            "standard_uncertainty": loose.offset_uncertainty,
+            "U6_average": loose.average,
+            "U6_maximum": loose.maximum,
+        },
+    }
+
+
 def plan_lines(plan: Plan) -> list[str]:
     """A plan as lines of text: title, verdict and table."""
-    lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True)]
+    lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True, lengths=plan.lengths)]
+    lines += [] if plan.quantities else target_lines(plan.lengths)
+    lines += scale_lines(plan.scale)
     lines += ["", *uncertainty_table(plan.quantities)] if plan.quantities else []
     return lines + ["", *task_table(plan.tasks)] if plan.tasks else lines
 
@@ -199,7 +263,8 @@ def plan_lines(plan: Plan) -> list[str]:
 def fit_lines(fit: Fit) -> list[str]:
     """A fit as lines of text: iterations, verdict, U1 to U6 and the machine's parameters."""
     record = fit.solution.iterations
-    lines = [f"{fit.label}: {fit.title}", *verdict_lines(fit.verdict, with_values=True)]
+    verdict = verdict_lines(fit.verdict, with_values=True, lengths=fit.quantities.get("U6"))
+    lines = [f"{fit.label}: {fit.title}", *verdict]
     how = "estimated from the residuals" if fit.sigma_is_estimated else "as given"
     summary = f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
     if fit.converged:
@@ -299,7 +364,9 @@ def plan_data(plan: Plan) -> dict[str, Any]:
         **_verdict_data(plan.verdict),
         "sigma": 1.0,
         "quantities": _quantities_data(plan.quantities),
+        **({} if plan.quantities or plan.lengths is None else {"lengths": _quantity_data(plan.lengths)}),
         **({"tasks": task_data(plan.tasks)} if plan.tasks else {}),
+        "scale": scale_data(plan.scale),
     }
 
 
@@ -374,22 +441,22 @@ def finite(value: float) -> float | None:
 
 
 def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
+    return {symbol: _quantity_data(quantity) for symbol, quantity in quantities.items()}
+
+
+def _quantity_data(q: Quantity) -> dict[str, Any]:
+    compared: dict[str, Any] = {}
+    if q.within_target is not None:
+        compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
     return {
-        symbol: {
-            "maximum": finite(q.maximum),
-            "average": finite(q.average),
-            "unit": q.unit,
-            "count": q.count,
-            "undetermined": q.undetermined,
-            "largest_at": q.largest,
-            **(
-                {}
-                if q.within_target is None
-                else {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
-            ),
-            "description": q.description,
-        }
-        for symbol, q in quantities.items()
+        "maximum": finite(q.maximum),
+        "average": finite(q.average),
+        "unit": q.unit,
+        "count": q.count,
+        "undetermined": q.undetermined,
+        "largest_at": q.largest,
+        **compared,
+        "description": q.description,
     }
 
 
@@ -405,6 +472,13 @@ def _verdict_data(judged: Verdict) -> dict[str, Any]:
         "undetermined": [str(direction) for direction in judged.null],
         "reasons": list(judged.reasons),
         "weakly_determined": [
-            {"text": str(direction), "standard_deviation": direction.standard_deviation} for direction in judged.weak
+            {
+                "text": str(direction),
+                "standard_deviation": direction.standard_deviation,
+                "points": direction.points,
+                "points_beyond_limit": direction.beyond,
+                "limit": direction.limit,
+            }
+            for direction in judged.weak
         ],
     }

@@ -18,8 +18,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         description="Solve for one unknown of a design at a time, the others as drawn: the largest repeatability or "
         "certificate uncertainty, and the fewest repeats, fewest balls or smallest plate that meet a goal. What is "
         "told is a value of three digits, or a whole number, with which the file was planned; the next one fails. "
-        "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1; with --fail it is "
-        "0 if the design as drawn meets the goal, otherwise 1.",
+        "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1; "
+        "with --fail it is 0 if the design as drawn meets the goal, otherwise 1.",
     )
     add_file(parser)
     parser.add_argument("--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated")
