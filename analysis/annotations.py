@@ -35,9 +35,9 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     suggested = advice_lines(design)
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space after a hash.
-        warnings = [line for line in told if line.startswith("warning:")]
+        first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
         start = f"as expected: {file}: {design.plan.label}: "
-        return [f"{start}{line}".replace("##[", "# #[").replace("\n", " ") for line in (told[0], *warnings, *suggested)]
+        return [f"{start}{line}".replace("##[", "# #[").replace("\n", " ") for line in (first, *suggested)]
     place = design.place
     # The log of a run shows only the message, so that it names the place again.
     text = "\n".join([f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}", *told[1:], *suggested])
