@@ -97,13 +97,18 @@ def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
 def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
     """U1 to U6 as lines of text."""
     rows = [["", "standard uncertainty of", "maximum", "average", "unit", "count", "largest at"]]
+    told: set[str] = set()
     for symbol, quantity in quantities.items():
+        if ", " in quantity.unit:
+            # Lengths and angles have no common unit; each has a row of its own.
+            continue
+        name = symbol.partition(" ")[0]
         count = str(quantity.count)
         if quantity.undetermined:
             count += f" ({quantity.undetermined} undetermined)"
         rows.append(
             [
-                symbol.partition(" ")[0] if " " not in symbol else "",
+                "" if name in told else name,
                 quantity.description,
                 number(1e6 * quantity.maximum),
                 number(1e6 * quantity.average),
@@ -112,6 +117,7 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
                 quantity.largest,
             ]
         )
+        told.add(name)
     lines = aligned(rows, [False, False, True, True, False, False, False])
     for quantity in quantities.values():
         if quantity.within_target is not None:

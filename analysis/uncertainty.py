@@ -119,7 +119,7 @@ def uncertainties(
 
     if len(design.points):
         of_points, lengths = _of_points(design, layout, state, found, sigma, target)
-        point_names = [f"point {i + 1} {axis}" for i in range(len(design.points)) for axis in axes]
+        point_names = [f"{axis} of {_point(design, i)}" for i in range(len(design.points)) for axis in axes]
         add("U4", of_points.ravel(), "m", point_names)
         if lengths is not None:
             result["U6"] = lengths
@@ -150,8 +150,14 @@ def _of_points(
     if not pairs.count:
         return of_points, None
     share = None if target is None else pairs.within / pairs.count
-    lengths = _of_pairs("U6", pairs, sigma, lambda i: f"point {i + 1}", share)
+    lengths = _of_pairs("U6", pairs, sigma, lambda i: _point(design, i), share)
     return of_points, lengths if target is None else replace(lengths, coverage_factor=target.coverage_factor)
+
+
+def _point(design: Design, i: int) -> str:
+    """An evaluation point by its number from 1, as in the file, and its place."""
+    place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in design.points[i])
+    return f"point {i + 1} ({place}) mm"
 
 
 def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> Quantity:

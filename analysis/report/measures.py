@@ -35,6 +35,11 @@ class Measure:
         return self.statistic in (*STATISTICS, "actual average")
 
     @property
+    def is_share(self) -> bool:
+        """Whether the figure is a share within a target."""
+        return self.statistic == "within target"
+
+    @property
     def title(self) -> str:
         return f"{self.name}, {self.unit}" if self.unit else self.name
 

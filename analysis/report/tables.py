@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..montecarlo.figures import Figure
 from ..montecarlo.tables import with_error
 from ..sweeps.columns import symbol_column
-from ..tables import number
+from ..tables import number, percent
 from .measures import (
     Measure,
     descriptions,
@@ -196,6 +196,9 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
         text = "-" if math.isnan(value) else f"{value:.0f}"
     elif measure.error:
         text = with_error(Figure(value, results.value(measure.error, row)), measure.factor)
+    elif measure.is_share:
+        # Never rounded up: what is told to be all is all.
+        text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
     else:
         text = number(measure.factor * value, DIGITS)
     if measure.stands_for_all and partly_open(results, measure.symbol)[row] and not math.isnan(value):
