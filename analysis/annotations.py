@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from .checking import CheckedDesign, CheckedFile
-from .planning.repair.tables import repair_lines
-from .tables import verdict_lines
+from .planning.repair.tables import certificate_lines, repair_lines
+from .tables import scale_lines, target_lines, verdict_lines
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:
@@ -30,18 +30,28 @@ def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> lis
 
 
 def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> list[str]:
-    told = verdict_lines(design.plan.verdict)
-    suggested = repair_lines(design.repairs, design.plan.verdict)
+    plan = design.plan
+    told = [*verdict_lines(plan.verdict, lengths=plan.lengths), *target_lines(plan.lengths), *scale_lines(plan.scale)]
+    suggested = advice_lines(design)
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space after a hash.
+        first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
         start = f"as expected: {file}: {design.plan.label}: "
-        return [f"{start}{line}".replace("##[", "# #[").replace("\n", " ") for line in (told[0], *suggested)]
+        return [f"{start}{line}".replace("##[", "# #[").replace("\n", " ") for line in (first, *suggested)]
     place = design.place
     # The log of a run shows only the message, so that it names the place again.
-    text = "\n".join(
-        [f"{place.file}:{place.line}:{place.column}: {design.plan.label}: {told[0]}", *told[1:], *suggested]
-    )
-    return [_error(place.file, place.line, place.column, f"rank of {design.plan.label}", text, workspace)]
+    text = "\n".join([f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}", *told[1:], *suggested])
+    what = "rank" if plan.verdict.complaint else "goals"
+    return [_error(place.file, place.line, place.column, f"{what} of {plan.label}", text, workspace)]
+
+
+def advice_lines(design: CheckedDesign) -> list[str]:
+    """Goals, and what is suggested, as lines of text."""
+    return [
+        *design.goals,
+        *repair_lines(design.repairs, design.plan.verdict),
+        *certificate_lines(design.certificate),
+    ]
 
 
 def _error(file: str, line: int, column: int, title: str, text: str, workspace: Path | None) -> str:

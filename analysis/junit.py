@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from .annotations import advice_lines
 from .checking import CheckedDesign, CheckedFile
-from .planning.repair.tables import repair_lines
 from .tables import plan_lines, verdict_lines
 
 # No XML document can hold these, not even as character references.
@@ -17,7 +17,7 @@ NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 def junit_report(files: Sequence[CheckedFile]) -> str:
     """One XML document in ASCII: a suite for each file, a case for each design.
 
-    A rank that is not as expected is a failure, a file that cannot be used an error.
+    A rank that is not as expected is a failure, and so is a goal that is missed; a file that cannot be used an error.
     """
     suites = [_suite(checked) for checked in files]
     top = ElementTree.Element("testsuites", {"name": "ballplate check", **_totals(suites)})
@@ -42,12 +42,14 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
     case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
-    told = [*plan_lines(design.plan), *repair_lines(design.repairs, design.plan.verdict)]
+    told = [*plan_lines(design.plan), *advice_lines(design)]
     if design.place is None:
         ElementTree.SubElement(case, "system-out").text = _clean("\n".join(told))
         return case
-    message = _clean(verdict_lines(design.plan.verdict)[0])
-    failure = ElementTree.SubElement(case, "failure", {"type": "rank", "message": message})
+    is_rank = bool(design.plan.verdict.complaint)
+    message = _clean(verdict_lines(design.plan.verdict)[0] if is_rank else "; ".join(design.missed))
+    kind = "rank" if is_rank else "goal"
+    failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"
     failure.text = _clean("\n".join([place, *told]))
     return case

@@ -12,8 +12,7 @@ from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction, format_length
 
 from .lengths import Groups, LengthMap, Settings, length_pairs
-from .reach.goals import percent
-from .tables import aligned, finite, number
+from .tables import aligned, finite, number, percent, uncertainty_words
 
 AXES = "xyz"
 POINT_COLUMNS = (
@@ -42,6 +41,7 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
         f"{rank}{count} lengths between {n} points of a grid, with the probe {settings.probe}{scatter}",
         f"target {target_words(settings.target)}: met by the standard uncertainty u of {_share(whole, False)}, by the "
         f"expanded uncertainty {k} u of {_share(whole, True)} lengths",
+        f"the target is meant for the {uncertainty_words(settings.target_factor)}",
     ]
     if whole.undetermined[0]:
         some = ", ".join(f"{_place(found.points[i])} to {_place(found.points[j])}" for i, j in found.open_pairs)
@@ -66,7 +66,7 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
 
 def _share(groups: Groups, expanded: bool) -> str:
     share = percent(float(groups.share(expanded)[0]))
-    return share if expanded else share.removesuffix(" of")
+    return f"{share} of" if expanded else share
 
 
 def _place(point: Array) -> str:
@@ -106,7 +106,7 @@ def _table(head: str, names: list[str], groups: Groups, k: str, targets: list[st
         row = [name, str(groups.count[i]), str(groups.undetermined[i])]
         row += [number(1e6 * float(v[i])) for v in (groups.average, groups.maximum, factor * groups.maximum)]
         row += [targets[i] if targets else "", number(float(groups.maximum_ratio[i]))]
-        row += [percent(float(groups.share(expanded)[i])).removesuffix(" of") for expanded in (False, True)]
+        row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
         rows.append(row)
     unused = {6} if not targets else set[int]()
     unused |= {2} if not groups.undetermined.any() else set()
@@ -155,6 +155,7 @@ def length_data(label: str, title: str, found: LengthMap) -> dict[str, Any]:
         "probe": settings.probe,
         "target": {"constant": settings.target.constant, "slope": settings.target.slope},
         "coverage_factor": settings.coverage_factor,
+        "target_coverage_factor": settings.target_factor,
         "with_repeatability": settings.with_repeatability,
         "all": _group_data(found.whole)[0],
         "worst": None if found.worst is None else [found.points[k].tolist() for k in found.worst],

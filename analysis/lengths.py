@@ -35,7 +35,8 @@ NAMED = 3
 class Settings:
     """What lengths are looked at: `grid` points along each axis, with a probe, and how they are compared.
 
-    `with_repeatability`: whether the scatter of the two readings along the length adds to its uncertainty.
+    `with_repeatability`: whether the scatter of the two readings along the length adds to its uncertainty. The
+    `target` is meant for `target_factor` times the standard uncertainty.
     """
 
     grid: tuple[int, ...]
@@ -43,6 +44,7 @@ class Settings:
     target: LengthFunction
     coverage_factor: float = 2.0
     with_repeatability: bool = False
+    target_factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +53,8 @@ class Groups:
 
     `count` of them there are, `undetermined` of these are open; `average` and `maximum` are standard uncertainties,
     `average_ratio` and `maximum_ratio` those to the target; `within` and `within_expanded` count the lengths whose
-    standard and expanded uncertainties are no larger than the target.
+    standard and expanded uncertainties are no larger than the target, `within_target` those with the uncertainty that
+    the target is meant for.
     """
 
     count: Integers
@@ -62,6 +65,7 @@ class Groups:
     maximum_ratio: Array
     within: Integers
     within_expanded: Integers
+    within_target: Integers
 
     def share(self, expanded: bool = False) -> Array:
         """Shares of lengths within the target (g,), undetermined ones counted as not; NaN of an empty group."""
@@ -92,6 +96,11 @@ class LengthMap:
     worst: tuple[int, int] | None
     open_pairs: tuple[tuple[int, int], ...]
 
+    @property
+    def is_met(self) -> bool:
+        """Whether all lengths are within the target, by the uncertainty that it is meant for."""
+        return bool(self.whole.within_target[0] == self.whole.count[0])
+
 
 @single_threaded
 def length_map(experiment: Experiment, settings: Settings) -> LengthMap:
@@ -101,20 +110,21 @@ def length_map(experiment: Experiment, settings: Settings) -> LengthMap:
     edges = class_edges(float(np.linalg.norm(design.upper - design.lower)))
     names = direction_names(design.dimension)
     deficiency, tiles = _tiles(design, points, settings)
-    by_point, by_length = _Tally(len(points)), _Tally(len(edges) - 1)
-    by_direction, whole = _Tally(len(names)), _Tally(1)
+    factors = (1.0, settings.coverage_factor, settings.target_factor)
+    by_point, by_length = _Tally(len(points), factors), _Tally(len(edges) - 1, factors)
+    by_direction, whole = _Tally(len(names), factors), _Tally(1, factors)
     worst, largest = None, -1.0
     named: list[tuple[int, int]] = []
     for tile in tiles:
         target = settings.target.at(tile.lengths)
         ratio = np.where(tile.is_open, np.nan, tile.uncertainties / target)
         values = np.where(tile.is_open, np.nan, tile.uncertainties)
-        by_point.add(tile.first, values, ratio, settings.coverage_factor)
-        by_point.add(tile.second, values, ratio, settings.coverage_factor)
-        by_length.add(length_classes(tile.lengths, edges), values, ratio, settings.coverage_factor)
+        by_point.add(tile.first, values, ratio)
+        by_point.add(tile.second, values, ratio)
+        by_length.add(length_classes(tile.lengths, edges), values, ratio)
         apart = (points[tile.second] - points[tile.first]) / (design.upper - design.lower)
-        by_direction.add(direction_classes(apart), values, ratio, settings.coverage_factor)
-        whole.add(np.zeros(len(values), np.int64), values, ratio, settings.coverage_factor)
+        by_direction.add(direction_classes(apart), values, ratio)
+        whole.add(np.zeros(len(values), np.int64), values, ratio)
         if not tile.is_open.all() and (top := int(np.nanargmax(ratio))) >= 0 and ratio[top] > largest:
             worst, largest = (int(tile.first[top]), int(tile.second[top])), float(ratio[top])
         for k in np.flatnonzero(tile.is_open)[: NAMED - len(named)]:
@@ -211,19 +221,21 @@ def direction_classes(apart: Array) -> Integers:
 
 
 class _Tally:
-    """Running sums of groups of lengths."""
+    """Running sums of groups of lengths, counted where their uncertainty times each of `factors` is in the target."""
 
-    def __init__(self, size: int) -> None:
-        self.counts = np.zeros((4, size), np.int64)
+    def __init__(self, size: int, factors: tuple[float, ...]) -> None:
+        self.factors = factors
+        self.counts = np.zeros((2 + len(factors), size), np.int64)
         self.sums = np.zeros((2, size))
         self.tops = np.full((2, size), -np.inf)
 
-    def add(self, group: Integers, values: Array, ratio: Array, coverage: float) -> None:
+    def add(self, group: Integers, values: Array, ratio: Array) -> None:
         """Count standard uncertainties (m,) and their ratios to the target, NaN where undetermined."""
         is_open = np.isnan(values)
         size = self.counts.shape[1]
         with np.errstate(invalid="ignore"):
-            kinds: tuple[NDArray[np.bool_], ...] = (~is_open | is_open, is_open, ratio <= 1.0, coverage * ratio <= 1.0)
+            within = [factor * ratio <= 1.0 for factor in self.factors]
+        kinds: tuple[NDArray[np.bool_], ...] = (~is_open | is_open, is_open, *within)
         for k, chosen in enumerate(kinds):
             self.counts[k] += np.bincount(group[chosen], minlength=size)
         known = ~is_open
@@ -232,9 +244,9 @@ class _Tally:
             np.maximum.at(self.tops[k], group[known], one[known])
 
     def groups(self) -> Groups:
-        count, open_, within, expanded = self.counts
+        count, open_, *within = self.counts
         known = count - open_
         with np.errstate(invalid="ignore"):
             average = np.where(known > 0, self.sums / np.maximum(known, 1), np.nan)
             top = np.where(known > 0, self.tops, np.nan)
-        return Groups(count, open_, average[0], top[0], average[1], top[1], within, expanded)
+        return Groups(count, open_, average[0], top[0], average[1], top[1], *within)

@@ -15,7 +15,7 @@ from simulator.estimation.covariance import Covariance, Spectrum
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array, HasLines
-from simulator.quantities import LengthFunction
+from simulator.quantities import Target
 
 from .bar_directions import reasons
 
@@ -77,7 +77,8 @@ class Direction:
 
     Null directions are scaled so that the part that moves points most moves them by one micrometre; weak ones are
     as long as their standard deviation. `standard_deviation` is what a weak one adds to corrected points, relative
-    to one another, in metres; it is infinite for a null direction.
+    to one another, in metres, as the root mean square over the evaluation `points`; it adds more than `limit`, beyond
+    which a direction is weak, at `beyond` of them. It is infinite for a null direction.
     """
 
     functions: tuple[FunctionPart, ...]
@@ -86,6 +87,9 @@ class Direction:
     standard_deviation: float = float("inf")
     probes: tuple[PositionPart, ...] = ()
     lengths: tuple[LengthPart, ...] = ()
+    points: int = 0
+    beyond: int = 0
+    limit: float = float("inf")
 
     def __str__(self) -> str:
         return in_words(self)
@@ -140,10 +144,11 @@ def verdict(
     found: Spectrum,
     spread: Covariance,
     expected: int | None = None,
-    target: LengthFunction | None = None,
+    target: Target | None = None,
 ) -> Verdict:
     """Judge a design from its spectrum; `spread` supplies how the balls follow the undetermined directions."""
     columns, effect = _weak_columns(design, layout, found, target)
+    limit = weak_limit(design, target)
     open_ = np.concatenate([spread.shared_null, found.root[:, columns]], axis=1)
     return Verdict(
         design.parameter_count,
@@ -153,7 +158,7 @@ def verdict(
         found.values,
         found.gap,
         null_directions(design, layout, spread),
-        _weak_directions(design, layout, found, columns, effect),
+        _weak_directions(design, layout, found, columns, effect, limit),
         reasons(design, layout, open_),
     )
 
@@ -178,35 +183,48 @@ def independent_mixture(spread: Covariance) -> Array:
 
 
 def weak_directions(
-    design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
+    design: Design, layout: SharedLayout, found: Spectrum, target: Target | None
 ) -> tuple[Direction, ...]:
     """Determined directions whose standard deviation spoils the error map, weakest first."""
-    return _weak_directions(design, layout, found, *_weak_columns(design, layout, found, target))
+    limit = weak_limit(design, target)
+    return _weak_directions(design, layout, found, *_weak_columns(design, layout, found, target), limit)
 
 
 def _weak_columns(
-    design: Design, layout: SharedLayout, found: Spectrum, target: LengthFunction | None
+    design: Design, layout: SharedLayout, found: Spectrum, target: Target | None
 ) -> tuple[Integers, Array]:
     """Columns of the root that are weak, weakest first, and what one standard deviation along each of all adds."""
-    effect = effects(design, layout, found)
+    effect = _root_mean_square(effects_at_points(design, layout, found))
     return np.flatnonzero(effect > weak_limit(design, target))[::-1], effect
 
 
 def effects(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
     """What one standard deviation along each determined direction adds to corrected points, in metres, (rank,).
 
-    Relative to one another, that is; empty where the design has no points.
+    Relative to one another, that is, as the root mean square over the points; empty where the design has none.
+    """
+    return _root_mean_square(effects_at_points(design, layout, found))
+
+
+def _root_mean_square(values: Array) -> Array:
+    return np.asarray(np.sqrt((values**2).mean(axis=0))) if len(values) else np.zeros(0)
+
+
+def effects_at_points(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
+    """What one standard deviation along each determined direction adds to each corrected point, (points, rank) metres.
+
+    Relative to the others, as the root mean square over the co-ordinates.
     """
     if not len(design.points) or found.rank == 0:
-        return np.zeros(0)
+        return np.zeros((0, found.rank))
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
     change = without_rigid_motion(design.points, jacobian @ found.root[layout.model])
     # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
-    return np.asarray(np.sqrt(2.0 * (change**2).mean(axis=(0, 1))))
+    return np.asarray(np.sqrt(2.0 * (change**2).mean(axis=1)))
 
 
-def weak_limit(design: Design, target: LengthFunction | None) -> float:
+def weak_limit(design: Design, target: Target | None) -> float:
     """The effect, in metres, beyond which a direction is weak."""
     if target is None:
         return WEAK * float(design.repeatability.max())
@@ -214,14 +232,16 @@ def weak_limit(design: Design, target: LengthFunction | None) -> float:
 
 
 def _weak_directions(
-    design: Design, layout: SharedLayout, found: Spectrum, columns: Integers, effect: Array
+    design: Design, layout: SharedLayout, found: Spectrum, columns: Integers, effect: Array, limit: float
 ) -> tuple[Direction, ...]:
     directions = []
+    beyond = (effects_at_points(design, layout, found) > limit).sum(axis=0) if len(columns) else np.zeros(0)
     for column in columns:
         root = found.root[:, column]
         description = _describe(design, layout, root, np.zeros_like(design.balls))
         size = float(effect[column])
-        directions.append(replace(description, artefacts=(), standard_deviation=size))
+        weak = replace(description, artefacts=(), standard_deviation=size, points=len(design.points))
+        directions.append(replace(weak, beyond=int(beyond[column]), limit=limit))
     return tuple(directions)
 
 
@@ -390,7 +410,11 @@ def in_words(direction: Direction) -> str:
     if np.isinf(direction.standard_deviation):
         end = "change together without changing any observation" if len(parts) > 1 else "changes no observation"
     else:
-        end = f"known only to {length(direction.standard_deviation)} in corrected points, relative to one another"
+        end = (
+            f"known only to {length(direction.standard_deviation)} in corrected points, relative to one another "
+            f"(root mean square over {direction.points} points; more than {length(direction.limit)} at "
+            f"{direction.beyond} of them)"
+        )
     return "; ".join(parts) + f": {end}"
 
 

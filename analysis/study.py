@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from simulator.estimation.covariance import Covariance, covariance, shared_covariance, spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import Solution, estimate
 from simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
@@ -26,8 +26,9 @@ from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
 from .reliability.suspects import Suspect, suspects
+from .scale import Scale, scale_of
 from .tasks import TaskUncertainty, task_uncertainties
-from .uncertainty import Quantity, uncertainties
+from .uncertainty import Quantity, length_uncertainties, uncertainties
 
 # Residuals that a fit names.
 LARGEST = 10
@@ -35,7 +36,11 @@ LARGEST = 10
 
 @dataclass(frozen=True)
 class Plan:
-    """What a design will be worth: the verdict on its rank, and U1 to U6 and tasks if they were asked for."""
+    """What a design will be worth: the verdict on its rank, and U1 to U6 and tasks if they were asked for.
+
+    `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if that was asked for
+    and is determined.
+    """
 
     label: str
     title: str
@@ -43,6 +48,8 @@ class Plan:
     verdict: Verdict
     quantities: dict[str, Quantity]
     tasks: tuple[TaskUncertainty, ...] = ()
+    lengths: Quantity | None = None
+    scale: Scale | None = None
 
 
 @dataclass(frozen=True)
@@ -128,14 +135,14 @@ class Fit:
         return self.solution.factor.sum_of_squares > float(chdtri(self.degrees_of_freedom, 1e-3))
 
 
-def check(experiment: Experiment, design: Design | None = None) -> Plan:
+def check(experiment: Experiment, design: Design | None = None, with_scale: bool = False) -> Plan:
     """Judge the rank of an experiment's design, or of what came of it, at zero machine error."""
-    return _plan(experiment, design or lay_out(experiment), with_quantities=False)
+    return _plan(experiment, design or lay_out(experiment), False, with_scale)
 
 
-def plan(experiment: Experiment) -> Plan:
+def plan(experiment: Experiment, with_scale: bool = False) -> Plan:
     """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
-    return _plan(experiment, lay_out(experiment), with_quantities=True)
+    return _plan(experiment, lay_out(experiment), True, with_scale)
 
 
 @single_threaded
@@ -151,25 +158,24 @@ def worth(experiment: Experiment) -> Worth:
 
 
 @single_threaded
-def _plan(experiment: Experiment, design: Design, with_quantities: bool) -> Plan:
+def _plan(experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool) -> Plan:
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
     found = spectrum(factor)
-    spread = covariance(design, factor, found) if with_quantities or found.deficiency else _nothing_open(design, found)
+    spread = (
+        covariance(design, factor, found) if with_quantities or found.deficiency else shared_covariance(design, found)
+    )
     judged = verdict(design, layout, found, spread, experiment.expected_rank_deficiency, experiment.target_accuracy)
     quantities: dict[str, Quantity] = {}
     tasks: tuple[TaskUncertainty, ...] = ()
     if with_quantities:
         quantities = uncertainties(design, layout, state, spread, target=experiment.target_accuracy)
         tasks = task_uncertainties(design, layout, state, spread)
-    return Plan(experiment.label, experiment.title, design, judged, quantities, tasks)
-
-
-def _nothing_open(design: Design, found: Spectrum) -> Covariance:
-    """A covariance without its values, for a verdict on a design of full rank."""
-    n, d = design.balls.shape
-    empty = np.zeros((n, d, 0))
-    return Covariance(found.root, empty, np.zeros((n, d, d)), found.null, empty, found.scale)
+        lengths = quantities.get("U6")
+    else:
+        lengths = length_uncertainties(design, layout, state, spread, experiment.target_accuracy)
+    scale = scale_of(experiment, design, layout, state, spread) if with_scale else None
+    return Plan(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
 
 
 @single_threaded

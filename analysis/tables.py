@@ -9,6 +9,7 @@ from typing import Any
 from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates
 from .rank import Verdict
+from .scale import Scale
 from .study import Fit, Plan
 from .tasks import TaskUncertainty, is_determined
 from .uncertainty import Quantity
@@ -47,6 +48,24 @@ def number(value: float, digits: int = 4) -> str:
     return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
 
 
+def percent(share: float) -> str:
+    """A share in words, never rounded up.
+
+    >>> percent(0.99999), percent(0.125)
+    ('99.99 %', '12.5 %')
+    """
+    return f"{math.floor(1e4 * share + 1e-9) / 100:g} %"
+
+
+def uncertainty_words(coverage_factor: float) -> str:
+    """The uncertainty that a target is compared with.
+
+    >>> uncertainty_words(1.0), uncertainty_words(2.0)
+    ('standard uncertainty u', 'expanded uncertainty U = 2 u')
+    """
+    return "standard uncertainty u" if coverage_factor == 1.0 else f"expanded uncertainty U = {coverage_factor:g} u"
+
+
 def to_uncertainty(value: float, uncertainty: float) -> str:
     """A value to the third digit of its standard uncertainty.
 
@@ -78,13 +97,18 @@ def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
 def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
     """U1 to U6 as lines of text."""
     rows = [["", "standard uncertainty of", "maximum", "average", "unit", "count", "largest at"]]
+    told: set[str] = set()
     for symbol, quantity in quantities.items():
+        if ", " in quantity.unit:
+            # Lengths and angles have no common unit; each has a row of its own.
+            continue
+        name = symbol.partition(" ")[0]
         count = str(quantity.count)
         if quantity.undetermined:
             count += f" ({quantity.undetermined} undetermined)"
         rows.append(
             [
-                symbol.partition(" ")[0] if " " not in symbol else "",
+                "" if name in told else name,
                 quantity.description,
                 number(1e6 * quantity.maximum),
                 number(1e6 * quantity.average),
@@ -93,17 +117,19 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
                 quantity.largest,
             ]
         )
+        told.add(name)
     lines = aligned(rows, [False, False, True, True, False, False, False])
     for quantity in quantities.values():
         if quantity.within_target is not None:
-            share = number(100 * quantity.within_target)
-            lines.append(f"within the target accuracy (one standard uncertainty): {share} % of {quantity.symbol}")
+            by = uncertainty_words(quantity.coverage_factor)
+            lines.append(f"within the target accuracy ({by}): {percent(quantity.within_target)} of {quantity.symbol}")
     return lines
 
 
 def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
     """Measuring tasks as lines of text."""
-    rows = [["task", "length, mm", "standard uncertainty, um", "expanded (k = 2), um", "target, um", "within target"]]
+    expanded = f"expanded (k = {tasks[0].expansion:g}), um"
+    rows = [["task", "length, mm", "standard uncertainty, um", expanded, "target, um", "within target"]]
     for task in tasks:
         rows.append(
             [
@@ -115,7 +141,8 @@ def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
             ]
         )
     with_target = any(task.target is not None for task in tasks)
-    note = ["(the target is compared with the standard uncertainty)"] if with_target else []
+    by = next((uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), "")
+    note = [f"(the target is compared with the {by})"] if with_target else []
     return [*aligned(rows, [False, True, True, True, True, False]), *note]
 
 
@@ -132,7 +159,9 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
             "length": task.length,
             "standard_uncertainty": finite(task.standard_uncertainty),
             "expanded_uncertainty": finite(task.expanded_uncertainty),
+            "coverage_factor": task.expansion,
             "target": task.target,
+            **({} if task.target is None else {"target_coverage_factor": task.coverage_factor}),
             "within_target": task.is_within,
             "unit": "m",
         }
@@ -140,8 +169,8 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
     }
 
 
-def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
-    """A verdict on rank as lines of text."""
+def verdict_lines(judged: Verdict, with_values: bool = False, lengths: Quantity | None = None) -> list[str]:
+    """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of them."""
     lines = []
     rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
     if judged.expected is not None or not judged.as_expected:
@@ -163,13 +192,76 @@ def verdict_lines(judged: Verdict, with_values: bool = False) -> list[str]:
             lines.append(f"{title} {k}: {direction}")
         if len(directions) > 20:
             lines.append(f"{title}: {len(directions) - 20} directions more")
+    if judged.weak and lengths is not None:
+        lines.append(f"all directions together: {_lengths_words(lengths)}")
     lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
 
 
+def _lengths_words(lengths: Quantity) -> str:
+    if math.isnan(lengths.average):
+        return "all are undetermined"
+    words = f"U6 {number(1e6 * lengths.average)} um on the average, {number(1e6 * lengths.maximum)} um at most"
+    open_ = f", {lengths.undetermined} of {lengths.count} distances undetermined" if lengths.undetermined else ""
+    return words + open_
+
+
+def target_lines(lengths: Quantity | None) -> list[str]:
+    """The share of lengths within the target accuracy, with U6, as a line of text; none where nothing is compared."""
+    if lengths is None or lengths.within_target is None:
+        return []
+    by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
+    return [f"within the target accuracy ({by}): {share} of {lengths.count} lengths; {_lengths_words(lengths)}"]
+
+
+def scale_lines(found: Scale | None) -> list[str]:
+    """What carries scale as lines of text, and a warning where it rests on offsets that are held exact."""
+    if found is None:
+        return []
+    if not found.has_scale:
+        return ["scale: the machine's own, which the error model does not change"]
+    told = []
+    for one in found.carriers:
+        without = "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
+        told.append(f"{one.words} ({without} without)")
+    lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm, from {' and '.join(told)}"]
+    if not found.rests_on_offsets:
+        return lines
+    warning = "warning: the scale rests on probe offsets that are held exact"
+    if found.loosened is not None:
+        loose = found.loosened
+        average, most, before = (number(1e6 * value) for value in (loose.average, loose.maximum, loose.before))
+        warning += (
+            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but one, U6 would be "
+            f"{average} um on the average and {most} um at most instead of {before} um on the average"
+        )
+    return [*lines, f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets"]
+
+
+def scale_data(found: Scale | None) -> dict[str, Any] | None:
+    """What carries scale as plain data, relative standard uncertainties, and U6 in metres."""
+    if found is None:
+        return None
+    loose = found.loosened
+    return {
+        "standard_uncertainty": found.uncertainty,
+        "carried_by": [{"text": one.words, "without": finite(one.without)} for one in found.carriers],
+        "rests_on_exact_offsets": found.rests_on_offsets,
+        "with_uncertain_offsets": None
+        if loose is None
+        else {
+            "standard_uncertainty": loose.offset_uncertainty,
+            "U6_average": loose.average,
+            "U6_maximum": loose.maximum,
+        },
+    }
+
+
 def plan_lines(plan: Plan) -> list[str]:
     """A plan as lines of text: title, verdict and table."""
-    lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True)]
+    lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True, lengths=plan.lengths)]
+    lines += [] if plan.quantities else target_lines(plan.lengths)
+    lines += scale_lines(plan.scale)
     lines += ["", *uncertainty_table(plan.quantities)] if plan.quantities else []
     return lines + ["", *task_table(plan.tasks)] if plan.tasks else lines
 
@@ -177,7 +269,8 @@ def plan_lines(plan: Plan) -> list[str]:
 def fit_lines(fit: Fit) -> list[str]:
     """A fit as lines of text: iterations, verdict, U1 to U6 and the machine's parameters."""
     record = fit.solution.iterations
-    lines = [f"{fit.label}: {fit.title}", *verdict_lines(fit.verdict, with_values=True)]
+    verdict = verdict_lines(fit.verdict, with_values=True, lengths=fit.quantities.get("U6"))
+    lines = [f"{fit.label}: {fit.title}", *verdict]
     how = "estimated from the residuals" if fit.sigma_is_estimated else "as given"
     summary = f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
     if fit.converged:
@@ -277,7 +370,9 @@ def plan_data(plan: Plan) -> dict[str, Any]:
         **_verdict_data(plan.verdict),
         "sigma": 1.0,
         "quantities": _quantities_data(plan.quantities),
+        **({} if plan.quantities or plan.lengths is None else {"lengths": _quantity_data(plan.lengths)}),
         **({"tasks": task_data(plan.tasks)} if plan.tasks else {}),
+        "scale": scale_data(plan.scale),
     }
 
 
@@ -352,18 +447,22 @@ def finite(value: float) -> float | None:
 
 
 def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
+    return {symbol: _quantity_data(quantity) for symbol, quantity in quantities.items()}
+
+
+def _quantity_data(q: Quantity) -> dict[str, Any]:
+    compared: dict[str, Any] = {}
+    if q.within_target is not None:
+        compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
     return {
-        symbol: {
-            "maximum": finite(q.maximum),
-            "average": finite(q.average),
-            "unit": q.unit,
-            "count": q.count,
-            "undetermined": q.undetermined,
-            "largest_at": q.largest,
-            **({} if q.within_target is None else {"within_target": q.within_target}),
-            "description": q.description,
-        }
-        for symbol, q in quantities.items()
+        "maximum": finite(q.maximum),
+        "average": finite(q.average),
+        "unit": q.unit,
+        "count": q.count,
+        "undetermined": q.undetermined,
+        "largest_at": q.largest,
+        **compared,
+        "description": q.description,
     }
 
 
@@ -379,6 +478,13 @@ def _verdict_data(judged: Verdict) -> dict[str, Any]:
         "undetermined": [str(direction) for direction in judged.null],
         "reasons": list(judged.reasons),
         "weakly_determined": [
-            {"text": str(direction), "standard_deviation": direction.standard_deviation} for direction in judged.weak
+            {
+                "text": str(direction),
+                "standard_deviation": direction.standard_deviation,
+                "points": direction.points,
+                "points_beyond_limit": direction.beyond,
+                "limit": direction.limit,
+            }
+            for direction in judged.weak
         ],
     }

@@ -23,23 +23,35 @@ COVERAGE = 2.0
 class TaskUncertainty:
     """A measuring task: its length, standard uncertainty and the one to be reached, in metres.
 
-    The standard uncertainty is NaN where observations leave it open; `target` is None where nothing is to be reached.
+    The standard uncertainty is NaN where observations leave it open; `target` is None where nothing is to be reached,
+    and otherwise compared with `coverage_factor` times the standard uncertainty.
     """
 
     name: str
     length: float
     standard_uncertainty: float
     target: float | None
+    coverage_factor: float = 1.0
 
     @property
     def expanded_uncertainty(self) -> float:
-        """With the coverage factor 2."""
-        return COVERAGE * self.standard_uncertainty
+        """With the coverage factor of the target, or 2 where that is 1."""
+        return self.expansion * self.standard_uncertainty
+
+    @property
+    def expansion(self) -> float:
+        """The coverage factor of the expanded uncertainty."""
+        return expansion(self.coverage_factor)
 
     @property
     def is_within(self) -> bool | None:
-        """Whether the standard uncertainty is within its target; None where there is none."""
-        return None if self.target is None else self.standard_uncertainty <= self.target
+        """Whether the uncertainty is within its target; None where there is none."""
+        return None if self.target is None else self.coverage_factor * self.standard_uncertainty <= self.target
+
+
+def expansion(coverage_factor: float) -> float:
+    """The coverage factor of an expanded uncertainty that is shown: that of the target, or 2 where that is 1."""
+    return coverage_factor if coverage_factor > 1.0 else COVERAGE
 
 
 def task_differences(design: Design, state: State) -> Array:
@@ -73,7 +85,9 @@ def task_uncertainties(
     values = sigma * found.of_shared(task_rows(design, layout, state))
     told = zip(design.task_names, lengths.tolist(), values.tolist(), design.task_targets, strict=True)
     return tuple(
-        TaskUncertainty(name, length, value, None if target is None else float(target.at(length)))
+        TaskUncertainty(name, length, value, None)
+        if target is None
+        else TaskUncertainty(name, length, value, float(target.stated.at(length)), target.coverage_factor)
         for name, length, value, target in told
     )
 

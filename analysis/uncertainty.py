@@ -11,7 +11,7 @@ from simulator.design import Design, State
 from simulator.estimation.covariance import Covariance, blank
 from simulator.estimation.parameters import SharedLayout
 from simulator.machines.protocol import Array
-from simulator.quantities import LengthFunction
+from simulator.quantities import LengthFunction, Target
 from simulator.threads import single_threaded
 
 from .corrections import corrected_points, correction_rows
@@ -41,8 +41,8 @@ class Quantity:
 
     `count` of them there are, `undetermined` of which the observations leave open; the maximum and the
     average are NaN when nothing is left, and `largest` then is empty, otherwise it names where the maximum stands.
-    `within_target` is the share of distances whose standard uncertainty is within the target accuracy, those
-    undetermined counted as not; None where no target is compared with.
+    `within_target` is the share of distances whose uncertainty, `coverage_factor` times the standard one, is within the
+    target accuracy, those undetermined counted as not; None where no target is compared with.
     """
 
     symbol: str
@@ -53,6 +53,7 @@ class Quantity:
     undetermined: int = 0
     largest: str = ""
     within_target: float | None = None
+    coverage_factor: float = 1.0
 
     @property
     def description(self) -> str:
@@ -66,7 +67,7 @@ def uncertainties(
     state: State,
     found: Covariance,
     sigma: float = 1.0,
-    target: LengthFunction | None = None,
+    target: Target | None = None,
 ) -> dict[str, Quantity]:
     """U1 to U6 for a design at `state` and those of its tasks, with U2 and U3 also split into lengths and angles.
 
@@ -117,21 +118,46 @@ def uncertainties(
         result["U5"] = _of_pairs("U5", pairs, sigma, lambda i: f"ball {design.ball_label(i)}")
 
     if len(design.points):
-        # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
-        limit = None if target is None else LengthFunction(target.constant / sigma, target.slope / sigma)
-        of_points, points = point_pairs(design, layout, state, found, limit)
-        point_names = [f"point {i + 1} {axis}" for i in range(len(design.points)) for axis in axes]
+        of_points, lengths = _of_points(design, layout, state, found, sigma, target)
+        point_names = [f"{axis} of {_point(design, i)}" for i in range(len(design.points)) for axis in axes]
         add("U4", of_points.ravel(), "m", point_names)
-        if points.count:
-            share = None if target is None else points.within / points.count
-            result["U6"] = _of_pairs("U6", points, sigma, lambda i: f"point {i + 1}", share)
+        if lengths is not None:
+            result["U6"] = lengths
     tasks = task_uncertainties(design, layout, state, found, sigma)
     if tasks:
         values = np.array([task.standard_uncertainty for task in tasks])
         quantity = summarise("tasks", values, "m", design.task_names)
-        result["tasks"] = replace(quantity, within_target=share_within(tasks))
+        result["tasks"] = replace(quantity, within_target=share_within(tasks), coverage_factor=tasks[0].coverage_factor)
     order = list(DESCRIPTIONS)
     return dict(sorted(result.items(), key=lambda item: order.index(item[0])))
+
+
+@single_threaded
+def length_uncertainties(
+    design: Design, layout: SharedLayout, state: State, found: Covariance, target: Target | None = None
+) -> Quantity | None:
+    """U6 alone, as `uncertainties` has it; None where there are no two evaluation points."""
+    return _of_points(design, layout, state, found, 1.0, target)[1] if len(design.points) else None
+
+
+def _of_points(
+    design: Design, layout: SharedLayout, state: State, found: Covariance, sigma: float, target: Target | None
+) -> tuple[Array, Quantity | None]:
+    """U4 (points, d), not multiplied by sigma, and U6."""
+    # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
+    limit = None if target is None else Target(target.standard, sigma).standard
+    of_points, pairs = point_pairs(design, layout, state, found, limit)
+    if not pairs.count:
+        return of_points, None
+    share = None if target is None else pairs.within / pairs.count
+    lengths = _of_pairs("U6", pairs, sigma, lambda i: _point(design, i), share)
+    return of_points, lengths if target is None else replace(lengths, coverage_factor=target.coverage_factor)
+
+
+def _point(design: Design, i: int) -> str:
+    """An evaluation point by its number from 1, as in the file, and its place."""
+    place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in design.points[i])
+    return f"point {i + 1} ({place}) mm"
 
 
 def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> Quantity:

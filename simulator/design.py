@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .joint_lengths import LengthWhitening, length_whitening
 from .machines.protocol import Array, ErrorModel
-from .quantities import LengthFunction
+from .quantities import Target
 
 Integers = NDArray[np.int64]
 
@@ -156,7 +156,7 @@ class Design:
     the origins of their positions. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none
     is. `length_names` and `drawn_lengths` (in metres) are those of length standards without certificates, which are
     parameters. `task_points` (t, 2, d) are what the scales say at the ends of the lengths that the machine is to
-    measure, `task_probes` (t, 2) what measures there, and `task_targets` (t,) the standard uncertainties to be reached.
+    measure, `task_probes` (t, 2) what measures there, and `task_targets` (t,) what uncertainties are to be within.
     """
 
     model: ErrorModel
@@ -189,7 +189,7 @@ class Design:
     task_names: tuple[str, ...] = ()
     task_points: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
     task_probes: Integers = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    task_targets: tuple[LengthFunction | None, ...] = ()
+    task_targets: tuple[Target | None, ...] = ()
 
     @property
     def dimension(self) -> int:

@@ -90,7 +90,13 @@ LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
 QUANTITY = re.compile(rf"({NUMBER})\s*([^\s0-9.+-].*)?")
-CONSTANT_AND_SLOPE = re.compile(rf"([^+]*(?:[eE]\+[^+]*)?)\+\s*L\s*/\s*({NUMBER})\s*")
+CONSTANT_AND_DIVISOR = re.compile(rf"([^+]*(?:[eE]\+[^+]*)?)\+\s*L\s*/\s*({NUMBER})\s*")
+CONSTANT_AND_RATIO = re.compile(rf"\s*([+-]?[^+]*(?:[eE]\+[^+]*)?)\+\s*({NUMBER}\s*[^\s0-9+-][^+]*)")
+WITH_UNIT_OF_LENGTH = re.compile(
+    rf"\s*\(\s*({NUMBER})\s*\+\s*L\s*/\s*({NUMBER})\s*\)\s*([^\s0-9()]+)\s+with\s+L\s+in\s+(\S+)\s*"
+)
+# No uncertainty of a length grows so fast: it is millimetres that were divided, as data sheets do.
+STEEPEST = Fraction(1, 10**4)
 
 
 class QuantityError(ValueError):
@@ -293,43 +299,128 @@ class LengthFunction:
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        pattern = f"{_pattern('length')[:-1]}( *\\+ *L */ *{NUMBER})?$"
-        return {"type": "string", "pattern": pattern, "examples": ["0.2 um", LENGTH_FUNCTION_EXAMPLE]}
+        constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
+        units = f"({'|'.join(_unit_patterns('length'))})"
+        growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
+        stated = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
+        return {
+            "type": "string",
+            "pattern": f"^({growing}|{stated})$",
+            "examples": ["0.2 um", LENGTH_FUNCTION_EXAMPLE, "0.9 um + 2.5 um/m", "(0.9 + L/400) um with L in mm"],
+        }
+
+
+@dataclass(frozen=True)
+class Target:
+    """What an uncertainty is to be within: ``coverage_factor`` times the standard uncertainty, at most ``stated``."""
+
+    stated: LengthFunction
+    coverage_factor: float = 1.0
+
+    @property
+    def standard(self) -> LengthFunction:
+        """What the standard uncertainty is to be within.
+
+        >>> Target(LengthFunction(1e-6), 2.0).standard
+        LengthFunction(constant=5e-07, slope=0.0)
+        """
+        k = self.coverage_factor
+        return LengthFunction(self.stated.constant / k, self.stated.slope / k)
+
+    def at(self, length: ArrayLike) -> NDArray[np.float64]:
+        """Return what standard uncertainties (m, any shape) are to be within at lengths (m, the same shape)."""
+        return self.standard.at(length)
 
 
 def parse_length_function(value: object) -> LengthFunction:
-    """Read a length that may depend on the measured length: ``A`` or ``A + L/K``, with L in metres.
+    """Read a length that may depend on the measured length.
 
-    :raises QuantityError: written otherwise, negative, or zero at every length.
+    ``A`` or ``A + L/K``, with L in metres; ``A + B`` with B a ratio; ``(A + L/K) unit with L in unit``.
+
+    :raises QuantityError: written otherwise, negative, zero at every length, or growing by 1e-4 or more.
 
     >>> parse_length_function("0.5 um + L/1000000")
     LengthFunction(constant=5e-07, slope=1e-06)
+    >>> parse_length_function("(0.9 + L/400) um with L in mm") == parse_length_function("0.9 um + 2.5 ppm")
+    True
     """
-    if not isinstance(value, str) or "L" not in value and "ppm" not in value:
-        constant = parse_length(value)
-        if constant <= 0:
-            _positive(value, constant)
-        return LengthFunction(constant)
-    match = CONSTANT_AND_SLOPE.fullmatch(value)
-    if match is None and "ppm" in value:
-        raise QuantityError(
-            f'"{shorten(value)}" is no such length; write for example "{LENGTH_FUNCTION_EXAMPLE}" for 0.5 um + 1 ppm'
-        )
+    if not isinstance(value, str) or "L" not in value and "+" not in value.strip()[1:]:
+        return _constant(value)
+    if "L" not in value:
+        match = CONSTANT_AND_RATIO.fullmatch(value)
+        if match is None:
+            return _constant(value)
+        return _growing(value, match[1], exact_ratio(match[2]))
+    if match := WITH_UNIT_OF_LENGTH.fullmatch(value):
+        number, divisor, unit, of_length = match.groups()
+        # Read for the messages about units.
+        parse_length(f"1 {unit}")
+        parse_length(f"1 {of_length}")
+        per = LENGTH_UNITS[_plain(unit)] / LENGTH_UNITS[_plain(of_length)]
+        return _growing(value, f"{number} {unit}", _inverse(value, divisor) * per)
+    match = CONSTANT_AND_DIVISOR.fullmatch(value)
     if match is None:
         raise QuantityError(
-            f'"{shorten(value)}" is not a length that grows with L; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
+            f'"{shorten(value)}" is not a length that grows with L; write for example "{LENGTH_FUNCTION_EXAMPLE}", '
+            'with L in metres, "0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L in mm"'
         )
-    constant = parse_length(match[1].strip())
-    divisor = exact_number(match[2])
-    if constant < 0 or divisor <= 0:
+    return _growing(value, match[1], _inverse(value, match[2]), in_metres=True)
+
+
+def exact_ratio(value: str) -> Fraction:
+    """Read a ratio exactly.
+
+    :raises QuantityError: not a number with ppm, um/m or the like.
+
+    >>> exact_ratio("2.5 um/m")
+    Fraction(1, 400000)
+    """
+    parse_ratio(value)
+    match = QUANTITY.fullmatch(value.strip())
+    assert match is not None
+    return exact_number(match[1]) * RATIO_UNITS[_plain(match[2])]
+
+
+def _constant(value: object) -> LengthFunction:
+    constant = parse_length(value)
+    if constant <= 0:
+        _positive(value, constant)
+    return LengthFunction(constant)
+
+
+def _inverse(value: str, divisor: str) -> Fraction:
+    number = exact_number(divisor)
+    if number <= 0:
         raise QuantityError(
             f'"{shorten(value)}" has a negative part or divides by zero; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
         )
-    if not 1 <= divisor <= 1 / SMALLEST:
+    return 1 / number
+
+
+def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False) -> LengthFunction:
+    """A length that grows by `slope` metres per metre, if one can; `in_metres` where L is divided without its unit.
+
+    :raises QuantityError: it cannot, or it is a data sheet's that is read as something else.
+    """
+    text = shorten(value)
+    at_zero = parse_length(constant.strip())
+    if at_zero < 0 or slope < 0:
+        raise QuantityError(f'"{text}" has a negative part; write for example "{LENGTH_FUNCTION_EXAMPLE}"')
+    if slope >= STEEPEST:
+        told = constant.strip() if at_zero else "0 um"
+        by = float(1000 * slope)
+        grows = f"{by:.4g} mm" if by < 1e6 else f"{by / 1000:.4g} m"
+        if not in_metres or slope / 1000 >= STEEPEST:
+            raise QuantityError(f'"{text}" grows by {grows} per metre of length; give less than 100 um/m')
         raise QuantityError(
-            f'"{shorten(value)}" grows too fast or too slowly; divide L by 1 to {float(1 / SMALLEST):g}'
+            f'"{text}" grows by {grows} per metre of length, since L is in metres; where L is in millimetres and the '
+            f'result in micrometres, as on data sheets, write "{told} + {float(slope * 1000):.9g} um/m"'
         )
-    return LengthFunction(constant, float(1 / divisor))
+    if slope and slope < SMALLEST:
+        raise QuantityError(f'"{text}" grows too slowly; leave out what it grows by, or give 1e-18 m/m or more')
+    if at_zero == 0 and slope == 0:
+        _positive(value, at_zero)
+    return LengthFunction(at_zero, float(slope))
 
 
 def with_quantities(value: Any) -> Any:
@@ -367,8 +458,7 @@ def _parse(value: object, kind: str) -> float:
     number, unit = match.groups()
     if unit is None:
         raise QuantityError(f'"{text}" has no unit; {_with_unit(text, kind)}')
-    # Both the micro sign and the Greek letter are in use on keyboards.
-    plain = unit.replace("µ", "u").replace("μ", "u")
+    plain = _plain(unit)
     if plain not in units:
         for other, other_units in UNITS.items():
             if plain in other_units:
@@ -377,6 +467,11 @@ def _parse(value: object, kind: str) -> float:
                 )
         raise QuantityError(f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}')
     return metres_or_radians(number, units[plain], kind)
+
+
+def _plain(unit: str) -> str:
+    """A unit in the letters of the tables: both the micro sign and the Greek letter are in use on keyboards."""
+    return unit.strip().replace("µ", "u").replace("μ", "u")
 
 
 def _positive(value: object, found: float, kind: str = "length") -> float:
@@ -401,10 +496,13 @@ def _with_unit(number: str, kind: str) -> str:
     return "write for example " + " or ".join(f'"{number} {unit}"' for unit in units)
 
 
-def _pattern(kind: str) -> str:
+def _unit_patterns(kind: str) -> list[str]:
     names = [re.escape(unit) for unit in UNITS[kind]]
-    names += ["[µμ]" + name[1:] for name in names if name.startswith("u")]
-    return f"^ *{NUMBER} *({'|'.join(names)})$"
+    return names + ["[µμ]" + name[1:] for name in names if name.startswith("u")]
+
+
+def _pattern(kind: str) -> str:
+    return f"^ *{NUMBER} *({'|'.join(_unit_patterns(kind))})$"
 
 
 def _schema(kind: str, *examples: str) -> WithJsonSchema:

@@ -6,20 +6,25 @@ import os
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from .common import add_file
+from .common import add_file, percentage
+
+if TYPE_CHECKING:
+    from ..checking import CheckedDesign
 
 FORMATS = ("text", "github", "junit", "json")
-AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
+AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "check",
         help="judge whether designs determine all their parameters",
-        description="Judge the rank of each design. The exit status is 0 if every deficiency is the one that the "
-        "file expects (none, where it says nothing), otherwise 1; it is 3 if a file cannot be used, and the others "
-        "are then checked nevertheless.",
+        description="Judge the rank of each design, and tell which share of lengths is within its target and what "
+        "carries its scale. The exit status is 0 if every deficiency is the one that the file expects (none, where it "
+        "says nothing), every --goal is met and, with --fail-weak, nothing is weakly determined, otherwise 1; it is 3 "
+        "if a file cannot be used, and the others are then checked nevertheless.",
     )
     add_file(parser, several=True)
     parser.add_argument(
@@ -36,28 +41,50 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="store_true",
         help="tell the cheapest changes after which nothing is undetermined or weakly determined, each verified",
     )
+    parser.add_argument(
+        "--goal",
+        action="append",
+        default=[],
+        help="what a design must reach, too, as in ballplate reach: lengths (U6 within target_accuracy), tasks, or a "
+        'quantity such as "U6 average 0.5 um"; may be repeated',
+    )
+    parser.add_argument(
+        "--share", metavar="95%", type=percentage, help="of the lengths that are to be within, with --goal lengths"
+    )
+    parser.add_argument(
+        "--fail-weak", action="store_true", help="let a design with a weakly determined direction fail, too"
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..annotations import annotation_lines
-    from ..checking import check_files
+    from ..annotations import advice_lines, annotation_lines
+    from ..checking import Wanted, check_files
+    from ..goals import GoalError, parse_goal
     from ..junit import junit_report
-    from ..planning.repair.tables import repair_data, repair_lines
     from ..tables import plan_data, plan_lines
     from .common import print_json, print_lines
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
+    try:
+        with_share = {"lengths": options.share}
+        goals = tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
+    except GoalError as error:
+        print(f"ballplate check: {error}", file=sys.stderr)
+        return WRONG_USAGE
+    if options.share is not None and "lengths" not in options.goal:
+        print("ballplate check: --share goes with --goal lengths; add it", file=sys.stderr)
+        return WRONG_USAGE
     files = []
-    for checked in check_files(options.files, options.variant, options.suggest):
+    for checked in check_files(options.files, options.variant, Wanted(goals, options.fail_weak, options.suggest)):
         files.append(checked)
         if options.format == "github":
             for line in annotation_lines(checked, workspace):
                 print(line, flush=True)
         elif options.format == "text":
             for design in checked.designs:
-                print_lines([*plan_lines(design.plan), *repair_lines(design.repairs, design.plan.verdict)])
+                print_lines([*plan_lines(design.plan), *advice_lines(design)])
         if options.format in ("text", "json"):
             for message in checked.messages:
                 print(message, file=sys.stderr)
@@ -65,8 +92,20 @@ def run(options: Namespace) -> int:
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        suggested = [{"repairs": repair_data(design.repairs)} if options.suggest else {} for design in designs]
-        print_json([plan_data(one.plan) | more for one, more in zip(designs, suggested, strict=True)])
+        print_json([plan_data(one.plan) | _asked(one, options.suggest) for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED
+
+
+def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:
+    """What was asked for besides the rank, as plain data."""
+    from ..planning.repair.tables import certificate_data, repair_data
+
+    told: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
+    if with_suggestions:
+        told |= {
+            "repairs": repair_data(design.repairs),
+            "scale_certificate": certificate_data(design.certificate),
+        }
+    return told

@@ -26,9 +26,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="map the uncertainty of lengths over the volume against a target",
         description="Compute the standard uncertainty u of the length between every two points of a grid over the "
         "volume, measured on the corrected machine, and compare it and the expanded uncertainty k u with the target by "
-        "length, direction and place. The target accuracy of a file is meant for u. The scatter of the readings that "
-        "will measure a length is no part of u unless asked for. The exit status is 0 if the rank is as expected, "
-        "otherwise 1.",
+        "length, direction and place. A target is meant for u, or for U = k u where the file states a coverage_factor. "
+        "The scatter of the readings that will measure a length is no part of u unless asked for. The exit status is "
+        "0 if the rank is as expected and, with --fail, all lengths are within the target, otherwise 1.",
     )
     add_file(parser)
     parser.add_argument("--target", metavar="LENGTH", help='instead of target_accuracy, such as "0.5 um + L/1000000"')
@@ -41,7 +41,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument("--probe", metavar="NAME", help="probe that measures them; default evaluation.probe")
     parser.add_argument(
-        "--coverage-factor", metavar="K", type=_factor, default=2.0, help="of the expanded uncertainty; default 2"
+        "--coverage-factor",
+        metavar="K",
+        type=_factor,
+        help="of the expanded uncertainty; default that of the file, or 2",
+    )
+    parser.add_argument(
+        "--fail", action="store_true", help="end with exit status 1 unless all lengths are within the target"
     )
     parser.add_argument(
         "--with-repeatability", action="store_true", help="count the scatter of the two readings of a length, too"
@@ -102,7 +108,9 @@ def run(options: Namespace) -> int:
         is_written &= draw(lambda path: draw_lengths(found, path), options.plot)
     if not is_written:
         return BAD_FILE
-    return 0 if found.deficiency == (experiment.expected_rank_deficiency or 0) else NOT_AS_EXPECTED
+    is_missed = options.fail and not found.is_met
+    is_expected = found.deficiency == (experiment.expected_rank_deficiency or 0)
+    return 0 if is_expected and not is_missed else NOT_AS_EXPECTED
 
 
 def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
@@ -113,9 +121,11 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
     from simulator.settings import hint
 
     from ..lengths import MOST_POINTS, Settings
+    from ..tasks import expansion
 
     try:
-        target = experiment.target_accuracy if options.target is None else parse_length_function(options.target)
+        stated = None if experiment.target_accuracy is None else experiment.target_accuracy.stated
+        target = stated if options.target is None else parse_length_function(options.target)
     except QuantityError as error:
         return f"--target: {error}"
     if target is None:
@@ -132,7 +142,9 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
     named = [path.resolve() for path in (options.csv, options.pairs, options.plot) if path is not None]
     if len({*named, options.files[0].resolve()}) <= len(named):
         return "two of --csv, --pairs, --plot and the experiment are the same file; name another"
-    return Settings(grid, probe, target, options.coverage_factor, options.with_repeatability)
+    factor = experiment.coverage_factor
+    expanded = options.coverage_factor or expansion(factor)
+    return Settings(grid, probe, target, expanded, options.with_repeatability, factor)
 
 
 def _write(path: Path, lines: Iterable[str]) -> bool:

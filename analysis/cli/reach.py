@@ -18,7 +18,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         description="Solve for one unknown of a design at a time, the others as drawn: the largest repeatability or "
         "certificate uncertainty, and the fewest repeats, fewest balls or smallest plate that meet a goal. What is "
         "told is a value of three digits, or a whole number, with which the file was planned; the next one fails. "
-        "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1.",
+        "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1; "
+        "with --fail it is 0 if the design as drawn meets the goal, otherwise 1.",
     )
     add_file(parser)
     parser.add_argument("--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated")
@@ -41,6 +42,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=whole,
         help="entry of the list that varies, the first is 0; default: all by the same factor",
     )
+    parser.add_argument(
+        "--fail", action="store_true", help="end with exit status 1 unless the design as drawn meets the goal"
+    )
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -49,7 +53,7 @@ def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
     from simulator.quantities import QuantityError, parse_length_function
 
-    from ..reach.goals import GoalError, parse_goal
+    from ..goals import GoalError, parse_goal
     from ..reach.search import reach
     from ..reach.tables import reach_data, reach_lines
     from ..reach.unknowns import NotVariableError
@@ -67,5 +71,7 @@ def run(options: Namespace) -> int:
         print_json([reach_data(found)])
     else:
         print_lines(reach_lines(found))
+    if options.fail:
+        return 0 if found.present.is_met else 1
     met = [one.is_met for one in found.answers]
     return 0 if (all if options.by else any)(met) else 1

@@ -56,7 +56,7 @@ def run(options: Namespace) -> int:
         print("ballplate run: --seed and --workers have a meaning with --trials or --until only", file=sys.stderr)
         return WRONG_USAGE
     for experiment in experiments(options):
-        plans.append(plan(experiment))
+        plans.append(plan(experiment, with_scale=True))
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plan_lines(plans[-1])])
         data: dict[str, Any] = plan_data(plans[-1])

@@ -322,7 +322,7 @@ def _target(experiment: Experiment, name: str, functions: Functions | None) -> f
     if functions is None or target is None:
         return None
     if name.endswith("-maximum"):
-        return target.constant if target.slope == 0 else None
+        return target.standard.constant if target.standard.slope == 0 else None
     return float(target.at(functions.lengths).mean())
 
 

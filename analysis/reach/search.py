@@ -16,8 +16,8 @@ from simulator.experiment.yamltree import Mapping, Node, Scalar
 from simulator.settings import listing
 from simulator.threads import single_threaded
 
+from ..goals import Goal, Judgement, check_goal, judge
 from ..study import Worth, plan, worth
-from .goals import Goal, Judgement, check_goal, judge
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
 

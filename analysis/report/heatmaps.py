@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..tables import number
 from .measures import Measure, uncertainty_measures
-from .results import Axis, Results, criterion
-from .tables import DIGITS, NOT_DONE, Entry
+from .results import Axis, Results, criterion, partly_open
+from .tables import DIGITS, NOT_DONE, STAR, Entry
 
 # Values of an axis that are shown, shades that can be told apart, and pairs of axes.
 MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
@@ -19,7 +19,10 @@ MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
 
 @dataclass(frozen=True)
 class Heat:
-    """A measure over two axes; `shades` from 0, the smallest, to SHADES - 1, or -1 where there is none."""
+    """A measure over two axes; `shades` from 0, the smallest, to SHADES - 1, or -1 where there is none.
+
+    What is undetermined even in part has none.
+    """
 
     rows: Axis
     columns: Axis
@@ -51,7 +54,10 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
     row_of, row_labels = _grouped(rows)
     column_of, column_labels = _grouped(columns)
     shape = len(row_labels), len(column_labels)
-    values = np.where(results.done, results.figure(measure.figure), np.nan)
+    open_ = partly_open(results, measure.symbol)
+    figures = np.where(results.done, results.figure(measure.figure), np.nan)
+    values = np.where(open_, np.nan, figures)
+    any_open = False
     place = row_of[results.chosen[:, i]] * shape[1] + column_of[results.chosen[:, j]]
     members = _members(place, shape[0] * shape[1])
     planned = np.bincount(row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members))
@@ -61,16 +67,22 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
         if len(known):
             medians[k] = np.median(values[known])
         text = number(measure.factor * medians[k], DIGITS) if len(known) else "-" if len(rows_here) else NOT_DONE
+        is_open = bool((open_ & results.done)[rows_here].any())
+        any_open |= is_open
+        if is_open and len(rows_here) == 1 and np.isfinite(figures[rows_here[0]]):
+            text = number(measure.factor * figures[rows_here[0]], DIGITS)
+        text += STAR if is_open else ""
         if planned[k] == 1 and len(rows_here):
             row = int(rows_here[0])
             status = results.statuses[row]
             is_done = status == "done"
-            value = float(values[row]) if is_done else None
+            value = float(figures[row]) if is_done else None
             cell = int(results.frame["cell"].to_numpy()[row])
             entries.append(Entry(text if is_done else status, value, cell, measure.figure))
         else:
             entries.append(Entry(text if planned[k] else ""))
-    note = "" if planned.max() <= 1 else "Medians over all cells that share the two values."
+    notes = [] if planned.max() <= 1 else ["Medians over all cells that share the two values."]
+    notes += [f"{STAR} marks what is undetermined, in part at least; it has no shade."] if any_open else []
     return Heat(
         rows,
         columns,
@@ -79,7 +91,7 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
         column_labels,
         tuple(tuple(entries[r * shape[1] : (r + 1) * shape[1]]) for r in range(shape[0])),
         tuple(tuple(row) for row in _shades(medians).reshape(shape).tolist()),
-        note,
+        " ".join(notes),
     )
 
 

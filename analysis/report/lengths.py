@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simulator.machines.protocol import Array
 
 from ..length_tables import target_words
 from ..lengths import LengthMap
-from ..reach.goals import percent
+from ..tables import percent
 from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
 
 if TYPE_CHECKING:
@@ -32,7 +33,9 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
     :raises OSError: the file cannot be written.
     """
     counts = found.settings.grid
-    ratios = found.by_point.maximum_ratio.reshape(counts)
+    factor = found.settings.target_factor
+    ratios = factor * found.by_point.maximum_ratio.reshape(counts)
+    marked, meaning = marks(ratios)
     levels = np.zeros(1, np.int64)
     if len(counts) == 3:
         levels = np.unique(np.linspace(0, counts[2] - 1, min(counts[2], MOST_SLICES)).round().astype(int))
@@ -53,14 +56,16 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
             row, column = divmod(place, columns)
             bottom = under + maps - (row + 1) * high - row * ABOVE
             axes = placed_axes(figure, LEFT + column * (side + BETWEEN), bottom, side, high)
-            image = _slice(axes, found, ratios[..., level] if len(counts) == 3 else ratios, limits)
+            here = (..., level) if len(counts) == 3 else (...,)
+            image = _slice(axes, found, ratios[here], marked[here], limits)
             if len(counts) == 3:
                 axes.set_title(f"z = {_millimetres(found, 2, int(level))} mm", loc="left")
             is_lowest = place + columns >= len(levels)
             axes.tick_params(bottom=is_lowest, labelbottom=is_lowest, left=column == 0, labelleft=column == 0)
             axes.set_xlabel("x, mm" if is_lowest else "")
             axes.set_ylabel("y, mm" if column == 0 else "")
-        head = "largest u / target of the lengths from or to a point" + _mark_words(found, known)
+        u = "u" if factor == 1.0 else f"{factor:g} u"
+        head = f"largest {u} / target of the lengths from or to a point" + _mark_words(found, meaning)
         figure.text(LEFT / WIDTH, 1.0 - 14.0 / total, head, fontsize=10.5, va="center")
         if image is not None and len(known):
             bar = placed_axes(figure, LEFT + columns * (side + BETWEEN) + 4.0, under, 10.0, maps)
@@ -69,26 +74,45 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
         _curves(axes, found)
         shares = [percent(float(found.whole.share(expanded)[0])) for expanded in (False, True)]
         k = f"{found.settings.coverage_factor:g}"
-        words = f"target {micro(target_words(found.settings.target))}: u within it for {shares[0]} the lengths, "
-        save(figure, path, f"{words}{k} u for {shares[1]} them")
+        words = f"target {micro(target_words(found.settings.target))}: u within it for {shares[0]} of the lengths, "
+        save(figure, path, f"{words}{k} u for {shares[1]} of them")
 
 
-def _mark_words(found: LengthMap, known: Array) -> str:
-    words = "; crosses: above 1" if (known > 1.0).any() else ""
+def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
+    """Which points are marked, by their ratios to the target, and what the marks mean: the fewer of both kinds are.
+
+    >>> marks(np.array([0.5, 0.6, 1.2]))
+    (array([False, False,  True]), 'crosses: above 1')
+    >>> marks(np.array([1.5, 0.6, 1.2]))
+    (array([False,  True, False]), 'crosses: 1 or below')
+    >>> marks(np.array([1.5, np.nan]))[1], marks(np.array([0.5, np.nan]))[1]
+    ('above 1 everywhere', '')
+    """
+    with np.errstate(invalid="ignore"):
+        missed, met = ratios > 1.0, ratios <= 1.0
+    if not missed.any():
+        return missed, ""
+    if not met.any():
+        return met, "above 1 everywhere"
+    return (missed, "crosses: above 1") if missed.sum() <= met.sum() else (met, "crosses: 1 or below")
+
+
+def _mark_words(found: LengthMap, meaning: str) -> str:
+    words = f"; {meaning}" if meaning else ""
     return words + ("; undetermined ones left out" if found.whole.undetermined[0] else "")
 
 
-def _slice(axes: Axes, found: LengthMap, ratios: Array, limits: tuple[float, float]):  # type: ignore[no-untyped-def]
-    """Ratios (x, y) as colours; crosses where the target is missed, dashes where nothing is determined."""
+def _slice(  # type: ignore[no-untyped-def]
+    axes: Axes, found: LengthMap, ratios: Array, marked: NDArray[np.bool_], limits: tuple[float, float]
+):
+    """Ratios (x, y) as colours, crosses where `marked`, dashes where nothing is determined."""
     sides = [_centres(found, axis) for axis in (0, 1)]
     image = axes.pcolormesh(
         *(_borders(side) for side in sides), np.ma.masked_invalid(ratios.T),
         cmap="viridis", vmin=limits[0], vmax=limits[1], rasterized=False,
     )  # fmt: skip
     x, y = np.meshgrid(*sides, indexing="ij")
-    with np.errstate(invalid="ignore"):
-        missed = ratios > 1.0
-    for chosen, marker in ((missed, "x"), (np.isnan(ratios), "_")):
+    for chosen, marker in ((marked, "x"), (np.isnan(ratios), "_")):
         colour = PAPER if marker == "x" else MUTED
         axes.plot(x[chosen], y[chosen], linestyle="none", marker=marker, color=colour, markersize=4.0)
     for spine in axes.spines.values():

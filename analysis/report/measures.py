@@ -30,6 +30,16 @@ class Measure:
         return f"{self.symbol} {self.statistic}"
 
     @property
+    def stands_for_all(self) -> bool:
+        """Whether the figure is told of all values of the quantity, those undetermined left out."""
+        return self.statistic in (*STATISTICS, "actual average")
+
+    @property
+    def is_share(self) -> bool:
+        """Whether the figure is a share within a target."""
+        return self.statistic == "within target"
+
+    @property
     def title(self) -> str:
         return f"{self.name}, {self.unit}" if self.unit else self.name
 

@@ -16,7 +16,7 @@ from simulator.layout import lay_out
 from simulator.settings import listing
 
 from ..sweeps.store import Store
-from ..tables import number
+from ..tables import number, percent, uncertainty_words
 from ..uncertainty import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
@@ -214,8 +214,8 @@ def _drawn_map(experiment: Experiment, results: Results, cell: int) -> DrawnMap:
         words += " Hatched regions are undetermined."
     if found.within is not None:
         words += (
-            f" Of the distances between all points of this grid {number(100 * found.within, 4)} % are known to within "
-            "the target accuracy, by one standard uncertainty."
+            f" Of the distances between all points of this grid {percent(found.within)} are known to within "
+            f"the target accuracy, by the {uncertainty_words(experiment.coverage_factor)}."
         )
     figures = []
     for k, one in enumerate(found.slices):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from simulator.quantities import QUANTITY, exact_number
 
+from ..sweeps.columns import MORE, symbol_column
 from ..sweeps.frame import frame
 from ..sweeps.store import Store, all_details, chosen_sweep, definition_of
 
@@ -129,6 +130,14 @@ def _axis(stored: dict[str, Any]) -> Axis:
         unit = units.pop()
         numbers = tuple(float(exact_number(one[1])) for one in found if one is not None)
     return Axis(one_line(stored["name"]), stored["column"], labels, numbers, unit)
+
+
+def partly_open(results: Results, symbol: str) -> NDArray[np.bool_]:
+    """Rows of the frame (rows,) in which some of a quantity's values are undetermined, so that others stand for all."""
+    column = f"{symbol_column(symbol.rstrip(MORE))}_undetermined"
+    if column not in results.frame:
+        return np.zeros(len(results.frame), bool)
+    return results.figure(column) > 0
 
 
 def one_line(text: object) -> str:

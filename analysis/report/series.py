@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..sweeps.columns import symbol_column
 from .measures import Measure, trial_symbols, uncertainty_measures
-from .results import Axis, Results
+from .results import Axis, Results, partly_open
 
 Floats = NDArray[np.float64]
 
@@ -79,8 +79,9 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
     groups, note = _places(axis, places)
     is_apart = len(settings) <= MOST_LINES and groups is None
     panels = []
+    left_out = partly_open(results, symbol)[done]
     for measure in measures:
-        values = measure.factor * results.figure(measure.figure)[done]
+        values = np.where(left_out, np.nan, measure.factor * results.figure(measure.figure)[done])
         actual, error = _actual(results, measure, done)
         lines = []
         if is_apart:
@@ -101,6 +102,8 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
     if not is_apart:
         over = f"the {len(settings)} settings of the other axes" if len(settings) > 1 else "these values"
         note = f"Median, with bars from the smallest to the largest, over {over}{note}."
+    if left_out.any():
+        note = f"{note} Cells in which some of it is undetermined are left out.".strip()
     return Plot(axis, symbol, measures[0].unit, tuple(panels), note)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..montecarlo.figures import Figure
 from ..montecarlo.tables import with_error
 from ..sweeps.columns import symbol_column
-from ..tables import number
+from ..tables import number, percent
 from .measures import (
     Measure,
     descriptions,
@@ -17,7 +17,7 @@ from .measures import (
     trial_measures,
     uncertainty_measures,
 )
-from .results import Results, criterion, ranked
+from .results import Results, criterion, partly_open, ranked
 
 DIGITS = 3
 
@@ -26,6 +26,9 @@ MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
 MOST_BEST = 10
 
 NOT_DONE = "left"
+
+# Behind a value that leaves out what is undetermined.
+STAR = "*"
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ def report_tables(results: Results) -> tuple[Table, ...]:
     """All tables of figures: the uncertainties and, where trials were made, those of Monte Carlo."""
     beside = _is_beside(results)
     measures = [*rank_measures(results), *uncertainty_measures(results, beside)]
-    open_ = "Maxima and averages leave out what is undetermined."
+    open_ = f"Maxima and averages leave out what is undetermined; {STAR} marks those that do."
     notes = (open_,) if rank_measures(results) else ()
     found = [_table(results, "uncertainties", "Standard uncertainties", measures, beside, notes)] if measures else []
     if not beside and len(results.frame) > 1:
@@ -95,7 +98,7 @@ def report_tables(results: Results) -> tuple[Table, ...]:
             "U5 and U6 are followed over 1000 distances where there are more, of which actual is the average and which "
             "spread / U compares with their own U."
         )
-        found.append(_table(results, "monte-carlo", caption, of_trials, beside, (note,)))
+        found.append(_table(results, "monte-carlo", caption, of_trials, beside, (note, *notes)))
     return tuple(found)
 
 
@@ -193,8 +196,13 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
         text = "-" if math.isnan(value) else f"{value:.0f}"
     elif measure.error:
         text = with_error(Figure(value, results.value(measure.error, row)), measure.factor)
+    elif measure.is_share:
+        # Never rounded up: what is told to be all is all.
+        text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
     else:
         text = number(measure.factor * value, DIGITS)
+    if measure.stands_for_all and partly_open(results, measure.symbol)[row] and not math.isnan(value):
+        text += STAR
     return Entry(text, value, cell, measure.figure)
 
 

@@ -37,7 +37,7 @@ class ErrorMap:
     """Standard uncertainty of the error function at a grid of x and y in metres, one or three slices.
 
     A value is the root mean square over the co-ordinates, so that it compares with U4. `within` is the share of the
-    distances between points of the grid whose standard uncertainty is within the target accuracy, None without one.
+    distances between points of the grid that are within the target accuracy, None without one.
     """
 
     x: Array
@@ -61,8 +61,10 @@ def error_map(experiment: Experiment) -> ErrorMap:
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
     spread = covariance(design, factor, spectrum(factor))
-    of_points, pairs = point_pairs(design, layout, state, spread, experiment.target_accuracy)
+    target = experiment.target_accuracy
+    limit = None if target is None else target.standard
+    of_points, pairs = point_pairs(design, layout, state, spread, limit)
     values = np.sqrt((of_points**2).mean(axis=1)).reshape(grid.shape[:-1])
     slices = [Slice(name, level, found) for (name, level), found in zip(levels, values, strict=True)]
-    within = None if experiment.target_accuracy is None else pairs.within / pairs.count
+    within = None if target is None else pairs.within / pairs.count
     return ErrorMap(x, y, tuple(slices), within)

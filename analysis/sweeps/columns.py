@@ -12,6 +12,10 @@ NAMES = (
 )
 
 
+# What marks the symbol of a further artefact in Monte Carlo.
+MORE = "'"
+
+
 def is_reserved(column: str) -> bool:
     """Whether a column may be recorded, so that no axis can have its name.
 
@@ -27,7 +31,7 @@ def symbol_column(symbol: str) -> str:
     >>> symbol_column("U2 lengths"), symbol_column("U5'")
     ('U2_lengths', 'U5_more')
     """
-    return symbol.replace(" ", "_").replace("'", "_more")
+    return symbol.replace(" ", "_").replace(MORE, "_more")
 
 
 def unit_suffix(unit: str) -> str:

@@ -166,6 +166,7 @@ def plan_figures(planned: Plan, record: tuple[str, ...]) -> tuple[dict[str, floa
         figures[f"{name}_maximum_{unit}"] = one.maximum
         figures[f"{name}_average_{unit}"] = one.average
         figures[f"{name}_undetermined"] = float(one.undetermined)
+        figures[f"{name}_count"] = float(one.count)
         if one.within_target is not None:
             figures[f"{name}_within_target"] = one.within_target
     details = {

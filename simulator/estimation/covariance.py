@@ -120,6 +120,15 @@ class Covariance:
         return blank(result, self.ball_null, np.full(result.shape, self.ball_scale))
 
 
+def shared_covariance(design: Design, found: Spectrum) -> Covariance:
+    """A covariance without that of the balls, of which nothing counts as open: of shared parameters alone."""
+    n, d = design.balls.shape
+    empty = np.zeros((n, d, 0))
+    return Covariance(
+        found.root, empty, np.zeros((n, d, d)), found.null, np.zeros((n, d, found.deficiency)), found.scale
+    )
+
+
 def blank(values: Array, change: Array, size: Array) -> Array:
     """`values` with NaN where a null direction's `change` (..., deficiency) is no mere rounding of `size`."""
     if change.shape[-1] == 0:

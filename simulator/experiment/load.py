@@ -17,7 +17,7 @@ from .checks import (
     check_true_machine,
     check_use,
 )
-from .machine import resolve_evaluation, resolve_machine
+from .machine import resolve_evaluation, resolve_machine, target_of
 from .messages import ExperimentError, Message, Steps, format_path
 from .model import Calibration, Experiment
 from .placements import resolve_position
@@ -155,10 +155,11 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         positions=tuple(positions.values()),
         calibration=tuple(calibrations.values()),
         evaluation=evaluation,
-        target_accuracy=sections.get("target_accuracy"),
+        target_accuracy=target_of(sections),
         sigma=sections.get("sigma"),
         expected_rank_deficiency=sections.get("expected_rank_deficiency"),
         seed=sections.get("seed"),
+        coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,

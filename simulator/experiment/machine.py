@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import format_length
+from ..quantities import LengthFunction, Target, format_length
 from ..settings import hint
 from .checks import TOLERANCE, check_points
 from .messages import ExperimentError, Steps
@@ -114,8 +114,13 @@ def _task(
     if np.linalg.norm(np.diff(points + [offsets[name] for name in probes], axis=0)) <= TOLERANCE:
         problems.add((*steps, "to"), "is where the length begins; give two points")
         return None
-    target = settings.target_accuracy or sections.get("target_accuracy")
-    return Task(settings.name, frozen(points), probes, target)
+    return Task(settings.name, frozen(points), probes, target_of(sections, settings.target_accuracy))
+
+
+def target_of(sections: Sections, own: LengthFunction | None = None) -> Target | None:
+    """What uncertainties are to be within: a length of its `own`, or else the file's, and which of them it is about."""
+    stated = own or sections.get("target_accuracy")
+    return None if stated is None else Target(stated, sections.get("coverage_factor"))
 
 
 def _unknown(probe: str, references: References) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
-from ..quantities import LengthFunction
+from ..quantities import LengthFunction, Target
 from .yamltree import Mark
 
 if TYPE_CHECKING:
@@ -144,13 +144,13 @@ class Prior:
 class Task:
     """A length that the machine is to measure: ``points`` (2, d) in metres, and the probes of its ends.
 
-    ``target``: the standard uncertainty to be reached, None where neither the task nor the file states one.
+    ``target``: what is to be reached, None where neither the task nor the file states it.
     """
 
     name: str
     points: Floats
     probes: tuple[str, str]
-    target: LengthFunction | None
+    target: Target | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,8 @@ class Experiment:
 
     ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres. ``layouts``:
     name of an artefact → its balls. ``target_accuracy`` and ``expected_rank_deficiency`` are None where
-    nothing was stated. ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
+    nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are meant for.
+    ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
     by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
     may choose from.
     """
@@ -186,10 +187,11 @@ class Experiment:
     positions: tuple[Position, ...]
     calibration: tuple[Calibration, ...]
     evaluation: Evaluation
-    target_accuracy: LengthFunction | None
+    target_accuracy: Target | None
     sigma: Literal["estimated", "given"]
     expected_rank_deficiency: int | None
     seed: int
+    coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None

@@ -98,7 +98,7 @@ class TaskSettings(Settings):
     probe: Name | None = Field(None, description="probe that both ends are measured with; default: evaluation.probe")
     probes: tuple[Name, Name] | None = Field(None, description="probes of the two ends, instead of probe")
     target_accuracy: LengthFunction | None = Field(
-        None, description="standard uncertainty to be reached; default: target_accuracy of the file"
+        None, description="what is to be reached, as target_accuracy of the file, which is the default"
     )
 
 
@@ -156,7 +156,14 @@ class ExperimentSettings(Settings):
     )
     evaluation: EvaluationSettings | None = Field(None, description="where the machine's uncertainty is evaluated")
     target_accuracy: LengthFunction | None = Field(
-        None, description="accuracy to be reached, such as 0.5 um + L/1000000"
+        None,
+        description="what standard uncertainties, or coverage_factor times these, are to be within, such as "
+        "0.5 um + L/1000000 with L in metres, 0.9 um + 2.5 um/m, or (0.9 + L/400) um with L in mm",
+    )
+    coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
+        1.0,
+        description="k of the expanded uncertainty U = k u that is compared with target_accuracy; default 1: the "
+        "standard uncertainty u is",
     )
     sigma: Literal["estimated", "given"] = Field(
         "estimated",

@@ -19,7 +19,7 @@ from simulator.estimation.initial import initial_state
 from simulator.estimation.parameters import SharedLayout, shared_layout
 from simulator.generate import noisy_certificate, noisy_readings
 from simulator.geometry.motions import rotation_from_vector
-from simulator.quantities import LengthFunction
+from simulator.quantities import LengthFunction, Target
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
 seeds = st.integers(0, 2**31)
@@ -216,8 +216,9 @@ def test_share_of_distances_within_the_target() -> None:
         pair = replace(design, points=design.points[[i, j]])
         length = float(np.linalg.norm(design.points[i] - design.points[j]))
         values.append((uncertainties(pair, layout, state, spread)["U6"].maximum, length))
-    for constant, slope, sigma in ((2e-7, 0.0, 1.0), (1e-7, 2e-7, 1.0), (1e-7, 2e-7, 1.7)):
-        target = LengthFunction(constant, slope)
+    cases = ((2e-7, 0.0, 1.0, 1.0), (1e-7, 2e-7, 1.0, 1.0), (1e-7, 2e-7, 1.7, 1.0), (3e-7, 4e-7, 1.2, 2.0))
+    for constant, slope, sigma, k in cases:
+        target = Target(LengthFunction(constant, slope), k)
         found = uncertainties(design, layout, state, spread, sigma, target)["U6"].within_target
-        assert found == np.mean([sigma * u <= constant + slope * length for u, length in values])
+        assert found == np.mean([k * sigma * u <= constant + slope * length for u, length in values])
         assert found is not None and 0 < found < 1

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 from analysis.cli import main
-from analysis.reach.goals import Goal, GoalError, parse_goal
+from analysis.goals import Goal, GoalError, parse_goal
 from analysis.reach.search import Answer, reach
 from analysis.reach.steps import at_step, round_down, round_up, step_of
 from analysis.reach.unknowns import NotVariableError

@@ -192,8 +192,10 @@ def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pyt
     assert run("check", "--suggest", *chosen) == 1
     lines = capsys.readouterr().out.splitlines()
     repairs_told = [line for line in lines if line.startswith("repair ")]
+    of_scale = [line for line in lines if line.startswith(("scale: calibrate", "scale, in the file"))]
+    assert len(of_scale) == 2 and lines.index(of_scale[0]) < lines.index(repairs_told[0])
     # What is told without suggestions stays as it is, and nothing is suggested where nothing is open.
-    assert [line for line in lines if line not in repairs_told] == plain.splitlines()
+    assert [line for line in lines if line not in [*repairs_told, *of_scale]] == plain.splitlines()
     assert repairs_told[0].startswith("repair 1: turn position ") and "full rank" in repairs_told[0]
     assert sum("in the file: " not in line for line in repairs_told) == 3
 
@@ -202,7 +204,9 @@ def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pyt
     assert run("check", "--json", "--suggest", *chosen) == 1
     good, bad = json.loads(capsys.readouterr().out)
     assert good.pop("repairs") is None
+    assert good.pop("scale_certificate")["text"] == of_scale[0].split(": ")[1]
     suggested = bad.pop("repairs")
+    assert bad.pop("scale_certificate") is None
     assert [good, bad] == before
     assert [one["rank_deficiency"] for one in suggested["complete"]] == [0, 0, 0]
     assert suggested["complete"][0]["removes"] == [1, 2]
@@ -210,8 +214,10 @@ def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pyt
     assert 1e-7 < suggested["complete"][0]["average_U6"] < 1e-6
 
     assert run("check", "--format", "github", "--suggest", *chosen) == 1
-    as_expected, error = capsys.readouterr().out.splitlines()
-    assert "repair" not in as_expected and "%0Arepair 1: turn position " in error
+    as_expected, *certificate, error = capsys.readouterr().out.splitlines()
+    assert "warning: the scale rests on probe offsets" in as_expected and "repair" not in as_expected
+    assert [line.split(": ", 3)[3] for line in certificate] == of_scale
+    assert "%0Arepair 1: turn position " in error
     assert run("check", "--format", "junit", "--suggest", *chosen) == 1
     failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
     assert failure is not None and "\nrepair 1: turn position " in (failure.text or "")

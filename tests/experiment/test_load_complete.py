@@ -9,7 +9,7 @@ import pytest
 from simulator.experiment import CoordinateCalibration, DistanceCalibration, Experiment, load
 from simulator.experiment.sections import ExperimentSettings
 from simulator.experiment.yamltree import Mapping, read_tree, walk
-from simulator.quantities import LengthFunction
+from simulator.quantities import LengthFunction, Target
 
 COMPLETE = """\
 # yaml-language-server: $schema=schema.json
@@ -81,6 +81,7 @@ evaluation:
   points: {random: 200, seed: 1}
   probe: side
 target_accuracy: 0.5 um + L/1000000
+coverage_factor: 2
 sigma: given
 expected_rank_deficiency: 0
 seed: 7
@@ -142,7 +143,7 @@ def test_the_file_uses_every_key(complete: Experiment) -> None:
 def test_heading(complete: Experiment) -> None:
     assert (complete.title, complete.description) == ("Every key", "at least once")
     assert (complete.name, complete.label, complete.seed, complete.sigma) == (None, "design", 7, "given")
-    assert complete.target_accuracy == LengthFunction(5e-7, 1e-6)
+    assert complete.target_accuracy == Target(LengthFunction(5e-7, 1e-6), 2.0)
     assert complete.expected_rank_deficiency == 0
     assert (complete.error_model.kind, complete.true_machine.kind) == ("kinematic", "zero")
 

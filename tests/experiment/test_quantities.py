@@ -82,7 +82,7 @@ def test_formatted_lengths_are_read_again(length: float) -> None:
     assert parse_length(format_length(length)) == pytest.approx(length, rel=1e-8, abs=1e-18)
 
 
-@given(st.floats(1e-9, 1e-3), st.floats(1.0, 1e9))
+@given(st.floats(1e-9, 1e-3), st.floats(1.00001e4, 1e9))
 def test_length_functions_are_read_again(constant: float, divisor: float) -> None:
     function = parse_length_function(f"{constant!r} m + L/{divisor!r}")
     assert function == LengthFunction(constant, float(1 / Fraction(repr(divisor))))
@@ -102,7 +102,39 @@ def test_length_function_at_lengths() -> None:
     np.testing.assert_allclose(function.at([[0.0], [2.0]]), [[0.5e-6], [2.5e-6]], rtol=1e-15)
     assert parse_length_function("1e+1 um + L / 1000000").constant == 1e-5
     assert parse_length_function("0.3 um") == LengthFunction(3e-7, 0.0)
-    assert parse_length_function("0 um + L/1000").at(1.0) == 1e-3
+    assert parse_length_function("0 um + L/20000").at(1.0) == 5e-5
+
+
+@given(st.integers(1, 10**7), st.integers(1, 10**5), st.sampled_from([0.0, 0.3, 2.0]))
+def test_the_forms_of_a_growing_length_are_the_same(nanometres: int, divisor: int, length: float) -> None:
+    # (A + L/K) um with L in mm grows by 1000/K um for each metre.
+    by_hand = 1e-9 * nanometres + 1e-3 / divisor * length
+    constant = f"{nanometres / 1000}"
+    if divisor <= 10:
+        with pytest.raises(QuantityError, match="per metre of length; give less than 100 um/m"):
+            parse_length_function(f"({constant} + L/{divisor}) um with L in mm")
+        return
+    slope = repr(1e3 / divisor)
+    for text in (
+        f"({constant} + L/{divisor}) um with L in mm",
+        f"( {constant}+L / {divisor} )µm  with L in mm",
+        f"{constant} um + {slope} um/m",
+        f"{constant} µm+{slope} ppm",
+        f"{constant} um + L/{divisor}e3",
+    ):
+        assert float(parse_length_function(text).at(length)) == pytest.approx(by_hand, rel=1e-12)
+
+
+@pytest.mark.parametrize("divisor", ["400", "11", "10000", "5e3"])
+def test_a_data_sheet_is_not_read_in_metres(divisor: str) -> None:
+    with pytest.raises(QuantityError) as caught:
+        parse_length_function(f"0.9 um + L/{divisor}")
+    told = str(caught.value)
+    assert f"grows by {1e3 / float(divisor):.4g} mm per metre of length, since L is in metres" in told
+    # What is advised is what the data sheet means: at one metre 1000 / divisor micrometres more than at none.
+    advised = parse_length_function(told.split('write "')[1].removesuffix('"'))
+    assert float(advised.at(1.0) - advised.at(0.0)) == pytest.approx(1e-6 * 1000 / float(divisor))
+    assert advised.constant == 9e-7
 
 
 @pytest.mark.parametrize(
@@ -136,10 +168,20 @@ def test_messages_of_lengths(value: object, message: str) -> None:
     [
         ("0 um", '"0 um" must be above zero; give a small one, such as 1 nm'),
         ("-1 um", '"-1 um" must be above zero; write for example "0.2 um"'),
-        ("L/1000", '"L/1000" is not a length that grows with L; write for example "0.5 um + L/1000000"'),
         (
-            "-1 um + L/1000",
-            '"-1 um + L/1000" has a negative part or divides by zero; write for example "0.5 um + L/1000000"',
+            "L/1000",
+            '"L/1000" is not a length that grows with L; write for example "0.5 um + L/1000000", with L in metres, '
+            '"0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L in mm"',
+        ),
+        ("-1 um + L/1000", '"-1 um + L/1000" has a negative part; write for example "0.5 um + L/1000000"'),
+        ("1 um + -2 ppm", '"1 um + -2 ppm" has a negative part; write for example "0.5 um + L/1000000"'),
+        ("1 um + 100 ppm", '"1 um + 100 ppm" grows by 0.1 mm per metre of length; give less than 100 um/m'),
+        ("1 um + L/10", '"1 um + L/10" grows by 100 mm per metre of length; give less than 100 um/m'),
+        ("1 um + 2 mm", '"2 mm" is a length; a ratio is expected, for example "5 ppm"'),
+        ("0 um + 0 ppm", '"0 um + 0 ppm" must be above zero; give a small one, such as 1 nm'),
+        (
+            "(1 + L/400) urad with L in mm",
+            '"1 urad" is an angle; a length is expected, for example "750 mm"',
         ),
         (
             "1 um + L/0",

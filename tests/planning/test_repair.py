@@ -13,7 +13,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analysis.checking import check_files
+from analysis.checking import Wanted, check_files
 from analysis.planning.repair.changes import Kind, apply_all
 from analysis.planning.repair.judging import examine, judge
 from analysis.planning.repair.offers import offers
@@ -337,7 +337,7 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     said = plain(Path("designs/planning/campaign.yaml"), None)
     path = tmp_path / "campaign.yaml"
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
-    (checked,) = check_files([path], with_repairs=True)
+    (checked,) = check_files([path], wanted=Wanted(repairs=True))
     (one,) = checked.designs
     assert one.repairs is not None and one.plan.verdict.deficiency
     first = one.repairs.complete[0]

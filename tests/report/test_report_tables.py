@@ -6,11 +6,14 @@ import csv
 import io
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from analysis.cli import main
 from analysis.report.formats import FORMATS
+from analysis.report.heatmaps import SHADES, heat_maps
 from analysis.report.results import best_and_worst, read_results
+from analysis.report.series import plots
 from analysis.report.tables import MOST_BEST, MOST_ROWS, report_tables
 from analysis.sweeps.store import Store
 from tests.report.stores import axis, done, failed, made_up
@@ -86,6 +89,35 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
     assert {column.partition(" ")[0] for column in best.columns} == {"U4"}
     assert table.size == MOST_ROWS and table.headings == ("cell", "level")
     assert table.notes[0] == "50 cells more are not shown here; ballplate export gives all."
+
+
+def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> None:
+    """Of the cell in the middle 600 values are but one undetermined: it is neither shaded, drawn nor told unmarked."""
+    axes = [axis("size", ["1 mm", "2 mm", "3 mm"], [1e-3, 2e-3, 3e-3], "m"), axis("way", ["a", "b"])]
+    rows = []
+    for cell in range(6):
+        is_partial = cell == 2
+        some = figures(0.001 if is_partial else 1.0 + cell)
+        some |= {"rank_deficiency": 3.0, "U4_undetermined": 599.0} if is_partial else {}
+        rows.append(done(cell, some))
+    results = read_results(made_up(tmp_path / "partial.sqlite", "partial", axes, rows), 1)
+    marked = {
+        (entry.cell, entry.figure)
+        for table in report_tables(results)
+        for block in table.blocks
+        for row in block.rows
+        for entry in row.entries
+        if entry.text.endswith("*")
+    }
+    assert marked == {(2, name) for name in ("U4_maximum_m", "U4_average_m", "U4_actual_average_m")}
+    (heat,) = heat_maps(results)
+    assert [[entry.text.endswith("*") for entry in row] for row in heat.entries] == [
+        [False, False], [True, False], [False, False]
+    ]  # fmt: skip
+    assert heat.shades[1][0] == -1 and heat.shades[0][0] == 0 and heat.shades[2][1] == SHADES - 1
+    assert "*" in heat.note
+    lines = [line for plot in plots(results) if plot.symbol == "U4" for line in plot.panels[0].lines]
+    assert [np.isnan(line.y).tolist() for line in lines] == [[False, True, False], [False, False, False]]
 
 
 def test_the_command_writes_tables(small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -122,7 +122,8 @@ class _Search:
                 best[kind] = min(possible, key=self.preference)
         for together in self.mixed(found, best):
             best[max(one.kind for one in together)] = together
-        order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
+        # What costs nothing comes before what the pool has a price for.
+        order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind != Kind.MOVE, kind))
         complete = tuple(self.told(best[kind]) for kind in order[: self.most] if self.helps(best[kind]))
         is_single = any(len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete)
         partial = () if is_single else self.of_single_directions(singles)

@@ -10,6 +10,7 @@ from ...tables import finite, number
 from .changes import KINDS
 
 if TYPE_CHECKING:
+    from .scale import ScaleCertificate
     from .search import Repair, Repairs
 
 # Names of errors that a line has room for.
@@ -84,6 +85,29 @@ def _tried(found: Repairs) -> str:
         return "there is nothing that could be changed in general"
     counts = ", ".join(f"{count} {KINDS[kind]}" for kind, count in found.tried.items())
     return f"tried: {counts}, and {found.sets} sets of several" if found.sets else f"tried: {counts}"
+
+
+def certificate_lines(found: ScaleCertificate | None) -> list[str]:
+    """The certificate that carries scale, with what the file is to say; nothing where none is needed."""
+    if found is None:
+        return []
+    if found.change is None:
+        return ["scale: no single calibrated distance that was tried carries it in place of the probe offsets"]
+    u, average = f"{1e6 * found.offset_uncertainty:g}", number(1e6 * found.average)
+    words = f"scale: {found.change.words}: average U6 {average} um with {u} um on the probe offsets"
+    return [words, *(f"scale, in the file: {edit}" for edit in found.edits)]
+
+
+def certificate_data(found: ScaleCertificate | None) -> dict[str, Any] | None:
+    """The same as plain data in metres; None where none is needed, and without a text where none was found."""
+    if found is None:
+        return None
+    return {
+        "text": None if found.change is None else found.change.words,
+        "offset_uncertainty": found.offset_uncertainty,
+        "average_U6": finite(found.average),
+        "edits": [{"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in found.edits],
+    }
 
 
 def repair_data(found: Repairs | None) -> dict[str, Any] | None:

@@ -10,9 +10,9 @@ from typing import Literal
 from simulator.quantities import QuantityError, parse_positive_angle, parse_positive_length
 from simulator.settings import listing
 
-from ..study import Plan, Worth
-from ..tables import number, shown_unit
-from ..uncertainty import DESCRIPTIONS, Quantity
+from .study import Plan, Worth
+from .tables import number, percent, shown_unit, uncertainty_words
+from .uncertainty import DESCRIPTIONS, Quantity
 
 FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
 # U2 and U3 as wholes have values of several units.
@@ -42,7 +42,8 @@ class Goal:
 
     def __str__(self) -> str:
         if self.kind == "lengths":
-            return f"{'all' if self.share == 1.0 else percent(self.share)} lengths (U6) within the target accuracy"
+            share = "all" if self.share == 1.0 else f"{percent(self.share)} of"
+            return f"{share} lengths (U6) within the target accuracy"
         if self.kind == "tasks":
             return "every task within its target"
         unit = "urad" if self.symbol.endswith("angles") else "um"
@@ -128,24 +129,20 @@ def judge(goal: Goal, plan: Plan | Worth) -> Judgement:
     # An exact count: the share is a ratio of two whole numbers.
     missing = found.count - round(share * found.count)
     is_met = missing <= (1.0 - goal.share) * found.count * (1.0 + 1e-12)
-    words = f"{percent(share)} lengths within the target{average}{_open(found)}".replace("100 % of", "all")
+    by = uncertainty_words(found.coverage_factor)
+    share_words = "all" if not missing else f"{percent(share)} of"
+    words = f"{share_words} lengths within the target by the {by}{average}{_open(found)}"
     return Judgement(is_met, 1.0 - share, words, found.undetermined)
 
 
-def percent(share: float) -> str:
-    """A share in words, never rounded up.
-
-    >>> percent(0.99999), percent(0.125)
-    ('99.99 % of', '12.5 % of')
-    """
-    return f"{math.floor(1e4 * share + 1e-9) / 100:g} % of"
-
-
 def _judge_tasks(plan: Plan | Worth) -> Judgement:
-    ratios = [task.standard_uncertainty / task.target for task in plan.tasks if task.target is not None]
+    ratios = [
+        task.coverage_factor * task.standard_uncertainty / task.target for task in plan.tasks if task.target is not None
+    ]
     undetermined = sum(map(math.isnan, ratios))
     within = sum(ratio <= 1.0 for ratio in ratios)
-    words = f"{within} of {len(ratios)} tasks within their targets"
+    words = f"{within} of {len(ratios)} tasks within their targets by the "
+    words += uncertainty_words(plan.tasks[0].coverage_factor)
     if undetermined:
         words += f", {undetermined} undetermined"
         return Judgement(False, math.inf, words, undetermined)

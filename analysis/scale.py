@@ -1,0 +1,211 @@
+"""Where a design's scale comes from: certificates, priors, probe offsets, or an error model that cannot stretch.
+
+Readings alone never tell it. Machine, plates, poses and offsets that are all larger by the same ratio give the same
+readings, so that some knowledge of a length must say how large they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from simulator.design import Design, State, nominal_state, probe_offsets
+from simulator.estimation.covariance import Covariance, shared_covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.parameters import SharedLayout, shared_layout
+from simulator.experiment.messages import ExperimentError
+from simulator.experiment.model import Experiment
+from simulator.layout import lay_out
+from simulator.machines.protocol import Array
+from simulator.settings import listing
+
+from .corrections import correction_rows
+from .pairs import PairSummary
+from .uncertainty import point_pairs
+
+# The standard uncertainty of offsets for which a design that rests on them is told what becomes of it.
+OFFSET_TRIAL = 1e-6
+# What is left out carries scale where the scale is less certain without it by this factor.
+CARRIES = 1.05
+# A design rests on offsets held exact where its scale is less certain without them by this factor.
+RESTS = 3.0
+# The part of a stretched volume that an error model must follow to have a common scale.
+FOLLOWED = 1e-6
+# Artefacts whose certificates are told apart.
+MOST_ARTEFACTS = 3
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """What carries scale, in words; `without` is the relative standard uncertainty of scale if it were not known.
+
+    Infinite where the scale would then be undetermined.
+    """
+
+    words: str
+    without: float
+
+
+@dataclass(frozen=True)
+class Loosened:
+    """U6 of a design whose exact probe offsets, but for one, have a standard uncertainty: average and maximum, metres.
+
+    `before` is the average with exact offsets.
+    """
+
+    offset_uncertainty: float
+    average: float
+    maximum: float
+    before: float
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The relative standard uncertainty of scale, and what carries it, the most important first.
+
+    Scale is the mean relative change of the distances between corrected points, weighted by their squares.
+    `rests_on_offsets`: whether, but for probe offsets that are held exact, it would be undetermined or at least
+    three times as uncertain; `loosened` then tells what becomes of U6. Without `has_scale` the error model cannot
+    stretch the volume, so that the scale is that of the machine.
+    """
+
+    uncertainty: float
+    carriers: tuple[Carrier, ...]
+    rests_on_offsets: bool = False
+    loosened: Loosened | None = None
+    has_scale: bool = True
+
+
+def scale_of(
+    experiment: Experiment, design: Design, layout: SharedLayout, state: State, spread: Covariance
+) -> Scale | None:
+    """What carries the scale of a design; None where it is undetermined or the design is evaluated nowhere."""
+    row = scale_row(design, layout, state)
+    uncertainty = float(spread.of_shared(row[None])[0])
+    if np.isnan(uncertainty):
+        return None
+    if not can_stretch(design, state):
+        return Scale(uncertainty, (), has_scale=False)
+    groups = list(_groups(experiment))
+    if not groups:
+        return None
+    offsets = exact_offsets(experiment)
+    if len(groups) == 1:
+        carriers = [Carrier(groups[0][0], np.inf)]
+    else:
+        found = [Carrier(words, scale_uncertainty(without)) for words, without in groups]
+        carriers = [one for one in found if one.without > CARRIES * uncertainty] or found
+        carriers.sort(key=lambda one: -one.without)
+    rests = any(one.words == EXACT_OFFSETS and one.without > RESTS * uncertainty for one in carriers)
+    loosened = _loosened(experiment, design, layout, state, spread) if rests and offsets else None
+    return Scale(uncertainty, tuple(carriers), rests, loosened)
+
+
+EXACT_OFFSETS = "the exact probe offsets"
+
+
+def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
+    """What may carry scale, in words, with the experiment in which it is not known."""
+    names = list(dict.fromkeys(item.artefact for item in experiment.calibration))
+    sets = [[name] for name in names] if len(names) <= MOST_ARTEFACTS else [names]
+    for some in sets:
+        rest = tuple(item for item in experiment.calibration if item.artefact not in some)
+        yield f"the certificates of {listing(some, 3)}", replace(experiment, calibration=rest)
+    if experiment.priors:
+        yield "the priors", replace(experiment, priors=())
+    unknown = np.full(experiment.dimension, np.inf)
+    stated = {name: u for name, u in experiment.offset_uncertainties.items() if np.isfinite(u).any()}
+    if stated:
+        freed = {**experiment.offset_uncertainties, **dict.fromkeys(stated, unknown)}
+        yield "the probe offsets with a standard uncertainty", replace(experiment, offset_uncertainties=freed)
+    if exact_offsets(experiment):
+        yield EXACT_OFFSETS, with_offsets(experiment, np.inf)
+
+
+def exact_offsets(experiment: Experiment) -> tuple[str, ...]:
+    """Probes whose offsets are held exact, but for one: what the others are relative to."""
+    return tuple(name for name in experiment.probes if name not in experiment.offset_uncertainties)[1:]
+
+
+def with_offsets(experiment: Experiment, uncertainty: float) -> Experiment:
+    """The experiment with a standard uncertainty, in metres, of the offsets that are held exact, but for one."""
+    own = np.full(experiment.dimension, uncertainty)
+    offsets = {**experiment.offset_uncertainties, **dict.fromkeys(exact_offsets(experiment), own)}
+    return replace(experiment, offset_uncertainties=offsets)
+
+
+def scale_uncertainty(experiment: Experiment) -> float:
+    """Relative standard uncertainty of an experiment's scale; infinite where it is undetermined."""
+    found = _solved(experiment)
+    if found is None:
+        return float("inf")
+    design, layout, state, spread = found
+    value = float(spread.of_shared(scale_row(design, layout, state)[None])[0])
+    return float("inf") if np.isnan(value) else value
+
+
+def scale_row(design: Design, layout: SharedLayout, state: State) -> Array:
+    """Derivative (s,) of the scale by the shared parameters: of the mean relative change of distances.
+
+    Distances between the evaluation points or, where there is but one or none, between the corners of the volume, are
+    weighted by their squares; the sum over all pairs is one over all points, less their centroid.
+    """
+    points = _points(design)
+    rows = correction_rows(design, layout, state, points, np.full(len(points), design.point_probe))
+    centred = points - points.mean(axis=0)
+    return np.asarray(np.einsum("nd,nds->s", centred, rows) / (centred**2).sum())
+
+
+def can_stretch(design: Design, state: State) -> bool:
+    """Whether the error model can stretch the volume by the same ratio along all axes."""
+    points = _points(design)
+    offsets = np.broadcast_to(probe_offsets(design, state)[design.point_probe], points.shape)
+    jacobian = design.model.jacobian(points, state.a, offsets)
+    centred = points - points.mean(axis=0)
+    columns = (jacobian - jacobian.mean(axis=0)).reshape(centred.size, -1)
+    size = np.sqrt((columns**2).sum(axis=0))
+    columns = columns[:, size > 0] / size[size > 0]
+    if not columns.shape[1]:
+        return False
+    left = centred.ravel() - columns @ np.linalg.lstsq(columns, centred.ravel(), rcond=1e-12)[0]
+    return bool(np.abs(left).max() <= FOLLOWED * np.abs(centred).max())
+
+
+def _points(design: Design) -> Array:
+    if len(design.points) > 1 and np.ptp(design.points, axis=0).max() > 0:
+        return design.points
+    return np.array(list(product(*zip(design.lower, design.upper, strict=True))))
+
+
+def _solved(experiment: Experiment) -> tuple[Design, SharedLayout, State, Covariance] | None:
+    """The design with the covariance of what is shared; None where it cannot be laid out."""
+    try:
+        design = lay_out(experiment)
+    except ExperimentError:
+        return None
+    layout, state = shared_layout(design), nominal_state(design)
+    found = spectrum(eliminate(design, layout, state))
+    return design, layout, state, shared_covariance(design, found)
+
+
+def _loosened(
+    experiment: Experiment, design: Design, layout: SharedLayout, state: State, spread: Covariance
+) -> Loosened | None:
+    """What becomes of U6 once the exact offsets have an uncertainty; None where something of it is undetermined."""
+    after = lengths_with_offsets(experiment, OFFSET_TRIAL)
+    if after is None:
+        return None
+    before = point_pairs(design, layout, state, spread)[1]
+    return Loosened(OFFSET_TRIAL, after.total / after.count, after.maximum, before.total / before.count)
+
+
+def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSummary | None:
+    """U6 where exact offsets, but for one, have an uncertainty in metres; None where something of it is open."""
+    found = _solved(with_offsets(experiment, uncertainty))
+    if found is None or not len(found[0].points):
+        return None
+    pairs = point_pairs(*found)[1]
+    return None if pairs.undetermined or not pairs.count else pairs

@@ -1,0 +1,203 @@
+"""What carries scale: against dense generalised least squares, and against what must hold of any design."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.scale import (
+    EXACT_OFFSETS,
+    can_stretch,
+    lengths_with_offsets,
+    scale_row,
+    scale_uncertainty,
+    with_offsets,
+)
+from analysis.study import check, plan
+from analysis.tables import plan_lines
+from simulator.design import nominal_state
+from simulator.estimation.parameters import shared_layout
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+from simulator.layout import lay_out
+from tests.reference import dense
+
+QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace("balls: [5, 5]", "balls: [3, 3]")
+SMALL = SMALL.replace("random: 200", "random: 12")
+CERTIFICATE = SMALL[SMALL.index("calibration:") : SMALL.index("# Where U4")]
+
+ONE_PROBE = """\
+title: one probe
+machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}
+error_model: {kind: metric}
+probes: {down: [0 mm, 0 mm, -50 mm]}
+artefacts:
+  plate: {kind: square, balls: 4, size: 600 mm}
+positions:
+  - {name: a, plane: z, level: 500 mm, corner: {x: 0 mm, y: 0 mm}}
+  - {name: b, plane: z, level: 500 mm, corner: {x: 300 mm, y: 300 mm}, quarter_turns: 1}
+  - {name: c, plane: x, level: 500 mm, corner: {y: 0 mm, z: 300 mm}, quarter_turns: 2}
+  - {name: d, plane: y, level: 500 mm, corner: {x: 300 mm, z: 0 mm}, quarter_turns: 3}
+calibration:
+  - {kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}
+evaluation: {points: {random: 20}}
+"""
+
+
+def experiment_of(folder: Path, text: str) -> Experiment:
+    file = folder / "design.yaml"
+    file.write_text(text, encoding="utf-8")
+    return load(file)[0]
+
+
+def without_certificate(text: str = SMALL) -> str:
+    return text.replace(CERTIFICATE, "")
+
+
+def dense_lengths(experiment: Experiment, offset_uncertainty: float) -> tuple[float, np.ndarray]:
+    """Scale and U6 of all pairs by generalised least squares: errors of the offsets are those of readings, together."""
+    design = lay_out(experiment)
+    problem = dense.planned(design, 3, 3)
+    zero = np.zeros(problem.parameters)
+    rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
+    parts = []
+    for probe, axis in itertools.product(range(1, len(design.probes)), range(3)):
+        offsets = design.probes.copy()
+        size = 1e-3
+        offsets[probe, axis] += size
+        other = replace(problem, design=replace(design, probes=offsets))
+        change = (dense.residuals(other, zero) - dense.residuals(problem, zero)) / size
+        of_plates = len(design.readings.ball) * 3
+        assert not change[of_plates:].any()
+        parts.append(change * offset_uncertainty)
+    common = np.stack(parts, axis=1)
+    weight = np.linalg.inv(np.linalg.cholesky(np.eye(len(common)) + common @ common.T))
+    found = dense.spread(weight @ rows)
+    assert found.deficiency == 0
+    points = dense.jacobian(dense.quantities(problem)["U4"], problem.parameters).reshape(-1, 3, problem.parameters)
+    first, second = dense.pairs_of(len(design.points))
+    apart = design.points[first] - design.points[second]
+    by_length = np.einsum("md,mdp->mp", apart, points[first] - points[second])
+    scale = by_length.sum(axis=0) / (apart**2).sum()
+    lengths = found.of(by_length / np.linalg.norm(apart, axis=1)[:, None])
+    return float(found.of(scale[None])[0]), lengths
+
+
+@pytest.mark.parametrize("uncertainty", [1e-9, 1e-6, 2e-5])
+def test_offsets_with_an_uncertainty_are_what_generalised_least_squares_makes_of_them(
+    tmp_path: Path, uncertainty: float
+) -> None:
+    for text in (SMALL, without_certificate()):
+        experiment = experiment_of(tmp_path, text)
+        scale, lengths = dense_lengths(experiment, uncertainty)
+        assert scale_uncertainty(with_offsets(experiment, uncertainty)) == pytest.approx(scale, rel=1e-6)
+        found = lengths_with_offsets(experiment, uncertainty)
+        assert found is not None
+        assert found.total / found.count == pytest.approx(lengths.mean(), rel=1e-6)
+        assert found.maximum == pytest.approx(lengths.max(), rel=1e-6)
+
+
+def test_scale_is_the_mean_relative_change_of_distances(tmp_path: Path) -> None:
+    """Counted pair by pair, for a change of the machine's parameters."""
+    design = lay_out(experiment_of(tmp_path, SMALL))
+    layout, state = shared_layout(design), nominal_state(design)
+    row = scale_row(design, layout, state)
+    step = 1e-6 * np.random.default_rng(3).normal(size=len(state.a))
+    points = design.points
+    offsets = np.broadcast_to(design.probes[design.point_probe], points.shape)
+    moved = points + design.model.error(points, step, offsets)
+    pairs = list(itertools.combinations(range(len(points)), 2))
+    changes = [np.linalg.norm(moved[i] - moved[j]) / np.linalg.norm(points[i] - points[j]) - 1 for i, j in pairs]
+    weights = [np.sum((points[i] - points[j]) ** 2) for i, j in pairs]
+    assert row[layout.model] @ step == pytest.approx(np.average(changes, weights=weights), rel=1e-3)
+
+
+def test_the_readings_alone_never_tell_the_scale(tmp_path: Path) -> None:
+    """Certificates or exact offsets are needed, and one of them is enough."""
+    certified, bare = experiment_of(tmp_path, SMALL), experiment_of(tmp_path, without_certificate())
+    unknown = np.inf
+    assert scale_uncertainty(with_offsets(bare, unknown)) == np.inf
+    assert np.isfinite(scale_uncertainty(with_offsets(certified, unknown)))
+    assert np.isfinite(scale_uncertainty(bare))
+
+
+def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_path: Path) -> None:
+    found = check(experiment_of(tmp_path, without_certificate()), with_scale=True)
+    assert found.verdict.deficiency == 0 and found.scale is not None
+    assert [one.words for one in found.scale.carriers] == [EXACT_OFFSETS]
+    assert found.scale.rests_on_offsets and found.scale.loosened is not None
+    assert found.scale.loosened.before == pytest.approx(found.lengths.average if found.lengths else None)
+    # Offsets off by u make a relative error of about u over their distances, here 100 mm.
+    assert found.scale.loosened.average > 5 * found.scale.loosened.before
+
+
+def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_path: Path) -> None:
+    certified = experiment_of(tmp_path, QUICKSTART)
+    found = plan(certified, with_scale=True).scale
+    assert found is not None and not found.rests_on_offsets and found.loosened is None
+    told = {one.words: one.without for one in found.carriers}
+    bare = experiment_of(tmp_path, without_certificate(QUICKSTART))
+    assert told["the certificates of plate"] == pytest.approx(scale_uncertainty(bare))
+    assert told[EXACT_OFFSETS] == pytest.approx(scale_uncertainty(with_offsets(certified, np.inf)))
+    # Two independent sources: the variances of what each alone says add up as their inverses.
+    both = sum(one.without**-2 for one in found.carriers) ** -0.5
+    assert found.uncertainty == pytest.approx(both, rel=0.02)
+
+
+def test_one_probe_leaves_nothing_but_the_certificate(tmp_path: Path) -> None:
+    found = check(experiment_of(tmp_path, ONE_PROBE), with_scale=True)
+    assert found.verdict.deficiency == 0 and found.scale is not None
+    assert [one.words for one in found.scale.carriers] == ["the certificates of plate"]
+    bare = ONE_PROBE[: ONE_PROBE.index("calibration:")] + ONE_PROBE[ONE_PROBE.index("evaluation:") :]
+    open_ = check(experiment_of(tmp_path, bare), with_scale=True)
+    assert open_.verdict.deficiency and open_.scale is None
+
+
+def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
+    """Without certificates, scale comes from what is known of one axis, or of offsets."""
+    stated = without_certificate()
+    for name in ("right", "left", "back", "front"):
+        line = next(one for one in stated.splitlines() if one.strip().startswith(f"{name}: ["))
+        offset = line.split(": ", 1)[1]
+        stated = stated.replace(line, f"  {name}: {{offset: {offset}, standard_uncertainty: 1 um}}")
+    found = check(experiment_of(tmp_path, stated), with_scale=True).scale
+    assert found is not None and not found.rests_on_offsets
+    assert [one.words for one in found.carriers] == ["the probe offsets with a standard uncertainty"]
+    prior = stated + "\npriors:\n  - {parameter: EXX t^1, value: 0 um, standard_uncertainty: 0.1 um}\n"
+    both = check(experiment_of(tmp_path, prior), with_scale=True).scale
+    assert both is not None and both.carriers[0].words == "the priors"
+    assert both.uncertainty < found.uncertainty
+
+
+def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) -> None:
+    for scale, is_free in (("each", True), ("none", False)):
+        experiment = experiment_of(tmp_path, ONE_PROBE.replace("{kind: metric}", f"{{kind: metric, scale: {scale}}}"))
+        design = lay_out(experiment)
+        assert can_stretch(design, nominal_state(design)) is is_free
+        found = check(experiment, with_scale=True)
+        assert found.scale is not None and found.scale.has_scale is is_free
+        told = "\n".join(plan_lines(found))
+        assert ("scale: the machine's own, which the error model does not change" in told) is not is_free
+
+
+def test_a_certificate_is_suggested_and_does_what_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The file as suggested, with a micrometre stated for the offsets, has the U6 that was told."""
+    experiment_of(tmp_path, without_certificate())
+    file = tmp_path / "design.yaml"
+    assert main(["check", str(file), "--suggest"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("warning: the scale rests on probe offsets that are held exact") for line in lines)
+    (edit,) = [line for line in lines if line.startswith("scale, in the file: add to calibration: ")]
+    (told,) = [line for line in lines if line.startswith("scale: calibrate the distance ")]
+    text = file.read_text(encoding="utf-8") + f"\ncalibration:\n  - {edit.split('calibration: ')[1]}\n"
+    loose = with_offsets(experiment_of(tmp_path, text), 1e-6)
+    average = plan(loose).quantities["U6"].average
+    assert f"average U6 {1e6 * average:.4f} um with 1 um on the probe offsets" in told
+    assert main(["check", str(file), "--suggest"]) == 0
+    assert "warning" not in capsys.readouterr().out

@@ -1,0 +1,207 @@
+"""Targets for standard and for expanded uncertainties, goals of `check`, and what is told of weak directions."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from analysis.corrections import correction_rows
+from analysis.lengths import Settings, length_map
+from analysis.rank import Verdict, weak_limit
+from analysis.study import check, plan
+from analysis.tables import percent, plan_lines
+from simulator.design import nominal_state
+from simulator.estimation.covariance import spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.parameters import shared_layout
+from simulator.experiment.load import load
+from simulator.experiment.model import Experiment
+from simulator.layout import lay_out
+
+QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+TASKS = """\
+    - {name: short, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_accuracy: 0.3 um}
+    - {name: long, from: [0 mm, 0 mm, 0 mm], to: [1 m, 1 m, 1 m]}
+"""
+SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace("balls: [5, 5]", "balls: [3, 3]")
+SMALL = SMALL.replace("random: 200", "random: 30").replace("  probe: down\n", f"  probe: down\n  tasks:\n{TASKS}")
+TARGET = "target_accuracy: 0.5 um + L/1000000"
+
+
+def written(folder: Path, text: str, name: str = "design.yaml") -> Path:
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def experiment_of(folder: Path, text: str) -> Experiment:
+    return load(written(folder, text))[0]
+
+
+def with_target(target: str, factor: float = 1.0, text: str = SMALL) -> str:
+    return text.replace(TARGET, f"target_accuracy: {target}\ncoverage_factor: {factor:g}")
+
+
+def verdicts(experiment: Experiment) -> list[object]:
+    """Everything that compares with the target."""
+    found = plan(experiment)
+    verdict: Verdict = check(experiment).verdict
+    mapped = length_map(experiment, Settings((3, 2, 3), "down", experiment.target_accuracy.stated,  # type: ignore[union-attr]
+                                             2.0, False, experiment.coverage_factor))  # fmt: skip
+    return [
+        found.quantities["U6"].within_target,
+        found.quantities["tasks"].within_target,
+        *(task.is_within for task in found.tasks),
+        len(verdict.weak),
+        weak_limit(found.design, experiment.target_accuracy),
+        mapped.is_met,
+        int(mapped.whole.within_target[0]),
+    ]
+
+
+@pytest.mark.parametrize("micrometres", [0.02, 0.1, 0.14, 0.2, 0.6])
+def test_a_target_for_2_u_is_half_of_it_for_u(tmp_path: Path, micrometres: float) -> None:
+    halved = SMALL.replace("0.3 um", "0.15 um")
+    of_u = verdicts(experiment_of(tmp_path, with_target(f"{micrometres} um + L/20000000", 1.0, halved)))
+    expanded = verdicts(experiment_of(tmp_path, with_target(f"{2 * micrometres} um + L/10000000", 2.0)))
+    assert of_u == pytest.approx(expanded)
+    # What the same numbers would say of u alone is another matter.
+    assert expanded != verdicts(experiment_of(tmp_path, with_target(f"{2 * micrometres} um + L/10000000")))
+
+
+def test_every_comparison_says_which_uncertainty_it_is_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for factor, words in ((1.0, "standard uncertainty u"), (2.0, "expanded uncertainty U = 2 u")):
+        file = str(written(tmp_path, with_target("0.2 um", factor)))
+        for command, expected in (
+            (["run"], 2), (["check"], 1), (["lengths"], 1), (["reach", "--by", "repeats"], 1),
+            (["reach", "--by", "repeats", "--goal", "tasks"], 1), (["check", "--goal", "lengths"], 2),
+        ):  # fmt: skip
+            main([command[0], file, *command[1:]])
+            told = capsys.readouterr().out
+            assert told.count(words) >= expected, (command, told)
+            assert factor == 1.0 or "standard uncertainty u)" not in told
+
+
+def test_run_and_reach_tell_the_same_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(written(tmp_path, with_target("0.11 um")))
+    main(["run", file])
+    ran = re.search(r"\(standard uncertainty u\): (\S+ %) of U6", capsys.readouterr().out)
+    main(["reach", file, "--by", "repeats"])
+    reached = re.search(r"as drawn: not met; (\S+ %) of lengths", capsys.readouterr().out)
+    main(["check", file])
+    checked = re.search(r"\(standard uncertainty u\): (\S+ %) of 435 lengths", capsys.readouterr().out)
+    assert ran and reached and checked and ran[1] == reached[1] == checked[1]
+    share = plan(experiment_of(tmp_path, with_target("0.11 um"))).quantities["U6"].within_target
+    assert share is not None and 0 < share < 1 and ran[1] == percent(share)
+    assert float(ran[1].removesuffix(" %")) == np.floor(1e4 * share) / 100
+
+
+def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(written(tmp_path, with_target("0.5 um")))
+    average = plan(load(file)[0]).quantities["U6"].average
+    just, not_quite = f"U6 average {1e6 * average * 1.001} um", f"U6 average {1e6 * average * 0.999} um"
+    assert main(["check", file, "--goal", just, "--goal", "lengths", "--goal", "U2 angles maximum 1 urad"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("goal met: ") == 3 and "goal not met" not in out
+    assert main(["check", file, "--goal", just, "--goal", not_quite]) == 1
+    out = capsys.readouterr().out
+    assert out.count("goal met: ") == 1 and out.count("goal not met: ") == 1
+    assert main(["check", file, "--goal", not_quite, "--json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert data["as_expected"] and len(data["missed"]) == 1
+    assert data["lengths"]["average"] == pytest.approx(average)
+    assert main(["check", file, "--goal", not_quite, "--format", "github"]) == 1
+    line = capsys.readouterr().out
+    assert line.startswith("::error file=") and "title=goals of design::" in line and "goal not met" in line
+    number = int(re.search(r"line=(\d+)", line)[1])  # type: ignore[index]
+    assert Path(file).read_text(encoding="utf-8").splitlines()[number - 1].startswith("target_accuracy")
+    assert main(["check", file, "--goal", not_quite, "--format", "junit"]) == 1
+    failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
+    assert failure is not None and failure.get("type") == "goal"
+    assert failure.get("message", "").startswith("goal not met: average U6")
+
+
+def test_a_share_of_the_lengths_is_enough_where_that_is_asked_for(tmp_path: Path) -> None:
+    file = str(written(tmp_path, with_target("0.11 um")))
+    share = plan(load(file)[0]).quantities["U6"].within_target
+    assert share is not None and 0.02 < share < 0.98
+    goal = ["check", file, "--goal", "lengths"]
+    assert main(goal) == 1
+    assert main([*goal, "--share", f"{100 * share - 1:.3f}%"]) == 0
+    assert main([*goal, "--share", f"{100 * share + 1:.3f}%"]) == 1
+
+
+def test_goals_that_are_none_and_goals_that_cannot_be_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = str(written(tmp_path, SMALL.replace(TARGET, "")))
+    assert main(["check", file, "--goal", "U7 average 1 um"]) == 2
+    assert main(["check", file, "--share", "95%"]) == 2
+    capsys.readouterr()
+    assert main(["check", file, "--goal", "lengths"]) == 1
+    assert "the file states no target_accuracy" in capsys.readouterr().out
+
+
+def test_weak_directions_fail_where_they_shall_not_be(tmp_path: Path) -> None:
+    weak = str(written(tmp_path, with_target("0.02 um")))
+    assert check(load(weak)[0]).verdict.weak
+    assert main(["check", weak]) == 0
+    assert main(["check", weak, "--fail-weak"]) == 1
+    assert main(["check", str(written(tmp_path, with_target("5 um"))), "--fail-weak"]) == 0
+
+
+def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
+    """By the uncertainty that the file means: 2 u is beyond a limit that u is within."""
+    largest = plan(experiment_of(tmp_path, with_target("1 um"))).quantities["U6"].maximum
+    for factor, status in ((1.0, 0), (2.0, 1)):
+        file = str(written(tmp_path, with_target(f"{1.5e6 * largest:.6f} um", factor)))
+        assert main(["reach", file, "--by", "repeats", "--fail"]) == status
+        assert main(["lengths", file, "--grid", "2"]) == 0
+        mapped = length_map(load(file)[0], Settings((2, 2, 2), "down", load(file)[0].target_accuracy.stated))  # type: ignore[union-attr]
+        of_corners = factor * float(mapped.whole.maximum_ratio[0]) > 1
+        assert main(["lengths", file, "--grid", "2", "--fail"]) == int(of_corners)
+
+
+def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Path) -> None:
+    experiment = experiment_of(tmp_path, with_target("0.02 um"))
+    found = check(experiment)
+    assert found.verdict.weak and found.lengths is not None
+    design = lay_out(experiment)
+    layout, state = shared_layout(design), nominal_state(design)
+    root = spectrum(eliminate(design, layout, state)).root
+    rows = correction_rows(design, layout, state, design.points, np.full(len(design.points), design.point_probe))
+    told = []
+    for column in range(root.shape[1]):
+        change = rows @ root[:, column]
+        # Less the rigid motion that fits best, by a dense least-squares fit.
+        turns = np.stack([np.cross(axis, design.points) for axis in np.eye(3)], axis=-1)
+        motions = np.concatenate([np.tile(np.eye(3), (len(design.points), 1, 1)), turns], axis=2).reshape(-1, 6)
+        left = change.ravel() - motions @ np.linalg.lstsq(motions, change.ravel(), rcond=None)[0]
+        at_points = np.sqrt(2 * (left.reshape(-1, 3) ** 2).mean(axis=1))
+        size = float(np.sqrt((at_points**2).mean()))
+        if size > 2e-8:
+            told.append((size, int((at_points > 2e-8).sum())))
+    found_there = [(one.standard_deviation, one.beyond) for one in found.verdict.weak]
+    assert sorted(found_there) == [(pytest.approx(size), count) for size, count in sorted(told)]
+    lines = plan_lines(found)
+    direction = next(line for line in lines if line.startswith("weakly determined 1"))
+    assert f"root mean square over 30 points; more than 0.02 um at {found.verdict.weak[0].beyond} of them" in direction
+    assert f"all directions together: U6 {1e6 * found.lengths.average:.4f}"[:38] in "\n".join(lines)
+
+
+def test_no_weak_direction_and_yet_a_target_that_is_missed(tmp_path: Path) -> None:
+    """Many moderate directions add up: nothing is weak, and `check` tells the share all the same."""
+    found = plan(experiment_of(tmp_path, SMALL))
+    directions = check(experiment_of(tmp_path, with_target("0.001 um"))).verdict.weak
+    limit = 1e6 * max(one.standard_deviation for one in directions)
+    text = with_target(f"{1.01 * limit:.6f} um")
+    checked = check(experiment_of(tmp_path, text))
+    assert not checked.verdict.weak and checked.verdict.deficiency == 0
+    assert checked.lengths is not None and checked.lengths.within_target is not None
+    assert checked.lengths.within_target < 1 and 1.01e-6 * limit < found.quantities["U6"].maximum
