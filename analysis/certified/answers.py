@@ -39,11 +39,12 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
     if not fitted.converged:
         return found
     reported = observed.design.model.reported()
-    quoted = reported.matrix.any(axis=1).tolist()
-    machine = zip(reported.names, (reported.matrix @ fitted.solution.state.a).tolist(), quoted, strict=True)
+    values = (reported.matrix @ fitted.solution.state.a).tolist()
+    # A coefficient that is zero in any machine of the model is none.
+    quoted = np.flatnonzero(reported.matrix.any(axis=1)).tolist()
     found["estimate"] = {
         "sum_of_squares": fitted.solution.factor.sum_of_squares,
-        "machine": {name: value for name, value, told in machine if told},
+        "machine": {reported.names[k]: values[k] for k in quoted},
         **_geometry(observed.design, fitted.solution.state),
         "uncertainties": _uncertainties(fitted.quantities),
     }

@@ -55,7 +55,7 @@ def built(problem: Problem, seed: int) -> tuple[Problem, exact.State]:
     p = problem
     target = [exact.place(p, state, int(r["position"]), int(r["ball"])) for r in p["readings"]]
     x = exact.without_error(p, state, target)
-    for _ in range(4):
+    for _ in range(2):
         every = exact.rows(p, x)
         linear = exact.linearised(p, state, every)
         if noise is None:
@@ -160,7 +160,7 @@ def certified(problem: Problem, state: exact.State | None) -> Problem:
     if state is None:
         return found
     solution = exact.estimate(problem, state)
-    assert not solution.null and solution.steps[-1] < mpf(10) ** -45, solution.steps
+    assert not solution.null and solution.steps[-1] < mpf(10) ** exact.SMALL_STEP, solution.steps
     model = problem["error_model"]
     found["estimate"] = {
         "sum_of_squares": solution.sum_of_squares,

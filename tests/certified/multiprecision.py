@@ -9,6 +9,7 @@ file with every number as a decimal.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import combinations
 from typing import Any
 
@@ -16,6 +17,8 @@ from mpmath import cos, cospi, mp, mpf, sin, sinpi, sqrt
 
 DIGITS = 120
 STEP_EXPONENT = -40
+# The steps shrink by some six orders of magnitude each time.
+SMALL_STEP = -30
 # A pivot below this fraction of its column's square is what differences leave of zero.
 NO_PIVOT = -60
 
@@ -64,29 +67,55 @@ class Solution:
     steps: list[Number] = field(default_factory=list)
 
 
-def functions(model: dict[str, Any]) -> list[tuple[str, int, int, bool, int, bool]]:
-    """Of the kinematic model: name, axis, component, whether it is a rotation, coefficients, whether zero at 1."""
+@dataclass(frozen=True)
+class Function:
+    """An error function: its name, the axis that moves, what it displaces along or turns about, its coefficients."""
+
+    name: str
+    axis: int
+    component: int
+    rotates: bool
+    coefficients: int
+    zero_at_one: bool
+
+    @property
+    def quoted(self) -> int:
+        """Number of coefficients of t, t^2, ...; none where nothing but zero is left."""
+        return 0 if self.coefficients <= 2 and self.zero_at_one else self.coefficients - 1
+
+    @property
+    def free(self) -> int:
+        return max(self.coefficients - 1 - self.zero_at_one, 0)
+
+
+def functions(model: dict[str, Any]) -> tuple[Function, ...]:
+    return functions_of(int(model["position_coefficients"]), int(model["rotation_coefficients"]))
+
+
+@cache
+def functions_of(position: int, rotation_: int) -> tuple[Function, ...]:
+    """The 18 functions of the kinematic model, translations before rotations."""
     found = []
-    for letters, key in ((TRANSLATIONS, "position_coefficients"), (ROTATIONS, "rotation_coefficients")):
+    for letters, count in ((TRANSLATIONS, position), (ROTATIONS, rotation_)):
         for axis in range(3):
             for component in range(3):
                 name = f"E{letters[component]}{TRANSLATIONS[axis]}"
-                found.append((name, axis, component, letters == ROTATIONS, int(model[key]), name in ZERO_AT_ONE))
-    return found
+                found.append(Function(name, axis, component, letters == ROTATIONS, count, name in ZERO_AT_ONE))
+    return tuple(found)
 
 
 def machine_names(model: dict[str, Any]) -> list[str]:
     """Names of the quoted parameters: coefficients of t, t^2, ... of each function, or those of the metric."""
     if model["kind"] == "metric":
         return list(model["parameters"])
-    return [f"{f[0]} t^{k}" for f in functions(model) for k in range(1, f[4]) if f[4] > 2 or not f[5]]
+    return [f"{f.name} t^{k + 1}" for f in functions(model) for k in range(f.quoted)]
 
 
 def free_machine(model: dict[str, Any]) -> int:
     """Number of free parameters: a function that is zero at 1 has no linear coefficient of its own."""
     if model["kind"] == "metric":
         return len(model["parameters"])
-    return sum(max(f[4] - 1 - f[5], 0) for f in functions(model))
+    return sum(f.free for f in functions(model))
 
 
 def quoted(model: dict[str, Any], a: Vector) -> Vector:
@@ -95,10 +124,10 @@ def quoted(model: dict[str, Any], a: Vector) -> Vector:
         return list(a)
     found: Vector = []
     start = 0
-    for _, _, _, _, count, zero_at_one in functions(model):
-        own = a[start : start + max(count - 1 - zero_at_one, 0)]
-        start += len(own)
-        if zero_at_one and own:
+    for f in functions(model):
+        own = a[start : start + f.free]
+        start += f.free
+        if f.zero_at_one and own:
             found.append(-sum(own))
         found += own
     return found
@@ -114,15 +143,13 @@ def error(problem: dict[str, Any], x: Vector, a: Vector, p: Vector) -> Vector:
     shift = [[mpf(0)] * 3 for _ in range(3)]
     turn = [[mpf(0)] * 3 for _ in range(3)]
     start = 0
-    for _, axis, component, rotates, count, zero_at_one in functions(model):
-        if count <= 2 and zero_at_one:
-            continue
-        t = (x[axis] - lower[axis]) / (upper[axis] - lower[axis])
+    t = [(c - low) / (high - low) for c, low, high in zip(x, lower, upper, strict=True)]
+    for f in functions(model):
         total = mpf(0)
-        for c in reversed(coefficients[start : start + count - 1]):
-            total = (total + c) * t
-        start += count - 1
-        (turn if rotates else shift)[axis][component] = total
+        for c in reversed(coefficients[start : start + f.quoted]):
+            total = (total + c) * t[f.axis]
+        start += f.quoted
+        (turn if f.rotates else shift)[f.axis][f.component] = total
     y = [mpf(0), x[1] - lower[1], mpf(0)]
     z = [mpf(0), mpf(0), x[2] - lower[2]]
     if model["rotations"] == "full":
@@ -270,10 +297,12 @@ def parameters(problem: dict[str, Any]) -> list[Key]:
 
 def changed(problem: dict[str, Any], state: State, change: dict[Key, Number]) -> State:
     """The state with some parameters changed; rotations are turned about the machine's axes."""
-    machine = list(state.machine)
+    machine = list(state.machine) if any(key[0] == "machine" for key in change) else state.machine
     balls = [[list(ball) for ball in artefact] for artefact in state.balls]
     origins = [list(origin) for origin in state.origins]
-    offsets = [list(offset) for offset in state.offsets]
+    offsets = state.offsets
+    if any(key[0] == "offset" for key in change):
+        offsets = [list(offset) for offset in state.offsets]
     lengths = list(state.lengths)
     d = int(problem["dimension"])
     turns: dict[int, Vector] = {}
@@ -307,9 +336,15 @@ def rows(problem: dict[str, Any], x: list[Vector]) -> list[Row]:
     def add(keys: list[Key], value: Any) -> None:
         found.append(Row([key for key in keys if key in known], value))
 
+    last: dict[int, tuple[State, Vector]] = {}
+
     def corrected(state: State, i: int) -> Vector:
+        # Most parameters change neither the machine nor the probes, and these lists then are the same.
+        if i in last and last[i][0].machine is state.machine and last[i][0].offsets is state.offsets:
+            return last[i][1]
         e = error(problem, x[i], state.machine, state.offsets[int(problem["readings"][i]["probe"])])
-        return [x[i][k] + e[k] for k in range(d)]
+        last[i] = state, [x[i][k] + e[k] for k in range(d)]
+        return last[i][1]
 
     for i, reading in enumerate(problem["readings"]):
         position, ball, probe = (int(reading[key]) for key in ("position", "ball", "probe"))
@@ -412,14 +447,14 @@ def linearised(problem: dict[str, Any], state: State, every: list[Row]) -> Linea
 
 
 def solve(problem: dict[str, Any], state: State, x: list[Vector], most: int) -> Solution:
-    """Gauss-Newton from `state` until a step is below 1e-45, at most `most` times; none gives the factor there."""
+    """Gauss-Newton from `state` until a step is below 1e-30, at most `most` times; none gives the factor there."""
     every = rows(problem, x)
     keys = parameters(problem)
     steps: list[Number] = []
     while True:
         linear = linearised(problem, state, every)
         inverse, null = inverted(keys, linear.derivatives)
-        if len(steps) == most or (steps and steps[-1] < mpf(10) ** -45):
+        if len(steps) == most or (steps and steps[-1] < mpf(10) ** SMALL_STEP):
             break
         gradient = {key: mpf(0) for key in keys}
         for residual, derivative in zip(linear.residuals, linear.derivatives, strict=True):
