@@ -71,8 +71,6 @@ def artefact_text(problem: Problem, artefact: Problem) -> str:
     if artefact["role"] == "gauge":
         directions = ", ".join(f"[{a} deg, {b} deg]" for a, b in artefact["directions_degrees"])
         return f"{{kind: bryan_gauge, radius: {problem['lengths'][0]['nominal']} m, directions: [{directions}]}}"
-    if artefact["role"] == "length_standard":
-        return f"{{kind: two_spheres, length: {problem['lengths'][0]['nominal']} m, role: length_standard}}"
     balls = (f'\n      "{ball_name(k)}": {metres(ball)}' for k, ball in enumerate(artefact["balls"]))
     return "\n    kind: balls\n    coordinates:" + "".join(balls)
 
@@ -102,24 +100,21 @@ def calibration_lines(problem: Problem) -> list[str]:
         pair = ", ".join(ball_name(ball) for ball in item["balls"])
         lines.append(
             f"  - {{kind: distances, artefact: {names[int(item['artefact'])]}, pairs: [[{pair}]], "
-            f"values: [{item['value']} m], standard_uncertainty: {item['standard_uncertainty']} m}}"
+            f"values: [{{balls: [{pair}], distance: {item['value']} m}}], "
+            f"standard_uncertainty: {item['standard_uncertainty']} m}}"
         )
-    by_ball: dict[tuple[str, str], list[Problem]] = {}
-    for item in problem["coordinates"]:
-        by_ball.setdefault((item["artefact"], item["ball"]), []).append(item)
-    for (artefact, ball), items in by_ball.items():
+    if problem["coordinates"]:
+        uncertainty = problem["coordinates"][0]["standard_uncertainty"]
         lines.append(
-            f'  - {{kind: coordinates, artefact: {names[int(artefact)]}, balls: ["{ball_name(ball)}"], '
-            f"values: [{metres([item['value'] for item in items])}], "
-            f"standard_uncertainty: {items[0]['standard_uncertainty']} m}}"
+            f"  - {{kind: coordinates, balls: all, values: {problem['name']}-certificate.csv, "
+            f"standard_uncertainty: {uncertainty} m}}"
         )
     for item in problem["lengths"]:
         if item["standard_uncertainty"] is not None:
             gauge = problem["artefacts"][0]["role"] == "gauge"
-            what = f"kind: radius, value: {item['value']} m" if gauge else (
-                f"kind: distances, pairs: all, values: [{item['value']} m]"
-            )  # fmt: skip
-            lines.append(f"  - {{{what}, standard_uncertainty: {item['standard_uncertainty']} m}}")
+            distance = f"[{{balls: [1, 2], distance: {item['value']} m}}]"
+            what = f"radius, value: {item['value']} m" if gauge else f"distances, pairs: all, values: {distance}"
+            lines.append(f"  - {{kind: {what}, standard_uncertainty: {item['standard_uncertainty']} m}}")
     return ["calibration:", *lines, ""] if lines else []
 
 
@@ -140,10 +135,25 @@ def readings_text(problem: Problem) -> str:
     lines = ["position,ball,probe," + ",".join(f"{axis}_m" for axis in axes)]
     for reading in problem["readings"]:
         position = problem["positions"][int(reading["position"])]
-        artefact = problem["artefacts"][int(position["artefact"])]
         ball = ball_name(reading["ball"])
-        if artefact["role"] == "length_standard":
-            ball = ("a", "b")[int(reading["ball"])]
         names = (position["name"], ball, problem["probes"][int(reading["probe"])]["name"])
         lines.append(",".join([*names, *reading["x"]]))
     return "\n".join(lines) + "\n"
+
+
+def certificate_text(problem: Problem) -> str:
+    """Certified co-ordinates of a plate as CSV, in metres; empty where there are none."""
+    by_ball: dict[str, list[str]] = {}
+    for item in problem["coordinates"]:
+        by_ball.setdefault(ball_name(item["ball"]), []).append(item["value"])
+    lines = [",".join([ball, *values]) for ball, values in by_ball.items()]
+    return "\n".join(["ball,x_m,y_m,z_m", *lines]) + "\n" if lines else ""
+
+
+def files(problem: Problem) -> dict[str, str]:
+    """Names and contents of the files that hold the problem for ballplate."""
+    name = problem["name"]
+    found = {f"{name}.yaml": experiment_text(problem), f"{name}-certificate.csv": certificate_text(problem)}
+    if "estimate" in problem["certified"]:
+        found[f"{name}.csv"] = readings_text(problem)
+    return {key: text for key, text in found.items() if text}

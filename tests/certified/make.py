@@ -17,7 +17,7 @@ from typing import Any
 from mpmath import mp, mpf, nstr
 
 from . import multiprecision as exact
-from .experiment_text import experiment_text, readings_text
+from .experiment_text import files
 from .problems import PROBLEMS, Problem
 
 FOLDER = Path("designs", "certified")
@@ -238,10 +238,8 @@ def main(names: list[str]) -> None:
 def write(name: str, text: str) -> None:
     """The problem as JSON, and the same as an experiment file with its readings."""
     Path(FOLDER, f"{name}.json").write_text(text, encoding="utf-8")
-    as_text = json.loads(text, parse_float=str, parse_int=str)
-    Path(FOLDER, f"{name}.yaml").write_text(experiment_text(as_text), encoding="utf-8")
-    if "estimate" in as_text["certified"]:
-        Path(FOLDER, f"{name}.csv").write_text(readings_text(as_text), encoding="utf-8")
+    for other, content in files(json.loads(text, parse_float=str, parse_int=str)).items():
+        Path(FOLDER, other).write_text(content, encoding="utf-8")
 
 
 if __name__ == "__main__":

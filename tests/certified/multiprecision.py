@@ -19,7 +19,8 @@ DIGITS = 120
 STEP_EXPONENT = -40
 # The steps shrink by some six orders of magnitude each time.
 SMALL_STEP = -30
-# A pivot below this fraction of its column's square is what differences leave of zero.
+# A slope below this fraction of its row's largest, and a pivot below this one of its column's square, are what
+# differences leave of zero.
 NO_PIVOT = -60
 
 Number = Any
@@ -438,12 +439,16 @@ def linearised(problem: dict[str, Any], state: State, every: list[Row]) -> Linea
         for key in row.keys:
             high, low = row.value(ahead[key]), row.value(behind[key])
             for i in range(len(at)):
-                slope = (high[i] - low[i]) / (2 * step)
-                if slope:
-                    own[i][key] = slope
+                own[i][key] = (high[i] - low[i]) / (2 * step)
+        derivatives += [without_rounding(slopes) for slopes in own]
         residuals += at
-        derivatives += own
     return Linear(residuals, derivatives)
+
+
+def without_rounding(slopes: dict[Key, Number]) -> dict[Key, Number]:
+    """The slopes of a row less what differences leave of zero."""
+    least = max((abs(slope) for slope in slopes.values()), default=mpf(0)) * mpf(10) ** NO_PIVOT
+    return {key: slope for key, slope in slopes.items() if abs(slope) > least}
 
 
 def solve(problem: dict[str, Any], state: State, x: list[Vector], most: int) -> Solution:

@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 
 import pytest
+
 from analysis.certified.answers import answers
 from analysis.certified.problems import certified_problems
 from analysis.certified.score import Score, scores
 from analysis.cli import main
-
-from tests.certified.experiment_text import experiment_text, readings_text
+from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made
 from tests.certified.problems import PROBLEMS
 
@@ -41,10 +41,8 @@ def test_every_problem_is_there_and_its_files_agree() -> None:
     assert sorted(path.stem for path in FOLDER.glob("*.json")) == sorted(NAMES)
     for name in NAMES:
         text = Path(FOLDER, f"{name}.json").read_text(encoding="utf-8")
-        problem = json.loads(text, parse_float=str, parse_int=str)
-        assert Path(FOLDER, f"{name}.yaml").read_text(encoding="utf-8") == experiment_text(problem)
-        if "estimate" in problem["certified"]:
-            assert Path(FOLDER, f"{name}.csv").read_text(encoding="utf-8") == readings_text(problem)
+        for other, content in files(json.loads(text, parse_float=str, parse_int=str)).items():
+            assert Path(FOLDER, other).read_text(encoding="utf-8") == content
 
 
 def test_built_and_computed_answers_agree() -> None:
