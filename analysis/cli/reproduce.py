@@ -1,4 +1,4 @@
-"""`ballplate reproduce`: the published experiments of a document, computed anew beside what it prints."""
+"""`ballplate reproduce`: published experiments and certified problems, computed anew beside what is printed of them."""
 
 from __future__ import annotations
 
@@ -13,26 +13,39 @@ WRONG_USAGE = 2
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reproduce",
-        help="compute a document's published experiments and set its figures beside ours",
-        description="Compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the shipped designs. "
-        "Every legible figure stands beside ours with the ratio and what the comparison rests on; statements on rank, "
-        "errata and open differences likewise. The exit status is 0 if all of it agrees within what is stated, "
-        "otherwise 1.",
+        help="compute a document's published experiments, or certified problems, and set their figures beside ours",
+        description="npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the shipped "
+        "designs. Every legible figure stands beside ours with the ratio and what the comparison rests on; statements "
+        "on rank, errata and open differences likewise. The exit status is 0 if all of it agrees within what is "
+        "stated, otherwise 1. certified: solve the problems with certified answers, and tell how many digits agree; "
+        "with --results those of another program. The exit status is 0 if every rank and every count is right and "
+        "every quantity has an answer, otherwise 1.",
     )
-    parser.add_argument("document", metavar="DOCUMENT", choices=("npl",), help="npl: NPL Report CISE 15/98")
+    parser.add_argument(
+        "document",
+        metavar="DOCUMENT",
+        choices=("npl", "certified"),
+        help="npl: NPL Report CISE 15/98; certified: the problems with certified answers",
+    )
     parser.add_argument(
         "--experiment",
         metavar="SECTION",
         action="append",
         default=[],
-        help="only the experiment of this section, such as 6.2.1; may be repeated",
+        help="only the experiment of this section, such as 6.2.1, or the problem of this name; may be repeated",
     )
     parser.add_argument(
         "--designs",
         metavar="FOLDER",
         type=Path,
-        default=Path("designs", "npl"),
-        help="where the shipped designs are; default: designs/npl below the current folder",
+        default=None,
+        help="where the shipped designs are; default: designs/npl or designs/certified below the current folder",
+    )
+    parser.add_argument(
+        "--results",
+        metavar="FILE",
+        type=Path,
+        help="with certified: score the answers in this JSON file instead of our own",
     )
     parser.add_argument("--quick", action="store_true", help="leave out what needs synthetic data sets (6.2.7)")
     parser.add_argument(
@@ -47,6 +60,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 def run(options: Namespace) -> int:
     """Reproduce a document; 1 if a published figure does not come out within the limits stated."""
     import sys
+
+    if options.document == "certified":
+        return _certified(options)
+    if options.results:
+        print("ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr)
+        return WRONG_USAGE
 
     from simulator.settings import hint
 
@@ -74,7 +93,9 @@ def run(options: Namespace) -> int:
 
     trials = None if options.quick else options.trials
     try:
-        found = reproduce(document, Shipped(options.designs), options.experiment, trials, report)
+        found = reproduce(
+            document, Shipped(options.designs or Path("designs", "npl")), options.experiment, trials, report
+        )
     finally:
         for bar in bars.values():
             bar.close()
@@ -85,3 +106,35 @@ def run(options: Namespace) -> int:
     else:
         print_lines(reproduction_lines(found))
     return 0 if found.agrees else 1
+
+
+def _certified(options: Namespace) -> int:
+    """Score answers to certified problems; 1 if a rank or count is wrong, or an answer is missing."""
+    import sys
+
+    from ..certified.answers import answers
+    from ..certified.problems import certified_problems, read_results
+    from ..certified.score import all_right, scores
+    from ..certified.tables import score_data, score_lines
+    from .common import print_json, print_lines
+    from .progress import ProgressBar
+
+    if options.quick or options.markdown:
+        print("ballplate reproduce: --quick and --markdown go with npl only; leave them out", file=sys.stderr)
+        return WRONG_USAGE
+    problems = certified_problems(options.designs or Path("designs", "certified"), options.experiment)
+    if options.results:
+        results = read_results(options.results)
+    else:
+        results = {}
+        bar = ProgressBar("problems")
+        for done, problem in enumerate(problems):
+            bar.show(done, len(problems))
+            results[problem.name] = answers(problem)
+        bar.close()
+    found = [one for problem in problems for one in scores(problem.name, problem.answers, results.get(problem.name))]
+    if options.json:
+        print_json([score_data(found, results)])
+    else:
+        print_lines(score_lines(problems, found))
+    return 0 if all_right(found) else 1

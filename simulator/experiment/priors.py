@@ -62,8 +62,8 @@ def _known(model: ErrorModel, positions: dict[int, Position], references: Refere
         if parameter.function != parameter.name:
             known[parameter.function] = (*known.get(parameter.function, ()), one)
     reported = model.reported()
-    for name, unit, row in zip(reported.names, reported.units, reported.matrix, strict=True):
-        known.setdefault(name, ((name, None, None, -1, row, unit, 0.0),))
+    for name, k in reported.known_names().items():
+        known.setdefault(name, ((reported.names[k], None, None, -1, reported.matrix[k], reported.units[k], 0.0),))
     of_no_error = np.zeros(len(own))
     for position in positions.values():
         artefact = references.artefacts[position.artefact]

@@ -37,6 +37,13 @@ class Reported:
     units: tuple[Unit, ...]
     matrix: Array
 
+    def known_names(self) -> dict[str, int]:
+        """Rows by all names under which they may be stated: `EXX t` is the coefficient `EXX t^1`, too."""
+        found = {name: row for row, name in enumerate(self.names)}
+        for row, name in enumerate(self.names):
+            found.setdefault(name.removesuffix("^1"), row)
+        return found
+
 
 @runtime_checkable
 class ErrorModel(Protocol):

@@ -69,9 +69,8 @@ def true_parameters(settings: Settings, model: ErrorModel) -> Array:
 def _stated(values: dict[str, str], model: ErrorModel) -> Array:
     own = {p.name: (p.unit, np.eye(len(model.parameters))[i]) for i, p in enumerate(model.parameters)}
     reported = model.reported()
-    quoted = {
-        name: (unit, row) for name, unit, row in zip(reported.names, reported.units, reported.matrix, strict=True)
-    }
+    rows = reported.known_names()
+    quoted = {name: (reported.units[row], reported.matrix[row]) for name, row in rows.items()}
     problems: list[tuple[str, str]] = []
     targets: dict[str, float] = {}
     for name, text in values.items():
@@ -86,17 +85,24 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
     if problems:
         raise TruthError(problems)
     given_own = {name: value for name, value in targets.items() if name in own}
-    given_quoted = {name: value for name, value in targets.items() if name not in own}
+    given_quoted: dict[int, tuple[str, float]] = {}
+    for name, value in targets.items():
+        if name in own:
+            continue
+        if rows[name] in given_quoted:
+            text = f'is the coefficient "{given_quoted[rows[name]][0]}" by another name; remove one of the two'
+            raise TruthError([(name, text)])
+        given_quoted[rows[name]] = name, value
     a = np.zeros(len(model.parameters))
     for name, value in given_own.items():
         a += value * own[name][1]
     if given_quoted:
-        wanted = np.array([given_quoted.get(name, 0.0) for name in reported.names])
+        wanted = np.zeros(len(reported.names))
+        wanted[list(given_quoted)] = [value for _, value in given_quoted.values()]
         solution = np.linalg.lstsq(reported.matrix, wanted, rcond=None)[0]
         left = reported.matrix @ solution - wanted
-        for name, value in given_quoted.items():
-            off = left[reported.names.index(name)]
-            if abs(off) > 1e-9 * max(abs(value), np.abs(wanted).max()):
+        for row, (name, value) in given_quoted.items():
+            if abs(left[row]) > 1e-9 * max(abs(value), np.abs(wanted).max()):
                 function = name.split()[0]
                 text = f"{function} must be zero at both ends of its axis, where it fixes the machine's frame"
                 problems.append((name, f"{text}; let its coefficients add up to zero"))

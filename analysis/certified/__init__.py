@@ -1,0 +1,1 @@
+"""Problems with certified answers, and how many digits of them a program finds."""

@@ -1,0 +1,82 @@
+"""Certified problems as they stand in files: a design, readings, and answers computed in many digits."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simulator.experiment.messages import ExperimentError, Message
+from simulator.settings import hint
+
+
+@dataclass(frozen=True)
+class CertifiedProblem:
+    """A problem and what is certified of it: `answers` as they stand under `certified` in its file, SI units.
+
+    `path` is the problem's file; the same design as an experiment file and its readings lie beside it.
+    """
+
+    name: str
+    title: str
+    path: Path
+    answers: dict[str, Any]
+
+    @property
+    def experiment_file(self) -> Path:
+        return self.path.with_suffix(".yaml")
+
+    @property
+    def readings_file(self) -> Path | None:
+        """The readings; None of a problem that is only planned."""
+        return self.path.with_suffix(".csv") if "estimate" in self.answers else None
+
+
+def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]:
+    """The problems in a folder by name, or those `names`.
+
+    :raises ExperimentError: there is no such folder or problem, or a file is not one of a problem.
+    """
+    found = {path.stem: path for path in sorted(folder.glob("*.json"))}
+    if not found:
+        text = "no certified problems here; name their folder, designs/certified in a checkout, with --designs"
+        raise ExperimentError([Message(str(folder), 0, 0, "", text)])
+    unknown = [name for name in names if name not in found]
+    if unknown:
+        messages = [Message(str(folder), 0, 0, "", f'no problem "{name}"; {hint(name, found)}') for name in unknown]
+        raise ExperimentError(messages)
+    return [_problem(found[name]) for name in names or found]
+
+
+def _problem(path: Path) -> CertifiedProblem:
+    data = read_json(path)
+    if not isinstance(data, dict) or not isinstance(data.get("certified"), dict):
+        raise ExperimentError([Message(str(path), 0, 0, "", 'no certified problem: it has no key "certified"')])
+    return CertifiedProblem(str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"])
+
+
+def read_results(path: Path) -> dict[str, Any]:
+    """Answers of a program by the names of problems: the mapping under `problems` of a JSON file.
+
+    :raises ExperimentError: it is no such file.
+    """
+    data = read_json(path)
+    if not isinstance(data, dict) or not isinstance(data.get("problems"), dict):
+        text = 'expected {"problems": {NAME: {"as_drawn": …, "estimate": …}}} as in docs/documents/certified.md'
+        raise ExperimentError([Message(str(path), 0, 0, "", text)])
+    return data["problems"]
+
+
+def read_json(path: Path) -> Any:
+    """What a JSON file holds.
+
+    :raises ExperimentError: it cannot be read, or is not JSON.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ExperimentError([Message(str(path), 0, 0, "", f"cannot be read ({error.strerror})")]) from None
+    except (ValueError, RecursionError) as error:
+        line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
+        raise ExperimentError([Message(str(path), line, column, "", f"is not JSON ({error})")]) from None

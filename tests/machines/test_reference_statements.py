@@ -1,0 +1,195 @@
+"""What the reference says of the error models, each statement against something written down independently."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from analysis.study import plan
+from simulator.experiment.load import load
+from simulator.experiment.messages import ExperimentError
+from simulator.layout import lay_out
+from simulator.machines.arrangement import ARRANGEMENTS
+from simulator.machines.bases import Polynomial, Spline
+from simulator.machines.empirical import empirical_model
+from simulator.machines.kinematic import KinematicModel, kinematic_model, kinematic_model_of
+from simulator.machines.metric import MetricModel
+from simulator.machines.protocol import ErrorModel
+from simulator.machines.spatial_metric import SpatialMetricModel
+from simulator.machines.terms import Radial, sums
+from simulator.machines.true_machine_settings import CoefficientSettings
+from simulator.machines.truth import TruthError, true_parameters
+
+LOWER, UPPER = (-0.2, 0.1, 0.3), (0.8, 0.7, 1.3)
+GENERATOR = np.random.default_rng(5)
+
+
+@pytest.mark.parametrize(
+    ("model", "place"),
+    [
+        (kinematic_model(ARRANGEMENTS["FB1"], 4, 3, LOWER, UPPER), LOWER),
+        (kinematic_model(ARRANGEMENTS["FB1"], 4, 3, LOWER, UPPER, full_rotations=True), LOWER),
+        (empirical_model(sums(Polynomial(4)), LOWER, UPPER), LOWER),
+        (SpatialMetricModel(True, LOWER, UPPER), LOWER),
+        (MetricModel("x"), (0.0, 0.0)),
+    ],
+    ids=["kinematic", "full rotations", "empirical", "metric in space", "metric in the plane"],
+)
+def test_where_no_error_is(model: ErrorModel, place: tuple[float, ...]) -> None:
+    """At one place no parameters make an error, whatever the offset; elsewhere they do."""
+    a = 1e-4 * GENERATOR.standard_normal(len(model.parameters))
+    x, p = np.array([place]), 0.1 * GENERATOR.standard_normal((1, len(place)))
+    assert np.abs(model.error(x, a, p) - p).max() < 1e-16
+    assert np.abs(model.error(x + 0.3, a, p) - p).max() > 1e-6
+
+
+def test_multiquadrics_contain_linear_polynomials_and_no_more() -> None:
+    terms = Radial((3, 2, 4), 0.4)
+    t = GENERATOR.random((50, 3))
+
+    def off(function: object) -> float:
+        at_centres, wanted = (np.array([function(*place) for place in places]) for places in (terms.centres, t))  # type: ignore[operator]
+        return float(np.abs(terms.values(t) @ at_centres - wanted).max())
+
+    assert off(lambda x, y, z: 2.0 - x + 3.0 * y + 0.5 * z) < 1e-12
+    assert off(lambda x, y, z: x * x) > 1e-3
+    assert off(lambda x, y, z: x * y) > 1e-3
+
+
+def spline_model() -> KinematicModel:
+    basis = Spline(4, (0.5,))
+    return kinematic_model_of(ARRANGEMENTS["MB2"], basis, basis, LOWER, UPPER)
+
+
+def test_splines_are_quoted_by_their_coefficients() -> None:
+    """The quoted coefficients, times SciPy's B-splines, make up the function."""
+    from scipy.interpolate import BSpline
+
+    model = spline_model()
+    reported = model.reported()
+    a = GENERATOR.standard_normal(len(model.parameters))
+    t = np.linspace(0.0, 1.0, 21)
+    splines = BSpline(np.array([0.0] * 4 + [0.5] + [1.0] * 4), np.eye(5), 3)(t)
+    for function, numbers in (("EXX", (2, 3, 4, 5)), ("EYX", (2, 3, 4))):
+        rows = [k for k, name in enumerate(reported.names) if name.startswith(f"{function} ")]
+        assert [reported.names[k] for k in rows] == [f"{function} N{n}(t)" for n in numbers]
+        values = splines[:, [n - 1 for n in numbers]] @ (reported.matrix @ a)[rows]
+        own = [k for k, parameter in enumerate(model.parameters) if parameter.function == function]
+        assert np.abs(values - model.lines(function, t)[0].basis @ a[own]).max() < 1e-13
+    empirical = empirical_model(sums(Spline(4, (0.5,))), LOWER, UPPER)
+    assert list(empirical.reported().names) == [parameter.name for parameter in empirical.parameters]
+
+
+def test_the_own_basis_of_functions_that_are_zero_at_both_ends() -> None:
+    model = kinematic_model(ARRANGEMENTS["MB2"], 5, 2, (0.0,) * 3, (1.0,) * 3)
+    t = np.linspace(0.0, 1.0, 11)
+    s = 2.0 * t - 1.0
+    expected = np.stack([t * (1 - t), t * (1 - t) * s, t * (1 - t) * (2 * s**2 - 1)], axis=1)
+    assert np.abs(model.lines("EYX", t)[0].basis - expected).max() < 1e-15
+    assert [p.name for p in model.parameters if p.function == "EYX"] == ["EYX[1]", "EYX[2]", "EYX[3]"]
+
+
+def test_rotation_matrices_of_both_sides() -> None:
+    """FB2: y carries z carries the probe, x carries the workpiece."""
+    model = kinematic_model(ARRANGEMENTS["FB2"], 2, 2, (0.0,) * 3, (1.0,) * 3, full_rotations=True)
+    a = 1e-2 * GENERATOR.standard_normal(len(model.parameters))
+    x, p = GENERATOR.random(3), 0.1 * GENERATOR.standard_normal(3)
+    shift, turn = np.zeros((3, 3)), np.zeros((3, 3))
+    for parameter, value in zip(model.parameters, a, strict=True):
+        axis, kind = "XYZ".index(parameter.function[2]), parameter.function[1]
+        if kind in "ABC":
+            turn[axis]["ABC".index(kind)] = value * x[axis]
+        else:
+            shift[axis]["XYZ".index(kind)] = value * x[axis]
+    # Rz Ry Rx: SciPy's lower-case axes are fixed ones, turned about in the order written.
+    rotations = [Rotation.from_euler("xyz", angles) for angles in turn]
+    moved = np.diag(x) + shift
+    outside = moved[1] + rotations[1].apply(moved[2] + rotations[2].apply(p))
+    tip = rotations[0].inv().apply(outside + moved[0])
+    assert np.abs(model.error(x[None], a, p[None])[0] - (tip - x)).max() < 1e-15
+
+
+def test_t_is_another_name_of_its_first_power() -> None:
+    model = kinematic_model(ARRANGEMENTS["MB2"], 3, 3, LOWER, UPPER)
+
+    def machine(**values: str) -> np.ndarray:
+
+        return true_parameters(CoefficientSettings(kind="coefficients", values=values), model)
+
+    assert (machine(**{"EXX t": "3 um"}) == machine(**{"EXX t^1": "3 um"})).all()
+    with pytest.raises(TruthError) as raised:
+        machine(**{"EXX t": "3 um", "EXX t^1": "1 um"})
+    assert "by another name" in str(raised.value.problems)
+
+
+EXPERIMENT = """\
+title: t
+machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}
+error_model: {kind: kinematic, position_coefficients: 2, rotation_coefficients: 2}
+probes:
+  down: [0 mm, 0 mm, -50 mm]
+  side: {offset: [50 mm, 0 mm, 0 mm], standard_uncertainty: 1 um}
+artefacts: {plate: {kind: grid, balls: [3, 3], size: [600 mm, 600 mm]}}
+positions:
+  - {name: one, plane: z, level: 200 mm, corner: {x: 100 mm, y: 100 mm}, probes: [down, side]}
+  - {name: two, plane: z, level: 700 mm, corner: {x: 300 mm, y: 200 mm}, quarter_turns: 1, probes: [down]}
+  - {name: three, plane: x, level: 400 mm, corner: {y: 100 mm, z: 100 mm}, probes: [side]}
+"""
+
+
+def written(folder: Path, more: str) -> Path:
+    path = folder / "e.yaml"
+    path.write_text(EXPERIMENT + more, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("certificate", "held"),
+    [
+        ("{kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}", 6),
+        ("{kind: coordinates, balls: [r1c1], standard_uncertainty: 0.2 um}", 3),
+        ("{kind: coordinates, balls: all, standard_uncertainty: {z: 0.2 um}}", 3),
+        ("{kind: coordinates, balls: [r1c1, r3c3], standard_uncertainty: 0.2 um}", 1),
+        ("{kind: coordinates, balls: corners, standard_uncertainty: 0.2 um}", 0),
+    ],
+)
+def test_as_much_of_the_first_pose_is_held_as_the_certificate_leaves_open(
+    certificate: str, held: int, tmp_path: Path
+) -> None:
+    (experiment,) = load(written(tmp_path, f"calibration: [{certificate}]\n"))
+    design = lay_out(experiment)
+    assert design.held.sum(axis=1).tolist() == [held, 0, 0]
+
+
+def test_priors_of_poses_free_nothing(tmp_path: Path) -> None:
+    certificate = "calibration: [{kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}]\n"
+    prior = "priors: [{{parameter: '{}: origin x', standard_uncertainty: 1 um}}]\n"
+    (experiment,) = load(written(tmp_path, certificate + prior.format("two")))
+    assert lay_out(experiment).held.sum(axis=1).tolist() == [6, 0, 0]
+    (experiment,) = load(written(tmp_path, certificate + prior.format("one")))
+    with pytest.raises(ExperimentError) as raised:
+        lay_out(experiment)
+    assert '"one: origin x" is held' in str(raised.value.messages[0])
+
+
+def test_u2_leaves_offsets_out(tmp_path: Path) -> None:
+    certificate = "calibration: [{kind: coordinates, balls: all, standard_uncertainty: 0.2 um}]\n"
+    (experiment,) = load(written(tmp_path, certificate))
+    quantities = plan(experiment).quantities
+    assert quantities["U2"].count == 18
+    assert quantities["U2 offsets"].count == 3
+    assert quantities["U2"].count == quantities["U2 lengths"].count + quantities["U2 angles"].count
+
+
+def test_a_prior_may_say_t_for_its_first_power(tmp_path: Path) -> None:
+    rows = []
+    for name in ("EXX t", "EXX t^1"):
+        (experiment,) = load(written(tmp_path, f"priors: [{{parameter: {name}, standard_uncertainty: 1 um}}]\n"))
+        (prior,) = experiment.priors
+        assert prior.name == "EXX t^1"
+        rows.append(prior.by_model)
+    assert (rows[0] == rows[1]).all()
+    assert rows[0].any()
