@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from typing import Any
@@ -13,6 +12,7 @@ from simulator.settings import listing
 from simulator.splines.constraints import Constraint
 from simulator.splines.pieces import Pieces, Powers, pieces
 from simulator.splines.read import Column
+from simulator.spreadsheets import CsvWriter
 
 from .curve import Curve
 from .tables import aligned, number
@@ -240,7 +240,7 @@ def coefficients_csv(curve: Curve, powers: Powers) -> str:
     count = coefficients.shape[1]
     sum_ = " + ".join("c0" if k == 0 else "c1 u" if k == 1 else f"c{k} u^{k}" for k in range(count))
     text.write(f"# {y.name} = {sum_}, where u is {_variable(curve, powers)}\n")
-    writer = csv.writer(text, lineterminator="\n")
+    writer = CsvWriter(text)
     names = [f"c{k}_{derivative_unit(curve, k).replace('/', '_per_').replace('^', '')}" for k in range(count)]
     writer.writerow([f"start_{x.unit}", f"end_{x.unit}", *names])
     breaks = (found.breaks / x.factor).tolist()

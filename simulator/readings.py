@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from .experiment.yamltree import Mark
 from .machines.protocol import Array
 from .misreading_messages import refuse_misreadings
 from .settings import hint, listing
+from .spreadsheets import CsvWriter
 
 AXES = ("x", "y", "z")
 
@@ -42,7 +42,7 @@ class ObservedReadings:
 
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
     """Write readings in millimetres with all digits: position, ball, probe, x_mm, y_mm and z_mm."""
-    writer = csv.writer(stream, lineterminator="\n")
+    writer = CsvWriter(stream)
     writer.writerow(["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])])
     positions, balls, probes = design.position_names, design.ball_names, design.probe_names
     for ball, position, probe, row in zip(

@@ -37,6 +37,8 @@ def add_store(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Write the table."""
+    from simulator.spreadsheets import cell_of_text
+
     from ..sweeps.frame import frame
     from ..sweeps.store import StoreError, open_store
 
@@ -53,6 +55,10 @@ def run(options: Namespace) -> int:
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
+    if suffix != ".parquet":
+        # A label or a reason may begin like a formula.
+        table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)
+        table.columns = [cell_of_text(name) for name in table.columns]
     if str(options.output) == "-":
         table.to_csv(sys.stdout, index=False)
         return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import AbstractContextManager, nullcontext
@@ -39,6 +40,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--beside", action="store_true", help="enter a changed sweep beside the one that is in the store"
     )
+    parser.add_argument(
+        "--folder",
+        metavar="FOLDER",
+        type=Path,
+        action="append",
+        default=[],
+        help="a folder, besides those of the sweep file and of its base, whose files the sweep may name; the store "
+        "keeps a copy of them; may be repeated",
+    )
     parser.set_defaults(run=run)
 
 
@@ -51,7 +61,7 @@ def run(options: Namespace) -> int:
     from ..sweeps.load import load_sweep
     from ..sweeps.store import StoreError, open_store
 
-    sweep = load_sweep(options.file)
+    sweep = load_sweep(options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder))
     if options.dry_run:
         return _dry_run(sweep, options)
     bundle = bundle_of(sweep)

@@ -169,7 +169,8 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integ
     for start in range(0, len(added), AT_ONCE):
         some = added[start : start + AT_ONCE]
         factor = np.asarray(np.linalg.cholesky(information + ridge + matrices[some]), float)
-        solved = np.asarray(np.linalg.solve(_counted(problem, factor), half))
+        # With one more dimension, as NumPy 1 takes a matrix for a batch of vectors.
+        solved = np.asarray(np.linalg.solve(_counted(problem, factor), half[None]))
         deficient = _deficient(factor)
         found[start : start + len(some)] = np.where(deficient > 0.0, deficient, (solved**2).sum(axis=(1, 2)))
     return added, found

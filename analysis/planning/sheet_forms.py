@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Sequence
 from html import escape
@@ -11,6 +10,7 @@ from typing import Any
 from simulator.experiment.messages import in_one_line
 from simulator.experiment.model import Experiment
 from simulator.quantities import format_duration
+from simulator.spreadsheets import CsvWriter
 
 from ..tables import aligned
 from .drawings import place_drawing
@@ -85,7 +85,7 @@ def sheet_lines(sheet: RunSheet) -> list[str]:
 def sheet_csv(sheet: RunSheet) -> str:
     """The run sheet as CSV with a header; minutes are decimal numbers, of items of calibration their price."""
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
+    writer = CsvWriter(out)
     writer.writerow(COLUMNS)
     for number, step in enumerate(sheet.steps, 1):
         writer.writerow(_row(number, step))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
@@ -11,6 +10,7 @@ import numpy as np
 
 from simulator.design import Integers
 from simulator.estimation.parameters import AXIS_NAMES
+from simulator.spreadsheets import CsvWriter
 
 from ..tables import SHOWN, aligned, finite, number
 from .effects import MOST_PLACES, SYMBOLS
@@ -275,7 +275,7 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
 
 def write_observations(stream: TextIO, result: Reliability) -> None:
     """Write a row for every observation: each co-ordinate of each reading, and each item."""
-    writer = csv.writer(stream, lineterminator="\n")
+    writer = CsvWriter(stream)
     writer.writerow(
         ["kind", "position", "ball", "probe", "axis", "name", "redundancy", "unit", "minimal_detectable"]
         + [f"{symbol}_{what}" for symbol in SYMBOLS for what in ("effect_um", "standard_uncertainty_um", "at")]

@@ -10,8 +10,9 @@ from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
 from simulator.experiment.yamltree import read_tree
 
-from ..sweeps.bundle import MODULE, Bundle, has_code, unpack
+from ..sweeps.bundle import Bundle, has_code, unpack
 from ..sweeps.load import experiment_of, load_sweep
+from ..sweeps.named_files import MODULE
 from ..sweeps.store import Store, files
 from .results import Results
 
@@ -42,7 +43,7 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
                 text = "the experiment has an error model in Python, which is run only with --run-modules"
                 raise NoExperimentError(text)
             # The stored file, whichever the sweep file names.
-            sweep = load_sweep(source, Path(folder) / PurePosixPath(bundle.base))
+            sweep = load_sweep(source, Path(folder) / PurePosixPath(bundle.base), (Path(folder),))
             if len(sweep.cells) != len(results.cells):
                 raise NoExperimentError("the stored files make other cells than those stored")
             return [experiment_of(sweep, cell) for cell in cells]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import re
 import textwrap
 from collections.abc import Callable, Sequence
+
+from simulator.spreadsheets import CsvWriter
 
 from ..tables import aligned
 from .tables import Block, Row, Table
@@ -79,7 +80,7 @@ def as_csv(title: str, tables: Sequence[Table]) -> str:
     parts = []
     for table in tables:
         found = io.StringIO()
-        writer = csv.writer(found, lineterminator="\n")
+        writer = CsvWriter(found)
         spanned = f"{table.spanner} " if table.spanner else ""
         first = [table.block] if table.block else []
         headings = [heading or "figure" for heading in table.headings]

@@ -14,10 +14,10 @@ from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.yamltree import Node, Scalar, read_tree, to_python, walk
 
 from .model import Sweep
+from .named_files import named_files
 
-MODULE = ".py"
-YAML = (".yaml", ".yml")
-MOST_MODULES = 1000
+# Of all files together, as they are kept in the store and sent to workers.
+MOST_BYTES = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -39,18 +39,22 @@ class Bundle:
 
 
 def bundle_of(sweep: Sweep) -> Bundle:
-    """The sweep file, its base, all files beside these that a text in them names, and those that machine files name.
+    """The sweep file, its base, and the files that these name.
 
-    A file that is named by its place from the root of the file system is not taken along: it must be there, wherever
-    the sweep is computed.
-
-    :raises ExperimentError: as `files_of`, or a file that cannot be read.
+    :raises ExperimentError: as `files_of`, a file that cannot be read, or too much in all.
     """
     source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
     paths = files_of(sweep)
     root = Path(os.path.commonpath([path.parent for path in paths]))
     names = {path: path.relative_to(root).as_posix() for path in paths}
     try:
+        size = sum(path.stat().st_size for path in paths)
+        if size > MOST_BYTES:
+            text = (
+                f"the files that the sweep names hold {size / 1e6:.0f} MB, and {MOST_BYTES / 1e6:.0f} MB are the limit "
+                "of what a store takes; name large files from the root of the file system"
+            )
+            raise ExperimentError([Message(str(sweep.source), 0, 0, "", text)])
         files = tuple((name, path.read_bytes()) for path, name in names.items())
     except OSError as error:
         text = f"cannot be read ({error.strerror}); check its name and permissions"
@@ -61,51 +65,14 @@ def bundle_of(sweep: Sweep) -> Bundle:
 def files_of(sweep: Sweep) -> list[Path]:
     """Absolute paths of the files of a sweep's bundle.
 
-    :raises ExperimentError: a path that leads through a link and back, so that it means another file than it says.
+    :raises ExperimentError: a path that leads through a link and back, so that it means another file than it says, or
+        a file outside the folders of the sweep.
     """
     source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
     if not base.is_file() or not base.samefile(sweep.base):
         text = f"{sweep.base} leads through a link to another folder and back; name the file from its real folder"
         raise ExperimentError([Message(str(sweep.source), 0, 0, "base", text)])
-    paths = {source, base}
-    for file in (source, base):
-        for text in _texts(read_tree(file)):
-            paths |= set(_named(base.parent, text))
-    # A machine file names tables beside it.
-    for file in sorted(paths - {source, base}):
-        if file.suffix.lower() in YAML:
-            try:
-                texts = list(_texts(read_tree(file)))
-            except ExperimentError:
-                # Who uses the file is told about it when it is loaded.
-                continue
-            for text in texts:
-                paths |= set(_named(file.parent, text))
-    return sorted(paths)
-
-
-def _texts(root: Node) -> Iterator[str]:
-    for _, node in walk(root):
-        if isinstance(node, Scalar) and isinstance(node.value, str):
-            yield node.value
-
-
-def _named(folder: Path, text: str) -> Iterator[Path]:
-    """Files below or beside a folder that a text may mean: a path, or a Python module."""
-    if not 0 < len(text) <= 300 or "\0" in text or "\n" in text or text.startswith(("/", "~")):
-        return
-    if ":" in text:
-        module = text.partition(":")[0].replace(".", "/")
-        if (folder / f"{module}{MODULE}").is_file() or (folder / module).is_dir():
-            # What it imports may stand beside it.
-            yield from (path for path in sorted(folder.glob(f"*{MODULE}"))[:MOST_MODULES] if path.is_file())
-            yield from sorted((folder / module.partition("/")[0]).rglob(f"*{MODULE}"))[:MOST_MODULES]
-    path = Path(os.path.abspath(folder / text))
-    try:
-        if path.is_file():
-            yield path
-    except (OSError, ValueError):
-        return
+    return sorted({source, base, *named_files(sweep)})
 
 
 def unpack(bundle: Bundle, folder: Path) -> Path:

@@ -106,13 +106,13 @@ def _sent(client: Any, bundle: Bundle) -> Any:
 
 
 def _on_worker(bundle: Bundle, task: Task) -> Row:
-    _, source = _unpacked(bundle)
-    return told(compute(_loaded(source), task), source)
+    folder, source = _unpacked(bundle)
+    return told(compute(_loaded(source, Path(folder.name)), task), source)
 
 
 @cache
-def _loaded(source: Path) -> Sweep:
-    return load_sweep(source)
+def _loaded(source: Path, folder: Path) -> Sweep:
+    return load_sweep(source, folders=(folder,))
 
 
 @cache

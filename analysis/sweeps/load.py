@@ -33,8 +33,10 @@ from .values import entry_names
 MOST_CELLS = 1_000_000
 
 
-def load_sweep(path: str | os.PathLike[str], base: Path | None = None) -> Sweep:
+def load_sweep(path: str | os.PathLike[str], base: Path | None = None, folders: tuple[Path, ...] = ()) -> Sweep:
     """Load a sweep file and the experiment file that it starts from, or `base` in its place.
+
+    Files that it names must be below its folder, that of its base, or one of `folders`.
 
     :raises ExperimentError: one of the two is wrong; holds everything that was found.
     """
@@ -83,6 +85,7 @@ def load_sweep(path: str | os.PathLike[str], base: Path | None = None) -> Sweep:
         settings.trials,
         settings.seed,
         settings.record,
+        folders=folders,
     )
     _check_base(sweep)
     bundle = bundle_of(sweep)

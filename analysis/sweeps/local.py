@@ -30,12 +30,20 @@ class ChangedError(Exception):
     """The files of a sweep are no longer those that it was started with."""
 
 
+@dataclass(frozen=True)
+class _Source:
+    """What a process loads a sweep from: its file, and further folders whose files it may take along."""
+
+    file: Path
+    folders: tuple[Path, ...]
+
+
 def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
     """A runner in processes of this machine; with one worker in this process.
 
     It raises ChangedError instead of a row that was computed from files other than those of the bundle.
     """
-    source, digest = Path(os.path.abspath(sweep.source)), bundle.digest
+    source, digest = _Source(Path(os.path.abspath(sweep.source)), sweep.folders), bundle.digest
 
     def run(tasks: Sequence[Task]) -> Iterator[Row]:
         if workers > 1 and tasks:
@@ -48,7 +56,7 @@ def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
     return run
 
 
-def _in_workers(sweep: Sweep, source: Path, digest: str, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
+def _in_workers(sweep: Sweep, source: _Source, digest: str, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     left = {(task.number, task.block): task for task in tasks}
@@ -71,7 +79,7 @@ def _in_workers(sweep: Sweep, source: Path, digest: str, tasks: Sequence[Task], 
             deaths += 1
 
 
-def _alone(source: Path, digest: str, task: Task) -> Row | None:
+def _alone(source: _Source, digest: str, task: Task) -> Row | None:
     """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
@@ -83,7 +91,7 @@ def _alone(source: Path, digest: str, task: Task) -> Row | None:
     return None
 
 
-def compute_unchanged(source: Path, digest: str, task: Task) -> Row:
+def compute_unchanged(source: _Source, digest: str, task: Task) -> Row:
     """Do a task of a sweep file, which is loaded once in each process.
 
     :raises ChangedError: its files are not those of the bundle with this digest.
@@ -127,9 +135,9 @@ def told(row: Row, source: Path) -> Row:
 
 
 @cache
-def _loaded(source: Path, digest: str) -> _Watched:
+def _loaded(source: _Source, digest: str) -> _Watched:
     try:
-        sweep = load_sweep(source)
+        sweep = load_sweep(source.file, folders=source.folders)
     except ExperimentError:
         raise ChangedError from None
     return _watched(sweep, digest)

@@ -52,7 +52,7 @@ class Sweep:
 
     `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest. `digest`
     is a hash of all files that the sweep depends on, `code` of those that an error model written in Python may use,
-    empty without one.
+    empty without one. `folders` are those, besides its own and that of its base, whose files it may take along.
     """
 
     source: Path
@@ -67,6 +67,7 @@ class Sweep:
     record: tuple[str, ...]
     digest: str = ""
     code: str = ""
+    folders: tuple[Path, ...] = ()
 
     def choices(self, number: int) -> tuple[Choice, ...]:
         """The choices that make up a cell."""

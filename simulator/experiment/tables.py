@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
+from ..spreadsheets import text_of_cell
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .yamltree import Mark, read_text
 
@@ -87,7 +88,7 @@ def read_table(
         for name in texts:
             if not by_name[name][1]:
                 messages.append(Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name"))
-        rows.append(Row(mark, tuple(by_name[name][1] for name in texts), tuple(row_lengths)))
+        rows.append(Row(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths)))
     if len(lines) == 1:
         messages.append(Message(file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"))
     if len(lines) > MOST_ROWS + 1:
