@@ -176,7 +176,7 @@ def _distances(
     labels: Integers,
     drawn: Array,
 ) -> Functions:
-    """Distances between places `first` and `second` that are determined, null motions being from where places are drawn."""
+    """Distances between places `first` and `second` that are determined where places are as `drawn`."""
     from scipy.sparse import coo_array
 
     n, d = places.shape
