@@ -115,9 +115,8 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     if not drawn.deficiency or len(design.lengths):
         return gauss_newton(design, x, start, settings, drawn)
     solution = gauss_newton(design, x, start, settings)
-    is_open = solution.spectrum.deficiency >= drawn.deficiency
     went_far = max(one.step for one in solution.iterations) > NEIGHBOURHOOD
-    if solution.status == "converged" and (is_open or not went_far):
+    if solution.status == "converged" and not went_far:
         return replace(solution, spectrum=spectrum(solution.factor, drawn))
     return gauss_newton(design, x, start, settings, drawn)
 
