@@ -1,4 +1,4 @@
-"""Experiments drawn at random, most of them deficient, as somebody might write them who does not know what is needed."""
+"""Experiments drawn at random, most of them deficient, as they might be written without knowing what is needed."""
 
 from __future__ import annotations
 
