@@ -33,6 +33,11 @@ from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_ro
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
 
+# What an item on offer may outweigh readings by: in the whole pool's information, beside which that without the item must
+# not vanish, and at all, since more than this changes no other uncertainty.
+MILDLY = 1e3
+EXACTLY = 1e8
+
 # Kinds of reading (which balls, how often) beyond which all combinations of balls are kept.
 MOST_KINDS = 24
 
@@ -168,8 +173,9 @@ def pool_information(experiment: Experiment, candidates: Sequence[Candidate], al
     weight = _position_weight(drawn)
     if any(_differs(rows, weight) for rows in [*known, *chain(*items.values())]):
         is_even = False
-        even_known = [_evened(rows, weight) for rows in known]
-        even_items = {k: [_evened(rows, weight) for rows in item] for k, item in items.items()}
+        even_known = [_weighted(rows, weight, weight) for rows in known]
+        even_items = {k: [_weighted(rows, weight, weight) for rows in item] for k, item in items.items()}
+        items = {k: [_weighted(rows, 0.0, EXACTLY * weight) for rows in item] for k, item in items.items()}
     certificates = [*even_known, *chain(*even_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
@@ -183,13 +189,15 @@ def pool_information(experiment: Experiment, candidates: Sequence[Candidate], al
     own: list[Array] = []
     for k in range(len(candidates)):
         own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]) if k in items else next(of_positions))
-    even = None
-    if not is_even:
-        even = [np.concatenate([_in_amounts(rows, balls) for rows in even_known])]
-        for k, reduced in enumerate(own):
-            rows_of_item = [_in_amounts(r, balls) for r in even_items.get(k, ())]
-            even.append(np.concatenate(rows_of_item) if rows_of_item else reduced)
-    basis, open_ = _basis(balls, drawn.shared, [base, *own], even)
+    if is_even:
+        basis, open_ = _basis(balls, drawn.shared, [base, *own])
+    else:
+        even = [np.concatenate([_in_amounts(rows, balls) for rows in even_known]), *own]
+        mild = [base, *own]
+        for k, item in even_items.items():
+            even[k + 1] = np.concatenate([_in_amounts(rows, balls) for rows in item])
+            mild[k + 1] = np.concatenate([_in_amounts(_weighted(r, 0.0, MILDLY * weight), balls) for r in items[k]])
+        basis, open_ = _basis(balls, drawn.shared, mild, even)
 
     def in_basis(rows: Array) -> Array:
         return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
@@ -238,10 +246,10 @@ def _differs(rows: Rows, weight: float) -> bool:
     return bool((sizes > ALIKE * weight).any() or (ALIKE * sizes[sizes > 0.0] < weight).any())
 
 
-def _evened(rows: Rows, weight: float) -> Rows:
-    """Rows without a pose that all have the same `weight`."""
+def _weighted(rows: Rows, least: float, most: float) -> Rows:
+    """Rows without a pose with weights between `least` and `most`."""
     sizes = _sizes(rows)[:, None]
-    factor = weight / np.where(sizes > 0.0, sizes, 1.0)
+    factor = np.clip(sizes, least, most) / np.where(sizes > 0.0, sizes, 1.0)
     return replace(rows, by_ball=factor * rows.by_ball, by_shared=factor * rows.by_shared)
 
 

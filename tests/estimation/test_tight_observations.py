@@ -61,8 +61,8 @@ def with_known(design: Design, known: Known) -> Design:
         if known.kind == "coefficient":
             row = reported[draw.choice(np.flatnonzero(reported.any(axis=1)))]
         else:
-            # Entries of all sizes.
-            row = draw.standard_normal(reported.shape[1]) * 10.0 ** draw.integers(-12, 1, reported.shape[1])
+            # Entries of many sizes, but none that is all but rounding beside another.
+            row = draw.standard_normal(reported.shape[1]) * 10.0 ** draw.integers(-5, 1, reported.shape[1])
         return _with_prior(design, -1, -1, row, u)
     if known.kind == "pose":
         position = int(draw.integers(0, len(design.held)))
@@ -186,7 +186,7 @@ def test_knowing_more_never_lowers_the_rank(what: tuple[list[int], str, float], 
 
 @pytest.mark.long
 @given(designs, st.lists(things, min_size=1, max_size=6))
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=300, deadline=None)
 def test_knowing_more_never_lowers_the_rank_of_many_designs(
     what: tuple[list[int], str, float], more: list[Known]
 ) -> None:
