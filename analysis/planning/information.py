@@ -33,8 +33,8 @@ from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_ro
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
 
-# What an item on offer may outweigh readings by: in the whole pool's information, beside which that without the item must
-# not vanish, and at all, since more than this changes no other uncertainty.
+# What an item on offer may outweigh readings by: in the information of the whole pool, beside which that without it
+# must not vanish, and at all, since more than this changes no other uncertainty.
 MILDLY = 1e3
 EXACTLY = 1e8
 

@@ -3,7 +3,7 @@
 Where one row outweighs others a millionfold, a plain triangular decomposition mixes its rounding into them, and what
 little they tell is lost. With the rows sorted by weight, heaviest first, and the columns taken in the order of what is
 left in them, every row keeps its own relative accuracy: M. J. D. Powell, J. K. Reid, *On applying Householder
-transformations to linear least squares problems*, 1969; A. J. Cox, N. J. Higham, *Stability of Householder QR
+transformations to linear least squares problems*, 1968; A. J. Cox, N. J. Higham, *Stability of Householder QR
 factorization for weighted least squares problems*, 1998.
 """
 

@@ -65,8 +65,10 @@ def with_known(design: Design, known: Known) -> Design:
             row = draw.standard_normal(reported.shape[1]) * 10.0 ** draw.integers(-5, 1, reported.shape[1])
         return _with_prior(design, -1, -1, row, u)
     if known.kind == "pose":
-        position = int(draw.integers(0, len(design.held)))
-        return _with_prior(design, position, int(draw.integers(0, 6)), np.zeros(len(design.model.parameters)), u)
+        free = np.argwhere(~design.held)
+        # Of what is held nothing can be known.
+        position, component = free[draw.integers(len(free))].tolist() if len(free) else (-1, -1)
+        return _with_prior(design, position, component, np.zeros(len(design.model.parameters)), u)
     if known.kind == "reading":
         readings = design.readings
         uncertainty = readings.uncertainty
