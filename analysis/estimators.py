@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from simulator.design import Design, Integers, State
-from simulator.estimation.gauss_newton import GaussNewtonSettings, estimate, open_as_drawn
+from simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
 from simulator.estimation.length_equations import LENGTH_ESTIMATORS, LengthEstimator, NotAMetricError, length_estimate
 from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from simulator.experiment.messages import ExperimentError, Message
@@ -105,7 +105,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
     elif not has_all_errors(design):
         what, text = "error_model", "length equations have the errors of {kind: metric}, in three dimensions, only"
-    elif open_as_drawn(design) is not None:
+    elif as_drawn(design).deficiency:
         text = "the design leaves errors open, and then estimates differ by what they hold; see ballplate check"
     if text:
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])

@@ -58,29 +58,36 @@ class PairTile:
 
 
 def all_pairs(
-    places: Array, common: Array, own: Array, null: Array, labels: Integers, limit: LengthFunction | None = None
+    places: Array,
+    common: Array,
+    own: Array,
+    null: Array,
+    labels: Integers,
+    limit: LengthFunction | None = None,
+    drawn: Array | None = None,
 ) -> PairSummary:
     """Standard uncertainty of the distances between all pairs of `places` (n, d), as `pair_tiles` gives them.
 
     `labels` (n,) name the places in the result.
     """
-    found = (_summary(tile, labels, limit) for tile in pair_tiles(places, common, own, null))
+    found = (_summary(tile, labels, limit) for tile in pair_tiles(places, common, own, null, drawn))
     return sum(found, PairSummary())
 
 
-def pair_tiles(places: Array, common: Array, own: Array, null: Array) -> Iterator[PairTile]:
+def pair_tiles(places: Array, common: Array, own: Array, null: Array, drawn: Array | None = None) -> Iterator[PairTile]:
     """Standard uncertainties of the distances between all pairs of `places` (n, d), a tile of pairs at a time.
 
     The places' errors are `common` (n, d, r) times r shared standard normal variables plus `own` (n, d, d) times
-    their own; `null` (n, d, k) moves them along undetermined directions. Places that coincide make no pair. Memory is
-    that of a tile.
+    their own; `null` (n, d, k) moves them along undetermined directions, from where they are `drawn` (n, d), which
+    is at `places` unless told. Places that coincide make no pair. Memory is that of a tile.
     """
     places = places - places.mean(axis=0) if len(places) else places
+    drawn = places if drawn is None else drawn - drawn.mean(axis=0)
     common = without_rigid_motion(places, common)
-    null = without_rigid_motion(places, null)
+    null = without_rigid_motion(drawn, null)
     single = common @ common.transpose(0, 2, 1) + own @ own.transpose(0, 2, 1)
     for rows, columns in _tiles(len(places)):
-        yield _tile(places, common, single, null, rows, columns)
+        yield _tile(places, common, single, null, drawn, rows, columns)
 
 
 def _tiles(n: int) -> Iterator[tuple[slice, slice]]:
@@ -95,6 +102,7 @@ def _tile(
     common: Array,
     single: Array,
     null: Array,
+    drawn: Array,
     rows: slice,
     columns: slice,
 ) -> PairTile:
@@ -118,8 +126,10 @@ def _tile(
     values = np.sqrt(np.maximum(weighted / squared, 0.0))[chosen]
     open_ = np.zeros(len(values), bool)
     if null.shape[2]:
-        change = sum(difference[i][:, :, None] * (null[rows, None, i, :] - null[None, columns, i, :]) for i in range(d))
-        size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / squared)
+        apart = drawn[rows, None] - drawn[None, columns]
+        change = sum(apart[:, :, i, None] * (null[rows, None, i, :] - null[None, columns, i, :]) for i in range(d))
+        length = (apart**2).sum(axis=2)
+        size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
         open_ = size[chosen] > _open_above(null)
     first, second = np.nonzero(chosen)
     return PairTile(rows.start + first, columns.start + second, np.sqrt(squared[chosen]), values, open_)

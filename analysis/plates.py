@@ -60,18 +60,15 @@ def plate_coordinates(
     for artefact, axes in axes_of_plates(experiment).items():
         balls = np.flatnonzero(design.ball_artefact == design.artefact_names.index(artefact))
         coordinates, rotation = in_plate_axes(state.balls[balls], axes)
-        across, length = 1 - axes.axis, coordinates[axes.ball, axes.axis]
-        if axes.axis == 1:
-            length = -length
+        across = 1 - axes.axis
         n = len(balls)
-        # How each co-ordinate follows the three balls concerned: itself, the origin, and the one on the axis.
-        by_ball = np.zeros((n, 2, 2))
-        by_ball[:, 0, across], by_ball[:, 1, across] = coordinates[:, 1] / length, -coordinates[:, 0] / length
-        weights = {axes.ball: by_ball, axes.origin: -np.eye(2) - by_ball}
-        common, null = rotation @ spread.ball[balls], rotation @ spread.ball_null[balls]
-        own = rotation @ spread.ball_own[balls]
+        weights = _weights(coordinates, axes)
+        common, own = rotation @ spread.ball[balls], rotation @ spread.ball_own[balls]
         moved = common + sum(weight @ common[k] for k, weight in weights.items())
-        opened = null + sum(weight @ null[k] for k, weight in weights.items())
+        drawn = state if spread.drawn is None else spread.drawn
+        as_drawn, turn = in_plate_axes(drawn.balls[balls], axes)
+        null = turn @ spread.ball_null[balls]
+        opened = null + sum(weight @ null[k] for k, weight in _weights(as_drawn, axes).items())
         variance = (moved**2).sum(axis=2)
         for k, weight in weights.items():
             # A ball that is one of these two itself moves by both its parts.
@@ -85,3 +82,13 @@ def plate_coordinates(
         values = np.where(np.isnan(uncertainty), np.nan, coordinates)
         found.append(PlateCoordinates(artefact, axes, names, values, sigma * uncertainty))
     return tuple(found)
+
+
+def _weights(coordinates: Array, axes: PlateAxes) -> dict[int, Array]:
+    """How each co-ordinate (n, 2) follows the ball on the axis and that at the origin (n, 2, 2), besides its own."""
+    across, length = 1 - axes.axis, coordinates[axes.ball, axes.axis]
+    if axes.axis == 1:
+        length = -length
+    by_ball = np.zeros((len(coordinates), 2, 2))
+    by_ball[:, 0, across], by_ball[:, 1, across] = coordinates[:, 1] / length, -coordinates[:, 0] / length
+    return {axes.ball: by_ball, axes.origin: -np.eye(2) - by_ball}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.design import Design, State
-from simulator.estimation.covariance import covariance
+from simulator.estimation.gauss_newton import fitted_covariance
 from simulator.estimation.parameters import SharedLayout
 from simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
 from simulator.experiment.load import place_in
@@ -272,7 +272,7 @@ def _chance(three: Reversal, five: Reversal) -> float:
 def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEstimate, ...]:
     """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the first, `k`."""
     layout, state = full.solution.factor.layout, full.solution.state
-    spread = covariance(design, full.solution.factor, full.solution.spectrum)
+    spread = fitted_covariance(design, full.solution)
     own = np.eye(len(layout))
     # Exact derivatives, as imaginary steps leave the real part alone.
     by_shared = [_relation(design, layout, state, k, m, 1e-30j * row).imag / 1e-30 for row in own]

@@ -10,7 +10,7 @@ import numpy as np
 from simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
 from simulator.estimation.covariance import Covariance, covariance, shared_covariance, spectrum
 from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import Solution, estimate
+from simulator.estimation.gauss_newton import Solution, estimate, fitted_covariance
 from simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
 from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
 from simulator.experiment.model import Experiment
@@ -196,7 +196,7 @@ def fit(
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         return Fit(experiment.label, experiment.title, design, solution, judged, 1.0, False, 0, {}, (), ())
-    spread = covariance(design, solution.factor, solution.spectrum)
+    spread = fitted_covariance(design, solution)
     judged = verdict(
         design, layout, solution.spectrum, spread, experiment.expected_rank_deficiency, experiment.target_accuracy
     )

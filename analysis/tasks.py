@@ -82,7 +82,8 @@ def task_uncertainties(
     if not design.task_names:
         return ()
     lengths = np.linalg.norm(task_differences(design, state), axis=1)
-    values = sigma * found.of_shared(task_rows(design, layout, state))
+    drawn = None if found.drawn is None else task_rows(design, layout, found.drawn)
+    values = sigma * found.of_shared(task_rows(design, layout, state), drawn)
     told = zip(design.task_names, lengths.tolist(), values.tolist(), design.task_targets, strict=True)
     return tuple(
         TaskUncertainty(name, length, value, None)

@@ -189,7 +189,12 @@ def ball_pairs(design: Design, state: State, found: Covariance) -> PairSummary:
     for artefact in np.flatnonzero(design.is_plate):
         balls = np.flatnonzero(design.ball_artefact == artefact)
         summary = summary + all_pairs(
-            state.balls[balls], found.ball[balls], found.ball_own[balls], found.ball_null[balls], balls
+            state.balls[balls],
+            found.ball[balls],
+            found.ball_own[balls],
+            found.ball_null[balls],
+            balls,
+            drawn=None if found.drawn is None else found.drawn.balls[balls],
         )
     return summary
 
@@ -204,10 +209,15 @@ def point_pairs(
     """U4 (points, d) and U6 at the design's evaluation points."""
     probes = np.full(len(design.points), design.point_probe)
     of_shared = correction_rows(design, layout, state, design.points, probes)
-    spread, null = of_shared @ found.shared, of_shared @ found.shared_null
+    spread = of_shared @ found.shared
     values = np.sqrt((spread**2).sum(axis=2))
+    drawn = None
+    if found.drawn is not None:
+        of_shared = correction_rows(design, layout, found.drawn, design.points, probes)
+        drawn = corrected_points(design, found.drawn, design.points, probes)
+    null = of_shared @ found.shared_null
     size = np.sqrt(((of_shared * found.scale) ** 2).sum(axis=2))
     corrected = corrected_points(design, state, design.points, probes)
     n, d = design.points.shape
-    pairs = all_pairs(corrected, spread, np.zeros((n, d, d)), null, np.arange(n), limit)
+    pairs = all_pairs(corrected, spread, np.zeros((n, d, d)), null, np.arange(n), limit, drawn)
     return blank(values, null, size), pairs

@@ -12,22 +12,31 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
 from simulator.design import Design
 from simulator.estimation.covariance import EXACT
-from simulator.estimation.observations import rotation_sensitivity
+from simulator.estimation.elimination import ALIKE
+from simulator.estimation.graded import Collected, Triangle
+from simulator.estimation.graded import triangle as triangular
+from simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment, Position
 from simulator.experiment.pool import Candidate
 from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
+from simulator.threads import scipy_linalg, single_threaded
 
 from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_rows
 
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
+
+# What an item on offer may outweigh readings by: in the information of the whole pool, beside which that without it
+# must not vanish, and at all, since more than this changes no other uncertainty.
+MILDLY = 1e3
+EXACTLY = 1e8
 
 # Kinds of reading (which balls, how often) beyond which all combinations of balls are kept.
 MOST_KINDS = 24
@@ -173,7 +182,15 @@ def pool_information(
         if not isinstance(candidate.item, Position)
     }
     known = always(drawn)
-    certificates = [*known, *(rows for item in items.values() for rows in item)]
+    # What is spanned and what is open does not depend on weights, but to see it these must not differ too much.
+    even_known, even_items, is_even = known, items, True
+    weight = _position_weight(drawn)
+    if any(_differs(rows, weight) for rows in [*known, *chain(*items.values())]):
+        is_even = False
+        even_known = [_weighted(rows, weight, weight) for rows in known]
+        even_items = {k: [_weighted(rows, weight, weight) for rows in item] for k, item in items.items()}
+        items = {k: [_weighted(rows, 0.0, EXACTLY * weight) for rows in item] for k, item in items.items()}
+    certificates = [*even_known, *chain(*even_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
     if len(candidates) * size**2 * 8 > MOST_BYTES:
@@ -193,7 +210,15 @@ def pool_information(
         rows = next(of_positions)
         own.append(_reduced(_in_amounts(rows, balls)))
         pose_ranks.append(_range(rows.by_pose).shape[1])
-    basis, open_ = _basis(balls, drawn.shared, [base, *own])
+    if is_even:
+        basis, open_ = _basis(balls, drawn.shared, [base, *own])
+    else:
+        even = [np.concatenate([_in_amounts(rows, balls) for rows in even_known]), *own]
+        mild = [base, *own]
+        for k, item in even_items.items():
+            even[k + 1] = np.concatenate([_in_amounts(rows, balls) for rows in item])
+            mild[k + 1] = np.concatenate([_in_amounts(_weighted(r, 0.0, MILDLY * weight), balls) for r in items[k]])
+        basis, open_ = _basis(balls, drawn.shared, mild, even)
 
     def in_basis(rows: Array) -> Array:
         return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
@@ -205,7 +230,8 @@ def pool_information(
     for whole, part in (completed or {}).items():
         matrices[whole] -= matrices[part]
     transformed = in_basis(base)
-    frames = replace(_frames(drawn, known, items, basis), artefacts=_unplaced(drawn, candidates, basis, all_balls))
+    unplaced = _unplaced(drawn, candidates, basis, all_balls)
+    frames = replace(_frames(drawn, even_known, even_items, basis), artefacts=unplaced)
     own_base = transformed.T @ transformed
     return Information(drawn, tuple(candidates), basis, own_base, matrices, open_, frames, tuple(pose_ranks))
 
@@ -223,6 +249,33 @@ def _in_amounts(rows: Rows, balls: Array) -> Array:
         along = _range(rows.by_pose)
         found -= along @ (along.T @ found)
     return found
+
+
+def _position_weight(drawn: Drawn) -> float:
+    """The weight of the heaviest readings and lengths of positions, for a micrometre."""
+    of_readings = reading_weights(drawn.design, drawn.design.readings.select(drawn.design.plate_readings))
+    of_lengths = (
+        1.0 / length_deviations(drawn.design, drawn.state, None)[1] if len(drawn.design.lengths) else of_readings
+    )
+    return STEP * max(float(of_readings.max(initial=0.0)), float(of_lengths.max(initial=0.0)))
+
+
+def _sizes(rows: Rows) -> Array:
+    """Lengths (m,) of rows."""
+    return np.asarray(np.sqrt((rows.by_ball**2).sum(axis=1) + (rows.by_shared**2).sum(axis=1)))
+
+
+def _differs(rows: Rows, weight: float) -> bool:
+    """Whether any row's weight differs from `weight` by more than plain orthogonal transformations keep apart."""
+    sizes = _sizes(rows)
+    return bool((sizes > ALIKE * weight).any() or (ALIKE * sizes[sizes > 0.0] < weight).any())
+
+
+def _weighted(rows: Rows, least: float, most: float) -> Rows:
+    """Rows without a pose with weights between `least` and `most`."""
+    sizes = _sizes(rows)[:, None]
+    factor = np.clip(sizes, least, most) / np.where(sizes > 0.0, sizes, 1.0)
+    return replace(rows, by_ball=factor * rows.by_ball, by_shared=factor * rows.by_shared)
 
 
 def _range(columns: Array) -> Array:
@@ -341,24 +394,42 @@ class _Span:
         return columns
 
 
-def _basis(balls: Array, shared: int, every: list[Array]) -> tuple[Basis, Array]:
-    """Basis in which the information of all rows together is the identity, and what is left out (shared, open)."""
+def _basis(balls: Array, shared: int, every: list[Array], even: list[Array] | None = None) -> tuple[Basis, Array]:
+    """Basis in which the information of all rows together is the identity, and what is left out (shared, open).
+
+    `even` are the same rows with weights that are much alike, where those of `every` are not.
+    """
     y = balls.shape[2]
     triangle = np.zeros((0, y + shared))
-    for some in _batches(every, 4 * (y + shared)):
+    for some in _batches(every if even is None else even, 4 * (y + shared)):
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *some]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
-    left, values, right = np.linalg.svd(triangle[:y, :y])
-    kept = values > EXACT * values.max(initial=0.0)
-    ball_open = right[~kept].T
-    ball_root = right[kept].T / values[kept]
-    ball_shared = ball_root @ left[:, kept].T @ triangle[:y, y:]
+    left, of_balls, by_balls = np.linalg.svd(triangle[:y, :y])
+    kept = of_balls > EXACT * of_balls.max(initial=0.0)
     # What balls leave of the rows above belongs to shared columns.
     below = np.concatenate([left[:, ~kept].T @ triangle[:y, y:], triangle[y:, y:]])
     _, values, right = np.linalg.svd(below, full_matrices=True)
     values = np.concatenate([values, np.zeros(shared - len(values))])
-    kept = values > EXACT * values.max(initial=0.0)
-    return Basis(balls, ball_root, ball_shared, right[kept].T / values[kept], ball_open), right[~kept].T
+    known = values > EXACT * values.max(initial=0.0)
+    ball_open, open_ = by_balls[~kept].T, right[~known].T
+    if even is None:
+        ball_root = by_balls[kept].T / of_balls[kept]
+        ball_shared = ball_root @ left[:, kept].T @ triangle[:y, y:]
+        return Basis(balls, ball_root, ball_shared, right[known].T / values[known], ball_open), open_
+    collected = Collected(int(kept.sum()), shared)
+    for rows in every:
+        collected.add(np.concatenate([rows[:, :y] @ by_balls[kept].T, rows[:, y:]], axis=1))
+    found = collected.found()
+    ball_root = by_balls[kept].T @ _inverse(found)
+    of_shared = triangular(found.rest @ right[known].T, np.zeros((len(found.rest), 0)))
+    return Basis(balls, ball_root, ball_root @ found.side, right[known].T @ _inverse(of_shared), ball_open), open_
+
+
+def _inverse(found: Triangle) -> Array:
+    """Inverse of a triangle, its rows in the order of the columns."""
+    inverse = np.empty_like(found.root)
+    inverse[found.order] = scipy_linalg().solve_triangular(found.root, np.eye(len(found.root)), check_finite=False)
+    return inverse
 
 
 def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:

@@ -87,7 +87,10 @@ def error_functions(design: Design, layout: SharedLayout, state: State, found: C
 
     probes = np.full(len(design.points), design.point_probe)
     rates = correction_rows(design, layout, state, design.points, probes)
-    spread, null = _points(rates, found)
+    spread = _points(rates, found)
+    if found.drawn is not None:
+        rates = correction_rows(design, layout, found.drawn, design.points, probes)
+    null = rates @ found.shared_null
     size = np.sqrt(((rates * found.scale) ** 2).sum(axis=2))
     uncertainty = blank(np.sqrt((spread**2).sum(axis=2)), null, size).ravel()
     known = np.flatnonzero(~np.isnan(uncertainty))
@@ -100,10 +103,13 @@ def point_distances(design: Design, layout: SharedLayout, state: State, found: C
     """U6: distances between corrected points, of at most `MOST_PLACES` of them."""
     chosen = evenly(len(design.points))
     points, probes = design.points[chosen], np.full(len(chosen), design.point_probe)
-    spread, null = _points(correction_rows(design, layout, state, points, probes), found)
+    spread = _points(correction_rows(design, layout, state, points, probes), found)
     corrected = corrected_points(design, state, points, probes)
     first, second = np.triu_indices(len(points), 1)
-    return _distances(corrected, spread, null, None, first, second, chosen)
+    drawn = state if found.drawn is None else found.drawn
+    null = correction_rows(design, layout, drawn, points, probes) @ found.shared_null
+    as_drawn = corrected_points(design, drawn, points, probes)
+    return _distances(corrected, spread, null, None, first, second, chosen, as_drawn)
 
 
 def ball_distances(design: Design, state: State, found: Covariance) -> Callable[[Integers], Functions]:
@@ -112,11 +118,12 @@ def ball_distances(design: Design, state: State, found: Covariance) -> Callable[
 
     n, d = design.balls.shape
     common, null = np.zeros_like(found.ball), np.zeros_like(found.ball_null)
+    drawn = (state if found.drawn is None else found.drawn).balls
     for artefact in np.flatnonzero(design.is_plate):
         mine = np.flatnonzero(design.ball_artefact == artefact)
         centred = state.balls[mine] - state.balls[mine].mean(axis=0)
         common[mine] = without_rigid_motion(centred, found.ball[mine])
-        null[mine] = without_rigid_motion(centred, found.ball_null[mine])
+        null[mine] = without_rigid_motion(drawn[mine] - drawn[mine].mean(axis=0), found.ball_null[mine])
     at = d * np.arange(n)[:, None, None] + np.zeros((d, d), np.int64)
     row, column = at + np.arange(d)[:, None], at + np.arange(d)
     own = coo_array((found.ball_own.ravel(), (row.ravel(), column.ravel())), shape=(n * d, n * d)).tocsr()
@@ -135,7 +142,7 @@ def ball_distances(design: Design, state: State, found: Covariance) -> Callable[
         key = first.tobytes()
         if key not in kept:
             kept.clear()
-            kept[key] = _distances(state.balls, common, null, own, first, second, np.arange(n))
+            kept[key] = _distances(state.balls, common, null, own, first, second, np.arange(n), drawn)
         return kept[key]
 
     return among
@@ -152,11 +159,11 @@ def evenly(count: int) -> Integers:
     return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
 
 
-def _points(rates: Array, found: Covariance) -> tuple[Array, Array]:
-    """Spread (p, d, r) and null motion (p, d, k) of points, as wide as those of balls."""
+def _points(rates: Array, found: Covariance) -> Array:
+    """Spread (p, d, r) of points, as wide as that of balls."""
     spread = np.zeros((*rates.shape[:2], found.ball.shape[2]))
     spread[:, :, : found.shared.shape[1]] = rates @ found.shared
-    return spread, rates @ found.shared_null
+    return spread
 
 
 def _distances(
@@ -167,23 +174,30 @@ def _distances(
     first: Integers,
     second: Integers,
     labels: Integers,
+    drawn: Array,
 ) -> Functions:
-    """Distances between places `first` and `second` that are determined."""
+    """Distances between places `first` and `second` that are determined where places are as `drawn`."""
     from scipy.sparse import coo_array
 
     n, d = places.shape
     centred = places - places.mean(axis=0) if n else places
     if own is None:
-        common, null = without_rigid_motion(centred, common), without_rigid_motion(centred, null)
-    unit = centred[first] - centred[second]
-    length = np.sqrt((unit**2).sum(axis=1))
-    apart = length > 0.0
-    first, second, unit = first[apart], second[apart], unit[apart] / length[apart, None]
-    row = np.repeat(np.arange(len(first)), 2 * d)
-    column = np.concatenate([d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1)
-    value = np.concatenate([unit, -unit], axis=1)
-    operator = coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
-    change = operator @ null.reshape(n * d, null.shape[2])
+        common = without_rigid_motion(centred, common)
+        null = without_rigid_motion(drawn - drawn.mean(axis=0) if n else drawn, null)
+    apart = np.sqrt(((centred[first] - centred[second]) ** 2).sum(axis=1)) > 0.0
+    first, second = first[apart], second[apart]
+
+    def by_places(places: Array) -> csr_array:
+        unit = places[first] - places[second]
+        length = np.sqrt((unit**2).sum(axis=1))
+        unit /= np.where(length > 0.0, length, 1.0)[:, None]
+        row = np.repeat(np.arange(len(first)), 2 * d)
+        column = np.concatenate([d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1)
+        value = np.concatenate([unit, -unit], axis=1)
+        return coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
+
+    operator = by_places(centred)
+    change = (by_places(drawn) if null.shape[2] else operator) @ null.reshape(n * d, null.shape[2])
     limit = 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
     known = np.sqrt((change**2).sum(axis=1)) <= limit
     operator, first, second = operator[known], first[known], second[known]

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulator.design import Design
-from simulator.estimation.covariance import covariance
-from simulator.estimation.gauss_newton import Solution
+from simulator.estimation.gauss_newton import Solution, fitted_covariance
 from simulator.estimation.hat import hat_rows, whitened_residuals
 from simulator.estimation.parameters import SharedLayout, shared_layout
 from simulator.machines.protocol import Array, Unit
@@ -102,7 +101,7 @@ class Search:
 
     def __init__(self, design: Design, layout: SharedLayout, solution: Solution, x: Array) -> None:
         self.design, self.layout, self.state, self.x = design, layout, solution.state, x
-        self.spread = covariance(design, solution.factor, solution.spectrum)
+        self.spread = fitted_covariance(design, solution)
         self.patterns = patterns(design, solution.state, x)
         self.square, self.information = np.zeros((2, len(self.patterns)))
         for one in responses(design, layout, solution.state, x, self.spread, self.patterns):

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design
+from ..design import Design, State
 from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
 from .elimination import Factor
+from .graded import triangle
 from .parameters import SharedLayout
+from .substitution import in_order, solve_balls, solve_kept
 
 # Below this fraction of the largest singular value a direction is undetermined: rounding leaves about 1e-14,
 # and the weakest determined direction of a usable design is many orders of magnitude above.
@@ -34,24 +36,19 @@ class Spectrum:
     Columns are scaled so that a unit step moves some point in the volume by up to a micrometre; a singular value
     is then the number of standard deviations by which the observations show such a change. `directions` (s, s)
     holds the right singular vectors as columns, in the parameters' own units, in the order of `values` (s,),
-    largest first; `deficiency` counts those that the observations leave wholly open.
+    largest first; `deficiency` counts those that the observations leave wholly open, and `gap` is the ratio of the
+    smallest value counted as determined to the largest counted as undetermined, where these were told apart.
     """
 
     values: Array
     directions: Array
     scale: Array
     deficiency: int
+    gap: float
 
     @property
     def rank(self) -> int:
         return len(self.values) - self.deficiency
-
-    @property
-    def gap(self) -> float:
-        """Ratio of the smallest value counted as determined to the largest counted as undetermined."""
-        if not 0 < self.deficiency < len(self.values):
-            return float("inf")
-        return float(self.values[self.rank - 1] / max(self.values[self.rank], np.finfo(float).tiny))
 
     @property
     def null(self) -> Array:
@@ -65,31 +62,61 @@ class Spectrum:
 
 
 @single_threaded
-def spectrum(factor: Factor, exact: float = EXACT, held: Array | None = None) -> Spectrum:
+def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     """Singular value decomposition of the shared parameters' factor.
 
-    What observations tell of the directions `held` (s, k), null directions of another spectrum, is left out, so that
-    these are null directions here, too.
+    Rank and null space do not depend on the weights of rows. Where these differ much, so that rounding of the heaviest
+    hides what the lightest tell, both are those of the rows with equal weights. They are those of `drawn` where
+    that is given: what observations tell of its null directions is left out, and no other direction counts as one.
     """
     scale = factor.layout.scale * MICROMETRE
-    root = factor.root * scale
-    if held is not None:
-        open_ = held / scale[:, None]
-        root = root - (root @ open_) @ open_.T
-    _, values, right = np.linalg.svd(root)
-    # Where nothing shared is determined, all values are rounding, of what the balls' rows have carried away.
-    largest = max(
-        float(values.max(initial=0.0)),
-        *(float(np.abs(rows * scale).max(initial=0.0)) for rows in (factor.ball_shared, factor.kept_shared)),
+    if drawn is None:
+        judged = factor if factor.alike is None else factor.alike
+        _, values, right = np.linalg.svd(judged.root * scale)
+        # Where nothing shared is determined, all values are rounding, of what the balls' rows have carried away.
+        largest = max(
+            float(values.max(initial=0.0)),
+            *(float(np.abs(rows * scale).max(initial=0.0)) for rows in (judged.ball_shared, judged.kept_shared)),
+        )
+        deficiency = int((values <= EXACT * largest).sum())
+        rank = len(values) - deficiency
+        gap = float("inf")
+        if 0 < deficiency < len(values):
+            gap = float(values[rank - 1] / max(values[rank], np.finfo(float).tiny))
+        if judged is factor:
+            return Spectrum(values, scale[:, None] * right.T, scale, deficiency, gap)
+        null = right[rank:].T
+    else:
+        null, deficiency, gap = drawn.null / scale[:, None], drawn.deficiency, drawn.gap
+    spanned = np.linalg.qr(null, mode="complete")[0][:, deficiency:]
+    values, directions = _determined(factor, scale, spanned)
+    # Rounding alone is left of what counts as zero.
+    below = values[-1] / gap if len(values) else 0.0
+    return Spectrum(
+        np.append(values, np.full(deficiency, below)),
+        scale[:, None] * np.concatenate([directions, null], axis=1),
+        scale,
+        deficiency,
+        gap,
     )
-    deficiency = int((values <= exact * largest).sum())
-    return Spectrum(values, scale[:, None] * right.T, scale, deficiency)
+
+
+def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Array]:
+    """Singular values (r,) and directions (s, r) of a scaled factor within what `spanned` (s, r) spans."""
+    if factor.orders is None:
+        _, values, right = np.linalg.svd((factor.root * scale) @ spanned, full_matrices=False)
+        return values, spanned @ right.T
+    # The heaviest rows would take all digits of the smallest singular values, but the inverse has these first.
+    found = triangle(in_order(factor) * scale @ spanned, np.zeros((len(scale), 0)))
+    inverse = scipy_linalg().solve_triangular(found.root, np.eye(len(found.root)), check_finite=False)
+    directions, values, _ = np.linalg.svd(spanned[:, found.order] @ inverse, full_matrices=False)
+    return 1.0 / values[::-1], directions[:, ::-1]
 
 
 def no_spectrum(layout: SharedLayout) -> Spectrum:
     """What stands for a spectrum where the factor is not finite: no value is known, none counts as open."""
     size = len(layout)
-    return Spectrum(np.full(size, np.nan), np.full((size, size), np.nan), layout.scale * MICROMETRE, 0)
+    return Spectrum(np.full(size, np.nan), np.full((size, size), np.nan), layout.scale * MICROMETRE, 0, float("inf"))
 
 
 @dataclass(frozen=True)
@@ -99,6 +126,9 @@ class Covariance:
     `shared` (s, r) for the shared parameters. For the balls: `ball` (n, d, r + kept) is the part common to all,
     `ball_own` (n, d, d) the part each has alone; rows of balls that are no parameters are zero. The `..._null`
     arrays say how the undetermined directions move the same parameters, (s, deficiency), (n, d, deficiency).
+
+    After a fit the latter are those of the design as drawn, since what is undetermined is a property of the design:
+    `drawn` then is the state at which functions are to be linearised to see whether a null direction changes them.
     """
 
     shared: Array
@@ -108,10 +138,16 @@ class Covariance:
     ball_null: Array
     scale: Array
     ball_scale: float = MICROMETRE
+    drawn: State | None = None
 
-    def of_shared(self, linear: Array) -> Array:
-        """Standard deviations (m,) of `linear` (m, s) applied to the shared parameters; NaN where open."""
+    def of_shared(self, linear: Array, drawn: Array | None = None) -> Array:
+        """Standard deviations (m,) of `linear` (m, s) applied to the shared parameters; NaN where open.
+
+        `drawn` (m, s) are the same functions linearised at the state `drawn`, if they are others there.
+        """
         result = np.sqrt(((linear @ self.shared) ** 2).sum(axis=1))
+        if drawn is not None:
+            linear = drawn
         return blank(result, linear @ self.shared_null, np.sqrt(((linear * self.scale) ** 2).sum(axis=1)))
 
     def of_balls(self) -> Array:
@@ -146,26 +182,14 @@ def covariance(design: Design, factor: Factor, found: Spectrum) -> Covariance:
     ball = np.zeros((n, d, rank + k))
     own = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
-    carried = _solve_balls(factor.ball_root, factor.ball_shared)
+    carried = solve_balls(factor, factor.ball_shared)
     ball[factor.eliminated, :, :rank] = -(carried @ shared)
     ball_null[factor.eliminated] = -(carried @ null)
-    own[factor.eliminated] = _solve_balls(factor.ball_root, np.broadcast_to(np.eye(d), factor.ball_root.shape))
+    own[factor.eliminated] = solve_balls(factor, np.broadcast_to(np.eye(d), factor.ball_root.shape))
     if k:
-        solve_triangular = scipy_linalg().solve_triangular
         sides = np.concatenate([factor.kept_shared @ shared, factor.kept_shared @ null, -np.eye(k)], axis=1)
-        solved = -solve_triangular(factor.kept_root, sides, check_finite=False)
+        solved = -solve_kept(factor, sides)
         ball[factor.kept, :, :rank] = solved[:, :rank].reshape(len(factor.kept), d, rank)
         ball_null[factor.kept] = solved[:, rank : rank + nulls].reshape(len(factor.kept), d, nulls)
         ball[factor.kept, :, rank:] = solved[:, rank + nulls :].reshape(len(factor.kept), d, k)
     return Covariance(shared, ball, own, null, ball_null, found.scale)
-
-
-def _solve_balls(root: Array, side: Array) -> Array:
-    """Solve upper triangular systems (n, d, d) for sides (n, d, m) by substitution, all balls at once."""
-    d = root.shape[1]
-    solution = np.array(side, dtype=float)
-    for row in reversed(range(d)):
-        for later in range(row + 1, d):
-            solution[:, row] -= root[:, row, later, None] * solution[:, later]
-        solution[:, row] /= root[:, row, row, None]
-    return solution

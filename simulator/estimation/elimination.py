@@ -11,19 +11,22 @@ are kept and eliminated together at the end.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..design import Design, Integers, State
 from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
+from .graded import Collected, without_balls
 from .observations import (
+    BallRows,
     coordinate_rows,
     distance_rows,
     length_shared_rows,
     prior_rows,
     reading_blocks,
+    reading_weights,
 )
 from .parameters import SharedLayout
 
@@ -38,6 +41,19 @@ DISTANCES_AT_ONCE = 1024
 SMALL = 500
 
 
+# Weights of rows that differ by more than this are beyond what plain orthogonal transformations keep apart.
+ALIKE = 1e4
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Parameters that the columns of a factor's triangles belong to: `ball` (e, d), `kept` (d k,), `shared` (s,)."""
+
+    ball: Integers
+    kept: Integers
+    shared: Integers
+
+
 @dataclass(frozen=True)
 class Factor:
     """Triangular factor of the whitened observations, with the right-hand side z = Q' r beside it.
@@ -47,6 +63,10 @@ class Factor:
     `eliminated`; `kept_root` (d k, d k), `kept_shared` (d k, s), `kept_side` (d k,) those of the balls
     `kept`; `root` (s, s) and `side` (s,) those of the shared parameters. `sum_of_squares` is S^2 at the point
     of linearisation and `remainder` what no change of the parameters can take away.
+
+    Where the weights of rows differ so much that columns have to be taken in an order that depends on them, `orders`
+    tells the columns of all roots, and `alike` is the factor of the same rows with about equal weights, which has the
+    same rank and the same null space. Otherwise columns stand in the order of the parameters.
     """
 
     layout: SharedLayout
@@ -62,6 +82,8 @@ class Factor:
     side: Array
     sum_of_squares: float
     remainder: float
+    orders: Orders | None = None
+    alike: Factor | None = None
 
 
 @single_threaded
@@ -71,6 +93,12 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     `x` (readings, d) holds a scale reading for each of the design's readings, in order. Without it the machine is taken
     to read without error, as for planning.
     """
+    if _differ(design, layout, state):
+        return _eliminate_graded(design, layout, state, x)
+    return _eliminate_alike(design, layout, state, x)
+
+
+def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
     d, s = design.dimension, len(layout)
     kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
     single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
@@ -139,6 +167,126 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
         sum_of_squares=total,
         remainder=float(triangle[-1, -1] ** 2),
     )
+
+
+def _differ(design: Design, layout: SharedLayout, state: State) -> bool:
+    """Whether the weights of a design's rows differ by more than `ALIKE`."""
+    given = design.lengths
+    known = _prior_weights(design, layout, state)
+    weights = [
+        reading_weights(design, design.readings.select(design.plate_readings)),
+        1.0 / design.distances.uncertainty,
+        1.0 / design.coordinates.uncertainty,
+        1.0 / given.uncertainty[given.uncertainty > 0.0],
+        1.0 / design.repeatability if given.with_repeatability.any() else np.zeros(0),
+        known[known > 0.0],
+    ]
+    largest = max(float(some.max(initial=0.0)) for some in weights)
+    smallest = min(float(some.min(initial=np.inf)) for some in weights)
+    return largest > ALIKE * smallest
+
+
+def _prior_weights(design: Design, layout: SharedLayout, state: State) -> Array:
+    """Largest derivative (m,) of each prior's row by a parameter, in its effect."""
+    return np.abs(prior_rows(design, layout, state)[1] * layout.scale).max(axis=1, initial=0.0)
+
+
+def _weighted_alike(design: Design, layout: SharedLayout, state: State) -> Design:
+    """The same observations with weights of about one each."""
+    given, known = design.lengths, design.priors
+    weights = _prior_weights(design, layout, state)
+    return replace(
+        design,
+        repeatability=np.ones(design.dimension),
+        readings=replace(design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)),
+        distances=replace(design.distances, uncertainty=np.ones(len(design.distances))),
+        coordinates=replace(design.coordinates, uncertainty=np.ones(len(design.coordinates))),
+        lengths=replace(
+            given,
+            uncertainty=np.ones(len(given)),
+            with_repeatability=np.zeros(len(given), bool),
+            certificate=np.arange(len(given)),
+        ),
+        priors=replace(known, uncertainty=known.uncertainty * np.where(weights > 0.0, weights, 1.0)),
+    )
+
+
+def _eliminate_graded(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
+    """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
+    d, s = design.dimension, len(layout)
+    kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
+    place_of = np.zeros(len(design.ball_names), np.int64)
+    place_of[kept] = np.arange(len(kept))
+    columns = d * len(kept)
+    scale = np.append(layout.scale, 1.0)
+    single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
+    balls, roots, orders, tops = [], [], [], []
+    total, shared, tied = 0.0, Collected(s, 1), Collected(columns, s + 1)
+    for is_tied, chosen in ((False, single), (True, kept)):
+        for batch, by_ball, rest in _batches(design, layout, state, x, chosen):
+            total += float((rest[:, :, -1] ** 2).sum())
+            rest *= scale
+            weights = np.maximum(np.abs(by_ball).max(axis=2), np.abs(rest[:, :, :-1]).max(axis=2, initial=0.0))
+            root, order, top, left = without_balls(by_ball, rest, weights)
+            shared.add(left.reshape(-1, s + 1))
+            if is_tied:
+                rows = np.zeros((len(batch), d, columns + s + 1))
+                ball, row = np.ogrid[: len(batch), :d]
+                for axis in range(d):
+                    rows[ball, row, (d * place_of[batch] + order[:, axis])[:, None]] = root[:, :, axis]
+                rows[:, :, columns:] = top
+                tied.add(rows.reshape(len(batch) * d, -1))
+                continue
+            balls.append(batch)
+            roots.append(root)
+            orders.append(order)
+            tops.append(top)
+    if len(design.lengths):
+        residual, derivative = length_shared_rows(design, layout, state, x)
+        total += float(residual @ residual)
+        shared.add(np.column_stack([derivative, residual]) * scale)
+    if len(design.priors):
+        residual, derivative = prior_rows(design, layout, state)
+        total += float(residual @ residual)
+        shared.add(np.column_stack([derivative, residual]) * scale)
+    distances = distance_rows(design, state)
+    total += float(distances.residual @ distances.residual)
+    for start in range(0, len(design.distances), DISTANCES_AT_ONCE):
+        rows = _distance_columns(design, distances, place_of, slice(start, start + DISTANCES_AT_ONCE))
+        tied.add(np.concatenate([rows, np.zeros((len(rows), s)), distances.residual[start:][: len(rows), None]], 1))
+    of_kept = tied.found()
+    shared.add(of_kept.rest)
+    of_shared = shared.found()
+    top = np.concatenate([np.zeros((0, d, s + 1)), *tops]) / scale
+    kept_top = of_kept.side / scale
+    return Factor(
+        layout=layout,
+        eliminated=np.concatenate([np.zeros(0, np.int64), *balls]),
+        ball_root=np.concatenate([np.zeros((0, d, d)), *roots]),
+        ball_shared=top[:, :, :-1],
+        ball_side=top[:, :, -1],
+        kept=kept,
+        kept_root=of_kept.root,
+        kept_shared=kept_top[:, :-1],
+        kept_side=kept_top[:, -1],
+        root=of_shared.root / layout.scale[of_shared.order],
+        side=of_shared.side[:, 0],
+        sum_of_squares=total,
+        remainder=float((of_shared.rest**2).sum()),
+        orders=Orders(np.concatenate([np.zeros((0, d), np.int64), *orders]), of_kept.order, of_shared.order),
+        alike=_eliminate_alike(_weighted_alike(design, layout, state), layout, state, x),
+    )
+
+
+def _distance_columns(design: Design, distances: BallRows, place_of: Integers, some: slice) -> Array:
+    """Derivatives (m, d k) of some calibrated distances by the balls that they tie together."""
+    d, first, second = design.dimension, design.distances.first[some], design.distances.second[some]
+    rows = np.zeros((len(first), d * (int(place_of.max()) + 1)))
+    at = np.arange(len(first))
+    for axis in range(d):
+        rows[at, d * place_of[first] + axis] = distances.derivative[some, axis]
+        rows[at, d * place_of[second] + axis] = -distances.derivative[some, axis]
+    return rows
 
 
 def _absorbed(triangle: Array, rows: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,10 +11,12 @@ from ..design import Design, State, nominal_state, probe_offsets, unknown_length
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from ..threads import scipy_linalg, single_threaded
-from .covariance import Spectrum, _solve_balls, no_spectrum, spectrum
+from .covariance import Covariance, Spectrum, covariance, no_spectrum, spectrum
 from .elimination import Factor, eliminate
+from .graded import triangle
 from .initial import initial_state
 from .parameters import shared_layout
+from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
 Status = Literal["converged", "not converged", "diverged"]
 
@@ -62,12 +64,13 @@ def gauss_newton(
     x: Array,
     start: State,
     settings: GaussNewtonSettings | None = None,
-    held: Array | None = None,
+    held: Spectrum | None = None,
 ) -> Solution:
     """Minimise S^2 over balls, poses and machine errors, from `start`.
 
-    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not moved in, nor those
-    `held` (s, k): see `open_as_drawn`. A failure to converge is a status, not an exception.
+    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not moved in; with
+    `held`, see `as_drawn`, these are its null directions, whatever the state. A failure to converge is a status, not an
+    exception.
     """
     settings = settings or GaussNewtonSettings()
     layout = shared_layout(design)
@@ -83,7 +86,7 @@ def gauss_newton(
             found = no_spectrum(layout)
             status = "diverged"
             break
-        found = spectrum(factor, held=held)
+        found = spectrum(factor, held)
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found)
@@ -108,24 +111,35 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     steps of metres.
     """
     start = initial_state(design, x)
-    drawn = open_as_drawn(design)
-    solution = gauss_newton(design, x, start, settings, drawn if len(design.lengths) else None)
-    if drawn is None or len(design.lengths):
-        return solution
-    is_open = solution.spectrum.deficiency >= drawn.shape[1]
+    drawn = as_drawn(design)
+    if not drawn.deficiency or len(design.lengths):
+        return gauss_newton(design, x, start, settings, drawn)
+    solution = gauss_newton(design, x, start, settings)
     went_far = max(one.step for one in solution.iterations) > NEIGHBOURHOOD
-    follows = solution.status == "converged" and (is_open or not went_far)
-    return solution if follows else gauss_newton(design, x, start, settings, drawn)
+    if solution.status == "converged" and not went_far:
+        return replace(solution, spectrum=spectrum(solution.factor, drawn))
+    return gauss_newton(design, x, start, settings, drawn)
 
 
-def open_as_drawn(design: Design) -> Array | None:
-    """Shared directions (s, k) that readings without errors in the nominal poses would leave open; None without any.
+def as_drawn(design: Design) -> Spectrum:
+    """The spectrum of a design in its nominal poses on a machine without errors: rank and null space are those here.
 
-    With errors, noise and poses that are not quite as drawn the same readings seem to tell a little of them. To follow
-    that may lead far astray: where no length is known, S^2 is least when all lengths are zero.
+    With errors, noise and poses that are not quite as drawn the same readings seem to tell a little of what they leave
+    open. To follow that may lead far astray: where no length is known, S^2 is least when all lengths are zero.
     """
-    found = spectrum(eliminate(design, shared_layout(design), nominal_state(design)))
-    return found.null if found.deficiency else None
+    return spectrum(eliminate(design, shared_layout(design), nominal_state(design)))
+
+
+@single_threaded
+def fitted_covariance(design: Design, solution: Solution) -> Covariance:
+    """Square root of the covariance at an estimate; what is undetermined is what the design as drawn leaves open."""
+    found = covariance(design, solution.factor, solution.spectrum)
+    if not solution.spectrum.deficiency:
+        return found
+    state = nominal_state(design)
+    factor = eliminate(design, solution.factor.layout, state)
+    drawn = covariance(design, factor, spectrum(factor))
+    return replace(found, shared_null=drawn.shared_null, ball_null=drawn.ball_null, drawn=state)
 
 
 def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:
@@ -133,22 +147,25 @@ def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array,
     shared = _shared_step(factor, found)
     balls = np.zeros((len(design.ball_names), design.dimension))
     side = factor.ball_side + factor.ball_shared @ shared
-    balls[factor.eliminated] = -_solve_balls(factor.ball_root, side[:, :, None])[:, :, 0]
+    balls[factor.eliminated] = -solve_balls(factor, side[:, :, None])[:, :, 0]
     if len(factor.kept):
-        solve_triangular = scipy_linalg().solve_triangular
-        kept = -solve_triangular(factor.kept_root, factor.kept_side + factor.kept_shared @ shared)
+        kept = -solve_kept(factor, factor.kept_side + factor.kept_shared @ shared)
         balls[factor.kept] = kept.reshape(-1, design.dimension)
     return shared, balls
 
 
 def _shared_step(factor: Factor, found: Spectrum) -> Array:
     if found.deficiency == 0:
-        solve_triangular = scipy_linalg().solve_triangular
-        return np.asarray(-solve_triangular(factor.root, factor.side))
-    # root = U diag(values) V' / scale, so U' side follows from root times the directions.
-    left = factor.root @ found.directions[:, : found.rank]
-    left /= np.sqrt((left**2).sum(axis=0))
-    return np.asarray(-(found.root @ (left.T @ factor.side)))
+        return -solve_shared(factor, factor.side)
+    determined = found.directions[:, : found.rank]
+    if factor.orders is None:
+        # root = U diag(values) V' / scale, so U' side follows from root times the directions.
+        left = factor.root @ determined
+        left /= np.sqrt((left**2).sum(axis=0))
+        return np.asarray(-(found.root @ (left.T @ factor.side)))
+    rest = triangle(in_order(factor) @ determined, factor.side[:, None])
+    steps = scipy_linalg().solve_triangular(rest.root, rest.side[:, 0], check_finite=False)
+    return np.asarray(-(determined[:, rest.order] @ steps))
 
 
 def moved(

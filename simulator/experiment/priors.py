@@ -75,6 +75,7 @@ def _known(model: ErrorModel, positions: dict[int, Position], references: Refere
             continue
         for k, word in enumerate(words):
             name = f"{position.name}: {word}"
+            unit: Unit
             unit, nominal = ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
             known[name] = ((name, position.name, None, k, of_no_error, unit, nominal),)
     return known

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..design import Integers, Lengths
-from ..estimation.covariance import _solve_balls
 from ..estimation.elimination import Factor
 from ..estimation.observations import length_values
 from ..estimation.parameters import SharedLayout
+from ..estimation.substitution import solve_balls, solve_kept, solve_shared
 from ..machines.protocol import Array
-from ..threads import scipy_linalg, single_threaded
+from ..threads import single_threaded
 from .expansion import Single
 from .reference import Group, Reference
 
@@ -353,34 +353,22 @@ def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squ
 
 def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
     """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared parameters (b, s)."""
-    solve_triangular = scipy_linalg().solve_triangular
     b, d, n = by_ball.shape
     e, s = len(factor.eliminated), by_shared.shape[1]
     rows = factor.ball_shared.reshape(e * d, s)
     # The columns of the systems are replicates.
     of_ball = np.ascontiguousarray(by_ball.transpose(2, 1, 0))
-    single = _solve_balls_transposed(factor.ball_root, of_ball[factor.eliminated])
+    single = solve_balls(factor, of_ball[factor.eliminated], transposed=True)
     right = by_shared.T - rows.T @ single.reshape(e * d, b)
     kept = of_ball[factor.kept].reshape(-1, b)
     if len(factor.kept):
-        kept = solve_triangular(factor.kept_root, kept, trans="T", check_finite=False)
+        kept = solve_kept(factor, kept, transposed=True)
         right = right - factor.kept_shared.T @ kept
-    right = solve_triangular(factor.root, right, trans="T", check_finite=False)
-    shared = solve_triangular(factor.root, right, check_finite=False)
+    shared = solve_shared(factor, solve_shared(factor, right, transposed=True))
     steps = np.zeros((n, d, b))
     carried = (rows @ shared).reshape(e, d, b)
-    steps[factor.eliminated] = _solve_balls(factor.ball_root, single - carried)
+    steps[factor.eliminated] = solve_balls(factor, single - carried)
     if len(factor.kept):
-        kept = solve_triangular(factor.kept_root, kept - factor.kept_shared @ shared, check_finite=False)
+        kept = solve_kept(factor, kept - factor.kept_shared @ shared)
         steps[factor.kept] = kept.reshape(-1, d, b)
     return -np.ascontiguousarray(steps.transpose(2, 1, 0)), -shared.T
-
-
-def _solve_balls_transposed(root: Array, side: Array) -> Array:
-    """Solve R' z = side for upper triangular R (n, d, d) and sides (n, d, m), all balls at once."""
-    solution = np.array(side, dtype=float)
-    for row in range(root.shape[1]):
-        for earlier in range(row):
-            solution[:, row] -= root[:, earlier, row, None] * solution[:, earlier]
-        solution[:, row] /= root[:, row, row, None]
-    return solution

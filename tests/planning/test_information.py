@@ -211,3 +211,35 @@ def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
     chosen = [names.index(name) for name in ("a", "d", "of small", "of large")]
     full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
     assert full.verdict.deficiency == 1 and value(problem, chosen) == np.inf
+
+
+# What is known all but exactly: of a machine's parameter, of a certificate, and beside readings that are coarse.
+TIGHT = {
+    "a prior": ("target_accuracy", "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_accuracy"),
+    "coarse readings": ("repeatability: 1 um", "repeatability: 10 mm"),
+    "an item on offer": (
+        "pairs: corner sides, standard_uncertainty: 0.5 um, price",
+        "pairs: corner sides, standard_uncertainty: 1e-9 um, price",
+    ),
+    "a certificate": ("standard_uncertainty: 0.5 um}\ntarget", "standard_uncertainty: 1e-9 um}\ntarget"),
+}
+
+
+@pytest.mark.parametrize("name", ["U6", "U5"])
+@pytest.mark.parametrize("what", TIGHT)
+def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str, name: CriterionName) -> None:
+    old, new = TIGHT[what]
+    assert old in TEXT
+    (experiment,) = load(written(tmp_path, TEXT.replace(old, new, 1)), planning=True)
+    assert experiment.pool is not None
+    problem = problem_of(experiment, name)
+    assert problem.information.deficiency == 0
+    compared = 0
+    for chosen in selections(experiment, 15, 7, 3):
+        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        found = value(problem, chosen)
+        assert np.isfinite(found) == (full.verdict.deficiency == 0)
+        if np.isfinite(found):
+            compared += 1
+            assert found == pytest.approx(in_full(full, name), rel=1e-8)
+    assert compared > 5
