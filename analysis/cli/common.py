@@ -7,9 +7,10 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -120,6 +121,38 @@ def write(path: Path, text: str, force: bool = False) -> None:
         told = f"cannot be written ({error.strerror}); name another file"
         raise ExperimentError([Message(str(path), 0, 0, "", told)]) from None
     print(f"{path} written", file=sys.stderr)
+
+
+def write_all(writers: Mapping[Path, Callable[[TextIO], None]], force: bool = False) -> None:
+    """Let each writer write its text file, all of them or none; the file named - is standard output, written last.
+
+    :raises ExperimentError: without `force` there is one already, or one cannot be written.
+    """
+    from simulator.experiment.messages import ExperimentError, Message
+
+    files = [path for path in writers if str(path) != "-"]
+    made = []
+    try:
+        with ExitStack() as opened:
+            streams = []
+            for path in files:
+                is_new = not path.exists()
+                # Files that are there are emptied only when all can be written.
+                stream = opened.enter_context(path.open("a" if force else "x", encoding="utf-8", newline=""))
+                made += [path] if is_new else []
+                streams.append(stream)
+            for path, stream in zip(files, streams, strict=True):
+                if path.is_file():
+                    stream.truncate(0)
+                writers[path](stream)
+    except OSError as error:
+        for one in made:
+            one.unlink(missing_ok=True)
+        told = f"cannot be written ({error.strerror}); name another file"
+        text = EXISTS if isinstance(error, FileExistsError) else told
+        raise ExperimentError([Message(str(path), 0, 0, "", text)]) from None
+    for path in writers.keys() - files:
+        writers[path](sys.stdout)
 
 
 def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:

@@ -16,6 +16,7 @@ from ..quantities import LengthFunction
 from .yamltree import Mark
 
 if TYPE_CHECKING:
+    from ..machines.protocol import Unit
     from .pool import Pool
 
 Floats = NDArray[np.float64]
@@ -126,7 +127,7 @@ class Prior:
 
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation. ``probe`` and
     ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of the error model's
-    parameters. ``mark`` and ``path``: where it is stated.
+    parameters. ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
     """
 
     name: str
@@ -138,6 +139,7 @@ class Prior:
     standard_uncertainty: float
     mark: Mark
     path: str = ""
+    unit: Unit = "m"
 
 
 @dataclass(frozen=True, eq=False)
