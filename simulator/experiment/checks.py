@@ -12,7 +12,7 @@ from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.description import MachineDescription
+from ..machines.description import MachineDescription, random_part
 from ..machines.settings import MachineFileSettings, MetricSettings, PythonSettings, build_error_model, dimension_of
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
@@ -99,6 +99,13 @@ def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | Non
     if found is None:
         return
     truth.of(found)
+    random = random_part(found)
+    if random and truth.random_part is None:
+        text = (
+            f"has a random part that simulated readings would lack: {listing(random)}; let machine.repeatability cover it "
+            "and add random_part: omitted, or leave it out of the machine file"
+        )
+        references.problems.add(steps, text)
     if machine is None or machine.dimension != 3:
         return
     for axis, name in enumerate(AXES):
