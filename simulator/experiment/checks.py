@@ -102,8 +102,8 @@ def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | Non
     random = random_part(found)
     if random and truth.random_part is None:
         text = (
-            f"has a random part that simulated readings would lack: {listing(random)}; let machine.repeatability cover it "
-            "and add random_part: omitted, or leave it out of the machine file"
+            f"has a random part that simulated readings would lack: {listing(random)}; let machine.repeatability cover "
+            "it and add random_part: omitted, or leave it out of the machine file"
         )
         references.problems.add(steps, text)
     if machine is None or machine.dimension != 3:

@@ -169,7 +169,9 @@ def random_part(machine: MachineDescription) -> tuple[str, ...]:
     def is_random(deviation: float | Points | None) -> bool:
         return any(deviation.values) if isinstance(deviation, Points) else bool(deviation)
 
-    bandwidths = [one.name for one in (*machine.errors, *machine.squareness) if is_random(one.deviation)]
+    stated: list[tuple[str, float | Points | None]] = [(one.name, one.deviation) for one in machine.errors]
+    stated += [(one.name, one.deviation) for one in machine.squareness]
+    bandwidths = [name for name, deviation in stated if is_random(deviation)]
     uncertain = [axis for axis, one in machine.temperature.items() if one.uncertainty and one.expansion]
     return (
         *(f"bandwidth of {name}" for name in bandwidths),
