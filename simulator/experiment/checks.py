@@ -198,23 +198,38 @@ def check_names(position_count: int, problems: Problems) -> None:
         first.setdefault(name, i)
 
 
-def check_inside(position: Position, steps: Steps, volume: Volume, references: References) -> None:
-    """Report balls that are read outside the measuring volume."""
+def check_inside(
+    position: Position, steps: Steps, volume: Volume, offsets: Mapping[str, Floats], references: References
+) -> None:
+    """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those of the probes.
+
+    Error models are functions of the scale readings, where the ball is less the probe's offset. Balls may be outside.
+    """
     layout = references.layouts[position.artefact]
-    read = read_balls([position])
-    coordinates = ball_coordinates(position.pose, layout)[read]
-    by_how_much, axes, sides = excess(coordinates, volume)
+    rows = [
+        (group.ball_indices, probe, offsets[probe])
+        for group in position.readings
+        for probe in group.probes
+        if probe in offsets and offsets[probe].shape == volume.lower.shape
+    ]
+    if not rows:
+        return
+    places = ball_coordinates(position.pose, layout)
+    balls = np.concatenate([indices for indices, _, _ in rows])
+    by_how_much, axes, sides = excess(np.concatenate([places[one] - offset for one, _, offset in rows]), volume)
     outside = np.flatnonzero(by_how_much > TOLERANCE)
     if len(outside) == 0:
         return
-    worst = int(outside[np.argmax(by_how_much[outside])])
-    axis = int(axes[worst])
-    others = f", and {len(outside) - 1} more balls" if len(outside) > 1 else ""
-    others = others[:-1] if len(outside) == 2 else others
+    # The first of those furthest outside, whatever rounding makes of equal ones.
+    worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
+    axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
+    offset, place = float(offsets[probe][axis]), float(places[balls[worst], axis])
+    others = f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}" if len(outside) > 1 else ""
+    less = f" (the ball at {format_length(place)} less the offset of {format_length(offset)})" if offset else ""
     text = (
-        f'ball "{layout.names[read[worst]]}" is at {AXES[axis]} = {format_length(coordinates[worst, axis])}, '
-        f"{format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others}; "
-        "move the artefact, or read fewer balls"
+        f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" puts the scales at {AXES[axis]} = '
+        f"{format_length(place - offset)}{less}, {format_length(by_how_much[worst])} {sides[worst]} the measuring "
+        f"volume{others}; move the artefact, or read it otherwise"
     )
     references.problems.add(steps, text)
 

@@ -36,9 +36,15 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Where balls may be: the volume, the lower and upper ends (2, d) by probe, and what a plate needs around it."""
+    """Where artefacts may be.
+
+    The scale readings of balls, which are where they are less the probe's offset of `offsets` (d,), have to be in
+    `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by probe. `edge` is what a plate needs
+    around it.
+    """
 
     volume: Volume
+    offsets: Mapping[str, Floats]
     reach: Mapping[str, Floats]
     edge: float | None
 
@@ -146,14 +152,15 @@ def _reasons(
         shifts[:, AXIS_INDEX[plane]] = [level for level, _ in both]
     read = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
     found = np.full(len(shifts), "", dtype=object)
-    found[~is_within(read, bounds.volume.lower, bounds.volume.upper)] = "outside the volume"
     if bounds.edge is not None and references.artefacts[group.artefact].role == "plate":
         around = outline(at_zero, group.layout, bounds.edge) + shifts[:, None, :]
         beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
-        found[(found == "") & beyond] = "edge outside the volume"
+        found[beyond] = "edge outside the volume"
     by_probes = {}
     for probes in group.probes[plane]:
         one = found.copy()
+        for offset in (bounds.offsets[probe] for probe in probes if probe in bounds.offsets):
+            one[~is_within(read - offset, bounds.volume.lower, bounds.volume.upper)] = "outside the volume"
         for probe in probes:
             if probe in bounds.reach:
                 one[(one == "") & ~is_within(read, *bounds.reach[probe])] = f"out of reach of probe {probe}"
