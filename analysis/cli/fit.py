@@ -79,7 +79,7 @@ def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
     from simulator.certificates import read_certificate
     from simulator.layout import lay_out
-    from simulator.misreading_messages import doubts_about_lengths
+    from simulator.misreading_messages import doubts_about_lengths, doubts_about_volume
     from simulator.readings import read_readings
     from simulator.settings import listing
 
@@ -113,7 +113,8 @@ def run(options: Namespace) -> int:
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
         if names:
             print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
-    for doubt in doubts_about_lengths(observed.design, observed.x):
+    doubts = doubts_about_lengths(observed.design, observed.x)
+    for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
         print(f"warning: {doubt}", file=sys.stderr)
     if options.estimator != "full":
         return _run_other(options, experiment, observed)
