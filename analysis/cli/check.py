@@ -52,6 +52,8 @@ def run(options: Namespace) -> int:
     files = []
     for checked in check_files(options.files, options.variant, options.suggest):
         files.append(checked)
+        for doubt in checked.doubts:
+            print(f"warning: {doubt}", file=sys.stderr)
         if options.format == "github":
             for line in annotation_lines(checked, workspace):
                 print(line, flush=True)

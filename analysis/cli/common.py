@@ -173,12 +173,14 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
             messages += error.messages
     if messages:
         raise ExperimentError(messages)
-    if not options.variant:
-        return found
-    unknown = unknown_variants(options.files, options.variant, {experiment.name for experiment in found})
-    if unknown:
-        raise ExperimentError(unknown)
-    return [experiment for experiment in found if experiment.name in options.variant]
+    if options.variant:
+        unknown = unknown_variants(options.files, options.variant, {experiment.name for experiment in found})
+        if unknown:
+            raise ExperimentError(unknown)
+        found = [experiment for experiment in found if experiment.name in options.variant]
+    for doubt in dict.fromkeys(doubt for experiment in found for doubt in experiment.doubts):
+        print(f"warning: {doubt}", file=sys.stderr)
+    return found
 
 
 def single(options: Namespace, planning: bool = False) -> Experiment:

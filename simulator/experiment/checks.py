@@ -20,7 +20,7 @@ from ..quantities import format_length
 from ..settings import listing
 from .curves import read_curves
 from .machine_file import load_machine
-from .messages import ExperimentError, Steps
+from .messages import ExperimentError, Message, Steps
 from .model import Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
 from .problems import Problems, written_text
 from .references import References
@@ -81,9 +81,11 @@ def _check_model(settings: Any, steps: Steps, machine: Machine | None, reference
     return True
 
 
-def _machine_of_file(file: str, steps: Steps, references: References) -> MachineDescription | None:
+def _machine_of_file(
+    file: str, steps: Steps, references: References, doubts: list[Message] | None = None
+) -> MachineDescription | None:
     try:
-        return load_machine(references.folder / file)
+        return load_machine(references.folder / file, doubts)
     except ExperimentError as error:
         references.problems.take(error, (*steps, "file"))
         return None
@@ -95,7 +97,7 @@ def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | Non
     if references.dimension == 2:
         text = 'kind "machine" has 3 dimensions, but machine.volume has 2; change one of the two'
         references.problems.add(("true_machine", "kind"), text)
-    found = _machine_of_file(truth.file, ("true_machine",), references)
+    found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
         return
     truth.of(found)

@@ -162,6 +162,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         priors=priors,
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
+        doubts=tuple(str(doubt) for doubt in problems.doubts),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

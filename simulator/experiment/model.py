@@ -172,7 +172,7 @@ class Experiment:
     name of an artefact → its balls. ``target_accuracy`` and ``expected_rank_deficiency`` are None where
     nothing was stated. ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
     by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
-    may choose from.
+    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant.
     """
 
     title: str
@@ -195,6 +195,7 @@ class Experiment:
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:

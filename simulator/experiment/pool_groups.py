@@ -23,6 +23,7 @@ from ..geometry.positions import (
 from ..quantities import format_length, length_text
 from .messages import Steps
 from .model import Floats, Indices, Position, ReadingGroup, Volume
+from .placements import check_turns
 from .pool_sections import GroupSettings, LengthsByAxisSettings, ProbesByPlaneSettings, RangeSettings, form_of_balls
 from .problems import written
 from .references import References, lengths_per_axis
@@ -237,7 +238,12 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
     balls = _balls(settings, layout, (*steps, "balls"), references) if layout is not None else ()
     if artefact is None or layout is None or len(references.problems.messages) > before:
         return None
+    is_list = isinstance(settings.quarter_turns, tuple)
     turns = settings.quarter_turns if isinstance(settings.quarter_turns, tuple) else (settings.quarter_turns,)
+    for k, turn in enumerate(turns):
+        check_turns(turn, (*steps, "quarter_turns", *((k,) if is_list else ())), references)
+    if len(references.problems.messages) > before:
+        return None
     kept: dict[str, Any] = {"repeats": settings.repeats} if settings.repeats != 1 else {}
     if uncertainty is not None:
         node = written(references.problems.root, *steps, "standard_uncertainty")
@@ -252,7 +258,7 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
         levels,
         anchor,
         places,
-        tuple(turn % 4 for turn in turns),
+        turns,
         probes,
         balls,
         settings.repeats,
