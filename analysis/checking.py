@@ -57,11 +57,15 @@ class Wanted:
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """What came of a file: its designs, each variant one of its own, or the reasons why it cannot be used."""
+    """What came of a file: its designs, each variant one of its own, or the reasons why it cannot be used.
+
+    `doubts` are about what is possible, and unlikely to be meant.
+    """
 
     file: str
     designs: tuple[CheckedDesign, ...]
     messages: tuple[Message, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def as_expected(self) -> bool:
@@ -85,7 +89,9 @@ def check_files(
             chosen = [one for one in experiments if not variants or one.name in variants]
             # What a plan may choose from is loaded where it is asked for only.
             pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
-            yield CheckedFile(str(path), tuple(_checked(one, pools.get(one.name), wanted) for one in chosen), ())
+            doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
+            judged = tuple(_checked(one, pools.get(one.name), wanted) for one in chosen)
+            yield CheckedFile(str(path), judged, (), doubts)
         except ExperimentError as error:
             complete = False
             yield CheckedFile(str(path), (), error.messages)

@@ -61,14 +61,21 @@ class Worth:
     tasks: tuple[TaskUncertainty, ...]
 
 
+ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "ball"]
+
+
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined."""
+    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined.
+
+    `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a standard's length, a ball.
+    """
 
     name: str
     value: float
     standard_uncertainty: float
     unit: Unit
+    kind: ParameterKind = "machine"
 
 
 @dataclass(frozen=True)
@@ -278,9 +285,9 @@ def _estimates(
 ) -> tuple[ParameterEstimate, ...]:
     found: list[ParameterEstimate] = []
 
-    def add(name: str, value: float, uncertainty: float, unit: Unit) -> None:
+    def add(kind: ParameterKind, name: str, value: float, uncertainty: float, unit: Unit) -> None:
         known = not np.isnan(uncertainty)
-        found.append(ParameterEstimate(name, float(value) if known else np.nan, float(sigma * uncertainty), unit))
+        found.append(ParameterEstimate(name, float(value) if known else np.nan, float(sigma * uncertainty), unit, kind))
 
     state = solution.state
     own = np.eye(len(layout))
@@ -290,7 +297,7 @@ def _estimates(
         matrix, names, units = reported.matrix @ matrix, list(reported.names), reported.units
     values = (reported.matrix if monomials else np.eye(len(state.a))) @ state.a
     for k, uncertainty in enumerate(spread.of_shared(matrix)):
-        add(names[k], values[k], uncertainty, units[k] if units else design.model.parameters[k].unit)
+        add("machine", names[k], values[k], uncertainty, units[k] if units else design.model.parameters[k].unit)
 
     of_poses = spread.of_shared(own[layout.poses])
     turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
@@ -299,21 +306,23 @@ def _estimates(
     for k in design.posed_positions:
         for j, column in enumerate(layout.pose_columns[k]):
             if column >= 0:
-                unit: Unit = "m" if j < design.dimension else "rad"
-                add(f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
+                kind: ParameterKind = "origin" if j < design.dimension else "rotation"
+                unit: Unit = "m" if kind == "origin" else "rad"
+                add(kind, f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
 
     of_offsets = spread.of_shared(own[layout.offsets])
     for probe, axis in np.argwhere(layout.offset_columns >= 0):
         column = layout.offset_columns[probe, axis]
         value = probe_offsets(design, state)[probe, axis]
-        add(layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
+        add("offset", layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
 
     of_lengths = spread.of_shared(own[layout.lengths])
     for name, value, uncertainty in zip(design.length_names, unknown_lengths(design, state), of_lengths, strict=True):
-        add(name, value, uncertainty, "m")
+        add("length", name, value, uncertainty, "m")
 
     of_balls = spread.of_balls()
     for ball in design.plate_balls:
         for axis, letter in enumerate(("x", "y", "z")[: design.dimension]):
-            add(f"{design.ball_label(ball)}: {letter}", state.balls[ball, axis], of_balls[ball, axis], "m")
+            name = f"{design.ball_label(ball)}: {letter}"
+            add("ball", name, state.balls[ball, axis], of_balls[ball, axis], "m")
     return tuple(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -289,10 +290,7 @@ def fit_lines(fit: Fit) -> list[str]:
     lines += ["", *uncertainty_table(fit.quantities), ""]
     lines += [*task_table(fit.tasks), ""] if fit.tasks else []
     rows = [["parameter", "value", "standard uncertainty", "unit"]]
-    machine_and_poses = [
-        e for e in fit.estimates if ": origin" not in e.name and not e.name.endswith((": x", ": y", ": z"))
-    ]
-    for estimate in machine_and_poses:
+    for estimate in (one for one in fit.estimates if one.kind not in ("origin", "ball")):
         rows.append(
             [
                 estimate.name,
@@ -411,16 +409,22 @@ def fit_data(fit: Fit) -> dict[str, Any]:
             for one in fit.largest
         ],
         **suspected,
-        "estimates": {
-            e.name: {
-                "value": finite(e.value),
-                "standard_uncertainty": finite(e.standard_uncertainty),
-                "unit": e.unit,
-            }
-            for e in fit.estimates
-        },
+        "estimates": _estimates_data(fit),
         **({"plates": {plate.artefact: plate_data(plate) for plate in fit.plates}} if fit.plates else {}),
         **({"adjustments": adjustment_data(fit.adjustments)} if fit.adjustments else {}),
+    }
+
+
+def _estimates_data(fit: Fit) -> dict[str, Any]:
+    """Estimates by name; by kind and name where a model gives a parameter the name that another kind has."""
+    times = Counter(one.name for one in fit.estimates)
+    return {
+        one.name if times[one.name] == 1 else f"{one.kind}: {one.name}": {
+            "value": finite(one.value),
+            "standard_uncertainty": finite(one.standard_uncertainty),
+            "unit": one.unit,
+        }
+        for one in fit.estimates
     }
 
 

@@ -14,6 +14,9 @@ from .experiment.yamltree import Mark
 from .machines.protocol import Array
 from .quantities import format_length
 
+# Fraction of the volume by which readings are outside where artefacts are not set up just as drawn.
+SLIGHTLY = 1e-3
+
 
 def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
     """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they are said to be of.
@@ -40,6 +43,29 @@ def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
 def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
     """Sentences about standards whose lengths are all off by a factor that machines hardly have."""
     return tuple(_of_length(design, one) for one in doubtful_lengths(design, x))
+
+
+def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
+    """A sentence about readings outside the volume, where error models are extrapolated, or none.
+
+    By less than a thousandth of the volume a reading is outside if an artefact was not set up just as drawn.
+    """
+    beyond = np.maximum(design.lower - x, x - design.upper)
+    far = np.flatnonzero((beyond > SLIGHTLY * (design.upper - design.lower)).any(axis=1))
+    if not len(far):
+        return ()
+    i = int(far[beyond[far].max(axis=1).argmax()])
+    axis = int(beyond[i].argmax())
+    how = "below" if x[i, axis] < design.lower[axis] else "above"
+    readings = design.readings
+    where = f" (line {marks[i].line})" if marks else ""
+    count = "1 reading is" if len(far) == 1 else f"{len(far)} readings are"
+    return (
+        f"{count} outside the measuring volume, and the error model is extrapolated there; furthest is ball "
+        f"{design.ball_label(int(readings.ball[i]))} in position {design.position_names[readings.position[i]]} "
+        f"with probe {design.probe_names[readings.probe[i]]}, at {'xyz'[axis]} = {_shown(float(x[i, axis]))}, "
+        f"{_shown(float(beyond[i, axis]))} {how} it{where}; correct machine.volume, or the readings",
+    )
 
 
 def _of_length(design: Design, one: LengthRatio) -> str:

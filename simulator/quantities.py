@@ -278,6 +278,15 @@ def format_length(length: float) -> str:
     return f"{length / float(LENGTH_UNITS[unit]) + 0.0:.9g} {unit}"
 
 
+def format_angle(angle: float) -> str:
+    """Write an angle in radians in microradians.
+
+    >>> format_angle(2e-6)
+    '2 urad'
+    """
+    return f"{1e6 * angle + 0.0:.9g} urad"
+
+
 @dataclass(frozen=True)
 class LengthFunction:
     """An uncertainty that grows with length: ``constant`` (m) + ``slope`` (m/m) × length."""

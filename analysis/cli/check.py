@@ -79,6 +79,8 @@ def run(options: Namespace) -> int:
     files = []
     for checked in check_files(options.files, options.variant, Wanted(goals, options.fail_weak, options.suggest)):
         files.append(checked)
+        for doubt in checked.doubts:
+            print(f"warning: {doubt}", file=sys.stderr)
         if options.format == "github":
             for line in annotation_lines(checked, workspace):
                 print(line, flush=True)

@@ -7,9 +7,10 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -122,6 +123,38 @@ def write(path: Path, text: str, force: bool = False) -> None:
     print(f"{path} written", file=sys.stderr)
 
 
+def write_all(writers: Mapping[Path, Callable[[TextIO], None]], force: bool = False) -> None:
+    """Let each writer write its text file, all of them or none; the file named - is standard output, written last.
+
+    :raises ExperimentError: without `force` there is one already, or one cannot be written.
+    """
+    from simulator.experiment.messages import ExperimentError, Message
+
+    files = [path for path in writers if str(path) != "-"]
+    made = []
+    try:
+        with ExitStack() as opened:
+            streams = []
+            for path in files:
+                is_new = not path.exists()
+                # Files that are there are emptied only when all can be written.
+                stream = opened.enter_context(path.open("a" if force else "x", encoding="utf-8", newline=""))
+                made += [path] if is_new else []
+                streams.append(stream)
+            for path, stream in zip(files, streams, strict=True):
+                if path.is_file():
+                    stream.truncate(0)
+                writers[path](stream)
+    except OSError as error:
+        for one in made:
+            one.unlink(missing_ok=True)
+        told = f"cannot be written ({error.strerror}); name another file"
+        text = EXISTS if isinstance(error, FileExistsError) else told
+        raise ExperimentError([Message(str(path), 0, 0, "", text)]) from None
+    for path in writers.keys() - files:
+        writers[path](sys.stdout)
+
+
 def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
     """Experiments of all files, every variant one of its own, less those not chosen; with pools for `planning`.
 
@@ -140,12 +173,14 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
             messages += error.messages
     if messages:
         raise ExperimentError(messages)
-    if not options.variant:
-        return found
-    unknown = unknown_variants(options.files, options.variant, {experiment.name for experiment in found})
-    if unknown:
-        raise ExperimentError(unknown)
-    return [experiment for experiment in found if experiment.name in options.variant]
+    if options.variant:
+        unknown = unknown_variants(options.files, options.variant, {experiment.name for experiment in found})
+        if unknown:
+            raise ExperimentError(unknown)
+        found = [experiment for experiment in found if experiment.name in options.variant]
+    for doubt in dict.fromkeys(doubt for experiment in found for doubt in experiment.doubts):
+        print(f"warning: {doubt}", file=sys.stderr)
+    return found
 
 
 def single(options: Namespace, planning: bool = False) -> Experiment:

@@ -29,6 +29,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_file(parser)
     parser.add_argument("readings", metavar="READINGS", type=Path, help="readings (CSV)")
     parser.add_argument(
+        "--certificate",
+        metavar="CSV",
+        type=Path,
+        help="values of certificates, priors and probe offsets in place of the experiment file's, as simulate "
+        "--certificate writes them",
+    )
+    parser.add_argument(
         "--sigma",
         choices=("estimated", "given"),
         help="scale the uncertainties by the residuals, or take them as stated; default: what the file says",
@@ -70,8 +77,9 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
+    from simulator.certificates import read_certificate
     from simulator.layout import lay_out
-    from simulator.misreading_messages import doubts_about_lengths
+    from simulator.misreading_messages import doubts_about_lengths, doubts_about_volume
     from simulator.readings import read_readings
     from simulator.settings import listing
 
@@ -95,6 +103,8 @@ def run(options: Namespace) -> int:
         print(f"ballplate fit: {told}", file=sys.stderr)
         return 2
     experiment = single(options)
+    if options.certificate:
+        experiment = read_certificate(options.certificate, experiment)
     if options.plot and (experiment.dimension != 2 or options.estimator not in ("full", "reversal")):
         text = "--plot draws residuals of readings in two dimensions, by the full estimator or reversal; leave it out"
         print(f"ballplate fit: {text}", file=sys.stderr)
@@ -103,7 +113,8 @@ def run(options: Namespace) -> int:
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
         if names:
             print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
-    for doubt in doubts_about_lengths(observed.design, observed.x):
+    doubts = doubts_about_lengths(observed.design, observed.x)
+    for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
         print(f"warning: {doubt}", file=sys.stderr)
     if options.estimator != "full":
         return _run_other(options, experiment, observed)

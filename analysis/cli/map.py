@@ -102,10 +102,14 @@ def run(options: Namespace) -> int:
     import numpy as np
 
     from simulator.experiment.machine_file import load_machine
+    from simulator.experiment.messages import Message
 
     from ..volumetric import Volumetric, along_axes
 
-    machine = load_machine(options.file)
+    doubts: list[Message] = []
+    machine = load_machine(options.file, doubts)
+    for doubt in doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
     if options.plot is not None and options.plot.resolve() == options.file.resolve():
         print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
         return WRONG_USAGE

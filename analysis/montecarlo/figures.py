@@ -35,8 +35,9 @@ class Comparison:
 
     `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of the errors, over
     `count` members, a `sampled` selection of all pairs. `spread` is the ratio of the errors' scatter to the linearised
-    uncertainty, root mean square over the members, `actual` that of the errors themselves, what noise-free readings
-    leave included; `bias` the mean error, likewise a root mean square in standard uncertainties, and `largest_bias` the
+    uncertainty, root mean square over the members. `actual` is the root mean square of the errors themselves, what
+    noise-free readings leave included, over that of the linearised uncertainties (of members in the same unit);
+    `bias` the mean error, a root mean square in standard uncertainties like `spread`, and `largest_bias` the
     largest, in the member's unit. `known` and `estimated` are the shares of true values within the expanded
     uncertainty for 95 %, with sigma given and with sigma estimated by each replicate. `flags` names the figures that
     linear theory gets wrong.

@@ -88,7 +88,7 @@ def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
     lines += [
         "",
         ("Too optimistic? " if too_optimistic else "") + "The fitted model cannot follow the true machine exactly.",
-        f"actual errors are, in units of those predicted: {', '.join(ratios)}"
+        f"actual errors are, as root mean squares, in units of those predicted: {', '.join(ratios)}"
         + ("" if too_optimistic else f"; none is above 1 by more than {BEYOND:g} standard errors"),
         f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2 alone shows the misfit in "
         f"{100 * done.optimism.power:.3g} % of experiments",

@@ -48,8 +48,9 @@ def factors(freedom: int) -> Factors:
 class QuantityTally:
     """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (5,) numbers and their squares.
 
-    The five: mean square of the errors' scatter, and of the errors, in standard uncertainties, and the difference of
-    the two; share of errors within the expanded uncertainty with sigma known, and with sigma estimated from the
+    The five: mean square of the errors' scatter in standard uncertainties; mean square of the errors over that of the
+    uncertainties; how much larger than the first the errors' mean square in standard uncertainties is; share of errors
+    within the expanded uncertainty with sigma known, and with sigma estimated from the
     replicate's residuals.
     """
 
@@ -92,6 +93,18 @@ class Tally:
         )
 
 
+def _against_typical(errors: Array, aim: Target) -> Array:
+    """Mean square of errors (b, q) over the mean square uncertainty of those in the same unit, (b,).
+
+    Errors in units of their own uncertainties would be ruled by the few that have almost none.
+    """
+    typical = np.empty_like(aim.uncertainty)
+    units = np.array(aim.units)
+    for unit in np.unique(units):
+        typical[units == unit] = (aim.uncertainty[units == unit] ** 2).mean()
+    return np.asarray((errors**2 / typical).mean(axis=1))
+
+
 def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: int) -> Tally:
     """Sums over the first `count` replicates of a batch."""
     limits = factors(shared.degrees_of_freedom)
@@ -110,7 +123,7 @@ def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: 
         numbers = np.stack(
             [
                 of_scatter,
-                of_error,
+                _against_typical(change + aim.base, aim),
                 of_error - of_scatter,
                 (size <= limits.known).mean(axis=1),
                 (size <= limits.estimated * sigma[:, None]).mean(axis=1),

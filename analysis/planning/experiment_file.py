@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from simulator.experiment.messages import ExperimentError, in_one_line
+from simulator.experiment.messages import ExperimentError, format_path, in_one_line
 from simulator.experiment.model import Experiment, Position
 from simulator.experiment.pool import Candidate
 from simulator.experiment.problems import Problems
@@ -111,9 +111,9 @@ def _content(tree: MappingNode, experiment: Experiment, chosen: Sequence[Candida
     said["positions"] = [to_list(one.settings) for one in positions]
     said["calibration"] = items
     if "priors" in said:
-        said["priors"] = [
-            one for one in said["priors"] if not any(str(one["parameter"]).startswith(f"{name}: ") for name in others)
-        ]
+        gone = {one.path for one in experiment.priors if one.position in others}
+        paths = [format_path(("priors", i, "parameter")) for i in range(len(said["priors"]))]
+        said["priors"] = [one for one, path in zip(said["priors"], paths, strict=True) if path not in gone]
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
     order = sorted(said, key=known.index) if {"positions", "calibration"} - set(tree.items) else list(said)

@@ -10,13 +10,13 @@ from simulator.estimation.parameters import AXIS_NAMES
 from .patterns import Patterns
 
 
-def name(given: Patterns, k: int) -> str:
-    """What a pattern is about."""
+def name(given: Patterns, k: int, with_position: bool = True) -> str:
+    """What a pattern is about; a reading's may be without its position."""
     kind, subject = given.kind[k], int(given.subject[k])
     design, axis = given.design, int(given.axis[k])
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
     if kind in ("reading", "end"):
-        return f"{reading_name(design, subject)}, {letter}"
+        return f"{reading_name(design, subject, with_position)}, {letter}"
     if kind == "length":
         return f"{length_name(design, subject)} in position {design.position_names[_position(design, subject)]}"
     if kind == "prior":
@@ -52,12 +52,12 @@ def slip_place(given: Patterns, k: int) -> str:
     return f"half-way, before ball {design.ball_label(int(design.readings.ball[start]))}"
 
 
-def reading_name(design: Design, reading: int) -> str:
+def reading_name(design: Design, reading: int, with_position: bool = True) -> str:
     """A reading by ball and position, and by its probe where there are several."""
     readings = design.readings
-    position = design.position_names[readings.position[reading]]
+    position = f" in position {design.position_names[readings.position[reading]]}" if with_position else ""
     probe = f" with {design.probe_names[readings.probe[reading]]}" if len(design.probe_names) > 1 else ""
-    return f"ball {design.ball_label(int(readings.ball[reading]))} in position {position}{probe}"
+    return f"ball {design.ball_label(int(readings.ball[reading]))}{position}{probe}"
 
 
 def length_name(design: Design, length: int, of_reading: bool = True) -> str:

@@ -91,21 +91,14 @@ def _positions(result: Reliability) -> list[str]:
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
                 _shown(result.detectable[by_bias], "m"),
-                _short(result, int(by_bias)),
+                name(given, int(by_bias), with_position=False),
                 u if known else "-",
-                _short(result, int(by_effect)) if known else "",
+                name(given, int(by_effect), with_position=False) if known else "",
             ]
         )
     if len(rows) == 1:
         return ["no readings of plates"]
     return aligned(rows, [False, True, True, True, True, False, True, False])
-
-
-def _short(result: Reliability, k: int) -> str:
-    """A reading's name without its position."""
-    head, _, tail = name(result.patterns, k).partition(" in position ")
-    design, reading = result.design, int(result.patterns.subject[k])
-    return head + tail.removeprefix(design.position_names[design.readings.position[reading]])
 
 
 def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundancy: bool) -> list[str]:

@@ -66,7 +66,7 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
     """
     reported = design.model.reported()
     names, matrix = list(reported.names), reported.matrix.copy()
-    dropped = ~matrix.any(axis=1)
+    dropped = np.asarray(~matrix.any(axis=1))
     if isinstance(design.model, KinematicModel):
         functions = [name.partition(" ")[0] for name in names]
         for function in dict.fromkeys(functions):

@@ -17,7 +17,7 @@ from simulator.machines.settings import PythonSettings
 from simulator.settings import Settings
 
 # What says nothing about the result: names, and where things stand.
-LEFT_OUT = ("title", "description", "source", "mark", "path", "_folder")
+LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "_folder")
 
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)

@@ -56,13 +56,14 @@ def _radius(settings: RadiusSettings, artefact: str, steps: Steps, references: R
         references.problems.add((*steps, "kind"), text)
         return None
     value = gauge.radius if settings.value is None else settings.value
-    text = f"{_far_from_drawing(value, gauge.radius)}; correct the one or the other"
+    text = f"{far_from_drawing(value, gauge.radius)}; correct the one or the other"
     if not references.require(abs(value - gauge.radius) <= FAR_FROM_DRAWING * gauge.radius, (*steps, "value"), text):
         return None
     return RadiusCalibration(artefact, value, settings.standard_uncertainty)
 
 
-def _far_from_drawing(certified: float, drawn: float) -> str:
+def far_from_drawing(certified: float, drawn: float) -> str:
+    """Say that a certified length is not that of the drawing."""
     return f"{1e3 * certified:.6g} mm is far from the {1e3 * drawn:.6g} mm of the artefact's drawing"
 
 
@@ -197,7 +198,7 @@ def _certified_distances(
     for names, distance, mark, place in entries:
         expected = drawn.get(frozenset(names))
         if expected is not None and distance > 0 and not abs(distance - expected) <= FAR_FROM_DRAWING * expected:
-            text = f"{_far_from_drawing(distance, expected)}; correct the one or the other"
+            text = f"{far_from_drawing(distance, expected)}; correct the one or the other"
             problems.add_at(mark, place, text)
     if missing and len(problems.messages) == before:
         problems.add(steps, f"no distance for {listing(missing)}; add it, or leave it out of pairs")

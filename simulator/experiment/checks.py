@@ -12,7 +12,7 @@ from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.positions import ball_coordinates
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.description import MachineDescription
+from ..machines.description import MachineDescription, random_part
 from ..machines.settings import MachineFileSettings, MetricSettings, PythonSettings, build_error_model, dimension_of
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
@@ -20,7 +20,7 @@ from ..quantities import format_length
 from ..settings import listing
 from .curves import read_curves
 from .machine_file import load_machine
-from .messages import ExperimentError, Steps
+from .messages import ExperimentError, Message, Steps
 from .model import Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
 from .problems import Problems, written_text
 from .references import References
@@ -81,9 +81,11 @@ def _check_model(settings: Any, steps: Steps, machine: Machine | None, reference
     return True
 
 
-def _machine_of_file(file: str, steps: Steps, references: References) -> MachineDescription | None:
+def _machine_of_file(
+    file: str, steps: Steps, references: References, doubts: list[Message] | None = None
+) -> MachineDescription | None:
     try:
-        return load_machine(references.folder / file)
+        return load_machine(references.folder / file, doubts)
     except ExperimentError as error:
         references.problems.take(error, (*steps, "file"))
         return None
@@ -95,10 +97,17 @@ def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | Non
     if references.dimension == 2:
         text = 'kind "machine" has 3 dimensions, but machine.volume has 2; change one of the two'
         references.problems.add(("true_machine", "kind"), text)
-    found = _machine_of_file(truth.file, ("true_machine",), references)
+    found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
         return
     truth.of(found)
+    random = random_part(found)
+    if random and truth.random_part is None:
+        text = (
+            f"has a random part that simulated readings would lack: {listing(random)}; let machine.repeatability cover "
+            "it and add random_part: omitted, or leave it out of the machine file"
+        )
+        references.problems.add(steps, text)
     if machine is None or machine.dimension != 3:
         return
     for axis, name in enumerate(AXES):
@@ -191,23 +200,38 @@ def check_names(position_count: int, problems: Problems) -> None:
         first.setdefault(name, i)
 
 
-def check_inside(position: Position, steps: Steps, volume: Volume, references: References) -> None:
-    """Report balls that are read outside the measuring volume."""
+def check_inside(
+    position: Position, steps: Steps, volume: Volume, offsets: Mapping[str, Floats], references: References
+) -> None:
+    """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those of the probes.
+
+    Error models are functions of the scale readings, where the ball is less the probe's offset. Balls may be outside.
+    """
     layout = references.layouts[position.artefact]
-    read = read_balls([position])
-    coordinates = ball_coordinates(position.pose, layout)[read]
-    by_how_much, axes, sides = excess(coordinates, volume)
+    rows = [
+        (group.ball_indices, probe, offsets[probe])
+        for group in position.readings
+        for probe in group.probes
+        if probe in offsets and offsets[probe].shape == volume.lower.shape
+    ]
+    if not rows:
+        return
+    places = ball_coordinates(position.pose, layout)
+    balls = np.concatenate([indices for indices, _, _ in rows])
+    by_how_much, axes, sides = excess(np.concatenate([places[one] - offset for one, _, offset in rows]), volume)
     outside = np.flatnonzero(by_how_much > TOLERANCE)
     if len(outside) == 0:
         return
-    worst = int(outside[np.argmax(by_how_much[outside])])
-    axis = int(axes[worst])
-    others = f", and {len(outside) - 1} more balls" if len(outside) > 1 else ""
-    others = others[:-1] if len(outside) == 2 else others
+    # The first of those furthest outside, whatever rounding makes of equal ones.
+    worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
+    axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
+    offset, place = float(offsets[probe][axis]), float(places[balls[worst], axis])
+    others = f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}" if len(outside) > 1 else ""
+    less = f" (the ball at {format_length(place)} less the offset of {format_length(offset)})" if offset else ""
     text = (
-        f'ball "{layout.names[read[worst]]}" is at {AXES[axis]} = {format_length(coordinates[worst, axis])}, '
-        f"{format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others}; "
-        "move the artefact, or read fewer balls"
+        f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" puts the scales at {AXES[axis]} = '
+        f"{format_length(place - offset)}{less}, {format_length(by_how_much[worst])} {sides[worst]} the measuring "
+        f"volume{others}; move the artefact, or read it otherwise"
     )
     references.problems.add(steps, text)
 

@@ -119,8 +119,8 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         if position is not None:
             positions[i] = position
             if machine is not None and machine.dimension == references.dimension:
-                check_inside(position, ("positions", i), machine.volume, references)
-    candidates = resolve_candidates(sections, positions, machine, references)
+                check_inside(position, ("positions", i), machine.volume, probes, references)
+    candidates = resolve_candidates(sections, positions, machine, probes, references)
     possible = candidates.positions if candidates.complete else None
     check_use(sections, positions, position_count, references, possible, planning)
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
@@ -163,6 +163,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         priors=priors,
         offset_uncertainties=offset_uncertainties,
         pool=pool if planning else None,
+        doubts=tuple(str(doubt) for doubt in problems.doubts),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

@@ -20,6 +20,9 @@ from .tables import read_table
 
 AXES = ("x", "y", "z")
 
+# A repeatability (m) that is rather a slip of the unit.
+LARGE_REPEATABILITY = 1e-4
+
 
 def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | None:
     """Return the machine, or None after saying what is wrong."""
@@ -53,6 +56,13 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
         is_right = False
     if not is_right:
         return None
+    largest = max(by_axis.values())
+    if largest >= LARGE_REPEATABILITY:
+        text = (
+            f"{format_length(largest)} is far more than the readings of a co-ordinate measuring machine scatter; "
+            f"write {format_length(largest / 1000)} if that is meant"
+        )
+        problems.doubt(steps, text)
     lower_corner, upper_corner = zip(*ends.values(), strict=True)
     return Machine(Volume(frozen(lower_corner), frozen(upper_corner)), frozen(list(by_axis.values())))
 

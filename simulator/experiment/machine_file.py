@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..machines.arrangement import ARRANGEMENTS, AXES, Arrangement
@@ -23,19 +24,24 @@ from ..machines.description import (
     Three,
 )
 from ..machines.volumetric import DROOP, SQUARENESS
-from ..quantities import format_length
+from ..quantities import format_angle, format_length
 from ..settings import describe, listing
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings
-from .messages import ExperimentError, Steps
+from .messages import ExperimentError, Message, Steps
 from .problems import Problems
 from .sections import VolumeSettings
 from .wording import explain
 from .yamltree import Mapping, Scalar, read_tree, to_python, walk
 
+# Part of a polynomial's coefficients that is rounding.
+NOTHING = 1e-12
 
-def load_machine(path: str | os.PathLike[str]) -> MachineDescription:
+
+def load_machine(path: str | os.PathLike[str], doubts: list[Message] | None = None) -> MachineDescription:
     """Load a machine file. Tables that it names are read from the folder it is in.
+
+    What counts for nothing in it, and was hardly stated for that, is added to `doubts`.
 
     :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
     """
@@ -54,6 +60,9 @@ def load_machine(path: str | os.PathLike[str]) -> MachineDescription:
                 problems.add(steps, "empty; give a value, or leave it out")
         found = _machine(root, source, problems)
         if found is not None and not refused:
+            if doubts is not None:
+                _doubt_what_is_taken_off(found, problems)
+                doubts += problems.doubts
             return found
     made_up = {(one.file, one.line, one.column) for one in refused}
     told = [one for one in problems.messages if (one.file, one.line, one.column) not in made_up]
@@ -194,6 +203,26 @@ def _errors(
             yield replace(error, shape=table.points, criterion=table.criterion or machine.criterion)
         else:
             yield error
+
+
+def _doubt_what_is_taken_off(machine: MachineDescription, problems: Problems) -> None:
+    """Say what of stated polynomials makes no difference: a straight line through end points, and a constant."""
+    for error in machine.errors:
+        if not isinstance(error.shape, PowerSeries):
+            continue
+        steps, show = ("errors", error.name, "polynomial"), format_angle if error.is_rotation else format_length
+        t0 = float(machine.scaled(error.axis, machine.reference[error.axis]))
+        start, end, there = error.shape.values(np.array([0.0, 1.0, t0]))[:, 0].tolist()
+        if error.is_straightness and error.criterion == "end points":
+            if max(abs(start), abs(end)) > NOTHING * sum(map(abs, error.shape.coefficients)):
+                problems.doubt(
+                    steps,
+                    f"the straight line through its end points, from {show(start)} to {show(end)}, is taken off, as "
+                    "it is no straightness; let the polynomial begin and end at zero, and state a slope as squareness",
+                )
+        elif not error.is_straightness and abs(there) > NOTHING * sum(map(abs, error.shape.coefficients)):
+            text = f"{show(there)} is taken off, as errors are zero at the reference point; correct the constant"
+            problems.doubt(steps, text)
 
 
 def _table(

@@ -16,6 +16,7 @@ from ..quantities import LengthFunction, Target
 from .yamltree import Mark
 
 if TYPE_CHECKING:
+    from ..machines.protocol import Unit
     from .pool import Pool
 
 Floats = NDArray[np.float64]
@@ -126,7 +127,7 @@ class Prior:
 
     ``position`` and ``component``: a pose parameter, by its place among origin and rotation. ``probe`` and
     ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of the error model's
-    parameters. ``mark`` and ``path``: where it is stated.
+    parameters. ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
     """
 
     name: str
@@ -138,6 +139,7 @@ class Prior:
     standard_uncertainty: float
     mark: Mark
     path: str = ""
+    unit: Unit = "m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +173,7 @@ class Experiment:
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are meant for.
     ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
     by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
-    may choose from.
+    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant.
     """
 
     title: str
@@ -195,6 +197,7 @@ class Experiment:
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
     pool: Pool | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:

@@ -116,9 +116,20 @@ def _placement(
         return None
     anchor: Literal["corner", "centre"] = "centre" if settings.corner is None else "corner"
     at = _in_plane(getattr(settings, anchor), plane, (*steps, anchor), references)
+    turns = settings.quarter_turns or 0
+    is_right &= check_turns(turns, (*steps, "quarter_turns"), references)
     if at is None or not is_right:
         return None
-    return PlanePlacement(plane, settings.level or 0.0, anchor, at, settings.quarter_turns or 0)
+    return PlanePlacement(plane, settings.level or 0.0, anchor, at, turns)
+
+
+def check_turns(turns: int, steps: Steps, references: References) -> bool:
+    """Report a number of quarter-turns that may be meant as an angle."""
+    if turns % 90:
+        meant = f"write 0 to 3, such as {turns % 4}, which turns as far"
+    else:
+        meant = f"write {turns // 90 % 4} for {turns} deg"
+    return references.require(0 <= turns <= 3, steps, f"{turns} is no number of turns by 90 deg from 0 to 3; {meant}")
 
 
 def _in_plane(point: Any, plane: Axis, steps: Steps, references: References) -> tuple[float, float] | None:

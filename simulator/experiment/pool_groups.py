@@ -23,6 +23,7 @@ from ..geometry.positions import (
 from ..quantities import format_length, length_text
 from .messages import Steps
 from .model import Floats, Indices, Position, ReadingGroup, Volume
+from .placements import check_turns
 from .pool_sections import GroupSettings, LengthsByAxisSettings, ProbesByPlaneSettings, RangeSettings, form_of_balls
 from .problems import written
 from .references import References, lengths_per_axis
@@ -36,9 +37,15 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Where balls may be: the volume, the lower and upper ends (2, d) by probe, and what a plate needs around it."""
+    """Where artefacts may be.
+
+    The scale readings of balls, which are where they are less the probe's offset of `offsets` (d,), have to be in
+    `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by probe. `edge` is what a plate needs
+    around it.
+    """
 
     volume: Volume
+    offsets: Mapping[str, Floats]
     reach: Mapping[str, Floats]
     edge: float | None
 
@@ -146,14 +153,15 @@ def _reasons(
         shifts[:, AXIS_INDEX[plane]] = [level for level, _ in both]
     read = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
     found = np.full(len(shifts), "", dtype=object)
-    found[~is_within(read, bounds.volume.lower, bounds.volume.upper)] = "outside the volume"
     if bounds.edge is not None and references.artefacts[group.artefact].role == "plate":
         around = outline(at_zero, group.layout, bounds.edge) + shifts[:, None, :]
         beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
-        found[(found == "") & beyond] = "edge outside the volume"
+        found[beyond] = "edge outside the volume"
     by_probes = {}
     for probes in group.probes[plane]:
         one = found.copy()
+        for offset in (bounds.offsets[probe] for probe in probes if probe in bounds.offsets):
+            one[~is_within(read - offset, bounds.volume.lower, bounds.volume.upper)] = "outside the volume"
         for probe in probes:
             if probe in bounds.reach:
                 one[(one == "") & ~is_within(read, *bounds.reach[probe])] = f"out of reach of probe {probe}"
@@ -230,7 +238,12 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
     balls = _balls(settings, layout, (*steps, "balls"), references) if layout is not None else ()
     if artefact is None or layout is None or len(references.problems.messages) > before:
         return None
+    is_list = isinstance(settings.quarter_turns, tuple)
     turns = settings.quarter_turns if isinstance(settings.quarter_turns, tuple) else (settings.quarter_turns,)
+    for k, turn in enumerate(turns):
+        check_turns(turn, (*steps, "quarter_turns", *((k,) if is_list else ())), references)
+    if len(references.problems.messages) > before:
+        return None
     kept: dict[str, Any] = {"repeats": settings.repeats} if settings.repeats != 1 else {}
     if uncertainty is not None:
         node = written(references.problems.root, *steps, "standard_uncertainty")
@@ -245,7 +258,7 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
         levels,
         anchor,
         places,
-        tuple(turn % 4 for turn in turns),
+        turns,
         probes,
         balls,
         settings.repeats,

@@ -18,6 +18,7 @@ from .position_sections import (
     LengthPerAxis,
     PositionSettings,
     ProbeNames,
+    QuarterTurns,
     RadiusSettings,
     Text,
 )
@@ -136,9 +137,9 @@ GroupBalls = Annotated[
     Discriminator(form_of_balls),
 ]
 Turns = Annotated[
-    Annotated[int, Tag("<one>")]
-    | Annotated[Annotated[tuple[int, ...], Field(min_length=1, max_length=1000)], Tag("<list>")]
-    | Annotated[int, Tag("<mapping>")],
+    Annotated[QuarterTurns, Tag("<one>")]
+    | Annotated[Annotated[tuple[QuarterTurns, ...], Field(min_length=1, max_length=1000)], Tag("<list>")]
+    | Annotated[QuarterTurns, Tag("<mapping>")],
     FORM,
 ]
 
@@ -162,7 +163,7 @@ class GroupSettings(Settings):
     centres: LengthsByAxisSettings | None = Field(
         None, description="centres of the bounding rectangle along each axis, instead of corners"
     )
-    quarter_turns: Turns = Field(0, description="one number of turns by 90 degrees, or a list; default 0")
+    quarter_turns: Turns = Field(0, description="one number of turns by 90 degrees, 0 to 3, or a list; default 0")
     probes: GroupProbes | None = Field(
         None,
         description="names of probes, or a list of such sets to choose from, [[right, left], [right]]; either for all "

@@ -77,9 +77,16 @@ class Candidates:
 
 
 def resolve_candidates(
-    sections: Sections, positions: AnyMapping[int, Position], machine: Machine | None, references: References
+    sections: Sections,
+    positions: AnyMapping[int, Position],
+    machine: Machine | None,
+    offsets: AnyMapping[str, Floats],
+    references: References,
 ) -> Candidates:
-    """Return the positions to choose from, none without a pool; what is wrong goes to the problems."""
+    """Return the positions to choose from, none without a pool; what is wrong goes to the problems.
+
+    ``offsets`` (d,) are those of the probes.
+    """
     problems = references.problems
     root, result = problems.root, Candidates()
     node = written(root, "pool")
@@ -97,7 +104,7 @@ def resolve_candidates(
     reach = _reach(limits, references)
     bounds = None
     if machine is not None and machine.dimension == references.dimension:
-        bounds = Bounds(machine.volume, reach, limits.edge)
+        bounds = Bounds(machine.volume, offsets, reach, limits.edge)
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
@@ -123,7 +130,7 @@ def resolve_candidates(
                 continue
             if bounds is not None:
                 before = len(problems.messages)
-                check_inside(listed, steps, bounds.volume, references)
+                check_inside(listed, steps, bounds.volume, offsets, references)
                 if len(problems.messages) == before:
                     _check_bounds(listed, steps, bounds, references)
             stated = to_python(written(root, *steps))  # type: ignore[arg-type]

@@ -35,6 +35,10 @@ PairSelection = Annotated[
 ]
 
 
+# Those beyond are refused when the position is placed, with what is meant.
+QuarterTurns = Annotated[int, Field(json_schema_extra={"minimum": 0, "maximum": 3})]
+
+
 class AxisLengthsSettings(Settings):
     """A length above zero per axis."""
 
@@ -105,8 +109,8 @@ class PositionSettings(Settings):
     level: Length | None = Field(None, description="co-ordinate of the plane along that axis; omitted in 2-D")
     corner: InPlaneSettings | None = Field(None, description="lower corner of the turned bounding rectangle")
     centre: InPlaneSettings | None = Field(None, description="centre of the bounding rectangle, instead of corner")
-    quarter_turns: int | None = Field(
-        None, description="turns by 90 degrees, counter-clockwise seen against the plane's normal; default 0"
+    quarter_turns: QuarterTurns | None = Field(
+        None, description="0 to 3 turns by 90 degrees, counter-clockwise seen against the plane's normal; default 0"
     )
     pose: PoseSettings | None = Field(None, description="free pose, instead of plane, level and corner")
     probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")

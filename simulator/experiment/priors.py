@@ -105,5 +105,6 @@ def _prior(
         if len(values) == 2:
             if values[1] <= 0.0:
                 problems.add((*steps, "standard_uncertainty"), "must be above zero; correct it, or remove the prior")
-            found.append(Prior(full, position, probe, component, np.array(row), values[0], values[1], mark, place))
+            by_model = np.array(row)
+            found.append(Prior(full, position, probe, component, by_model, values[0], values[1], mark, place, unit))
     return found

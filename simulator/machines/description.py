@@ -163,6 +163,23 @@ class MachineDescription:
         return self.upper[axis] - self.lower[axis]
 
 
+def random_part(machine: MachineDescription) -> tuple[str, ...]:
+    """What of a machine is random, in words: bandwidths, uncertain temperatures, and probing."""
+
+    def is_random(deviation: float | Points | None) -> bool:
+        return any(deviation.values) if isinstance(deviation, Points) else bool(deviation)
+
+    stated: list[tuple[str, float | Points | None]] = [(one.name, one.deviation) for one in machine.errors]
+    stated += [(one.name, one.deviation) for one in machine.squareness]
+    bandwidths = [name for name, deviation in stated if is_random(deviation)]
+    uncertain = [axis for axis, one in machine.temperature.items() if one.uncertainty and one.expansion]
+    return (
+        *(f"bandwidth of {name}" for name in bandwidths),
+        *(f"uncertain temperature of {axis}" for axis in uncertain),
+        *(["probing"] if machine.probing else []),
+    )
+
+
 def coupling(machine: MachineDescription, error: ParametricError) -> Array:
     """What the three rotations of an error's axis add to it on its line of measurement, (3,) in metres per radian.
 

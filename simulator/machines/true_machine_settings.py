@@ -93,6 +93,11 @@ class TrueMachineFileSettings(Settings):
 
     kind: Literal["machine"] = Field(description="the machine that a file describes")
     file: str = Field(description="Machine file (YAML), as for ballplate map.")
+    random_part: Literal["omitted"] | None = Field(
+        default=None,
+        description='"omitted": simulated readings are to be without the random part of the file, which '
+        "machine.repeatability covers. A file that has one is refused otherwise.",
+    )
 
     # What the file says; filled in when the experiment is loaded.
     _machine: MachineDescription | None = PrivateAttr(default=None)

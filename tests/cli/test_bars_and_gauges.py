@@ -317,8 +317,8 @@ priors:
         "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give one of that range",
         "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible",
         "14:57: artefacts.zone.directions: the least elevation must be below the largest; exchange or correct them",
-        '18:5: positions[0]: ball "2" is at y = 900 mm, 100 mm above the measuring volume, and 1 more ball; move the '
-        "artefact, or read fewer balls",
+        '18:5: positions[0]: reading ball "2" with probe "magnet" puts the scales at y = 900 mm, 100 mm above the '
+        "measuring volume, and 1 more reading; move the artefact, or read it otherwise",
         '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind: radius',
         '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is none; use kind: distances',
         "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing; correct the one or the "

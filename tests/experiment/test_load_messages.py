@@ -246,11 +246,12 @@ POSITIONS = [
         '11:117: positions[0].readings[0].balls[0]: unknown ball "r1c7"; did you mean "r1c3"?',
     ]),
     (LOW, LOW.replace("x: 0 mm", "x: 600 mm"), [
-        '11:5: positions[0]: ball "r1c3" is at x = 1100 mm, 100 mm above the measuring volume, '
-        "and 2 more balls; move the artefact, or read fewer balls"]),
-    (LOW, LOW.replace("level: 0 mm", "level: -2 nm"), [
-        '11:5: positions[0]: ball "r1c1" is at z = -2 nm, 2 nm below the measuring volume, '
-        "and 8 more balls; move the artefact, or read fewer balls"]),
+        '11:5: positions[0]: reading ball "r1c3" with probe "down" puts the scales at x = 1100 mm, 100 mm above the '
+        "measuring volume, and 2 more readings; move the artefact, or read it otherwise"]),
+    (LOW, LOW.replace("level: 0 mm", "level: -50.000002 mm"), [
+        '11:5: positions[0]: reading ball "r1c1" with probe "down" puts the scales at z = -2 nm (the ball at '
+        "-50.000002 mm less the offset of -50 mm), 2 nm below the measuring volume, and 8 more readings; move the "
+        "artefact, or read it otherwise"]),
     ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
         '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',
         '12:16: positions[1].artefact: unknown artefact "baar"; did you mean "bar"?',

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.volumetric import Volumetric
 from simulator.experiment import ExperimentError, load
 from simulator.experiment.machine_file import load_machine
 from simulator.machines.curves import Points
-from simulator.machines.description import AxisTemperature, PowerSeries, Squareness
+from simulator.machines.description import AxisTemperature, PowerSeries, Squareness, random_part
 
 MACHINE = """\
 title: moving horizontal arm
@@ -257,7 +258,7 @@ EXPERIMENT = """\
 title: a machine file
 machine: {volume: {x: [0 mm, 1 m], y: [0 mm, 1 m], z: [0 mm, 1 m]}, repeatability: 1 um}
 error_model: {kind: machine, file: m.yaml}
-true_machine: {kind: machine, file: m.yaml}
+true_machine: {kind: machine, file: m.yaml, random_part: omitted}
 probes: {down: [0 mm, 0 mm, -50 mm]}
 artefacts: {plate: {kind: grid, balls: [3, 3], size: [600 mm, 600 mm]}}
 positions: [{name: low, plane: z, level: 100 mm, corner: {x: 100 mm, y: 100 mm}}]
@@ -277,6 +278,30 @@ def test_an_experiment_with_a_machine_file(tmp_path: Path) -> None:
     assert again.true_machine.machine().a.tolist() == found.true_machine.machine().a.tolist()
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "random"),
+    [
+        ("errors:", "errors:\n  EZX: {bandwidth: 1 um}", ("bandwidth of EZX",)),
+        ("errors:", "squareness: {EC0Y: {value: 1 urad, bandwidth: 1 urad}}\nerrors:", ("bandwidth of EC0Y",)),
+        ("errors:", "probing: 1 um\nerrors:", ("probing",)),
+        (
+            "errors:",
+            "temperature: {y: {deviation: 0 degC, expansion: 11 um/m/degC, standard_uncertainty: 0.1 degC}}\nerrors:",
+            ("uncertain temperature of y",),
+        ),
+        ("errors:", "errors:\n  EYX: {polynomial: [0 um, 0 um, 1 um]}", ()),
+    ],
+)
+def test_every_random_part_is_told(tmp_path: Path, old: str, new: str, random: tuple[str, ...]) -> None:
+    """Whatever adds to the deviation at some point is named, and nothing is where there is none."""
+    bare = "title: m\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors:\n  EXX: {polynomial: [0 um, 1 um]}\n"
+    (tmp_path / "m.yaml").write_text(bare.replace(old, new))
+    machine = load_machine(tmp_path / "m.yaml")
+    assert random_part(machine) == random
+    deviation = Volumetric(machine).errors(np.array([[0.3, 0.6, 0.7]])).deviation
+    assert bool(deviation.any()) == bool(random)
+
+
 def test_mistakes_of_a_machine_file_are_told_with_the_experiment(tmp_path: Path) -> None:
     written(tmp_path, MACHINE.replace("12 um", "12 urad").replace("probing: 1", "probing: 1 nm #"))
     with pytest.raises(ExperimentError) as caught:
@@ -289,7 +314,8 @@ def test_mistakes_of_a_machine_file_are_told_with_the_experiment(tmp_path: Path)
     ("old", "new", "message"),
     [
         ("x: [0 mm, 1 m]", "x: [0 mm, 3 m]", "e.yaml:4:37: true_machine.file: its volume goes from -100 mm to 1800 mm"),
-        ("m.yaml}\nprobes", "n.yaml}\nprobes", "e.yaml:4:37: true_machine.file:"),
+        ("m.yaml, random", "n.yaml, random", "e.yaml:4:37: true_machine.file:"),
+        (", random_part: omitted", "", "e.yaml:4:37: true_machine.file: has a random part"),
         ("m.yaml}\ntrue", "n.yaml}\ntrue", "e.yaml:3:36: error_model.file:"),
     ],
 )

@@ -23,7 +23,7 @@ GOOD = """\
 title: good
 machine: {volume: [1 m, 1 m, 1 m], repeatability: 1 um}
 error_model: {kind: kinematic}
-probes: {down: [0 mm, 0 mm, -50 mm], right: [50 mm, 0 mm, 0 mm]}
+probes: {down: [0 mm, 0 mm, -50 mm], right: [-50 mm, 0 mm, 0 mm]}
 artefacts:
   plate: {kind: grid, balls: [3, 3], size: [500 mm, 400 mm]}
   bar: {kind: two_spheres, length: 300 mm, role: length_standard}
@@ -227,6 +227,48 @@ def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
     assert pool.dropped["edge outside the volume"] == 4 + 2 * 2
 
 
+def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path: Path) -> None:
+    """By the positions of a file, one by one: a candidate is left just where the same position is accepted."""
+    levels = [0.0, 0.04, 0.06, 0.5, 0.94, 0.96, 1.0]
+    listed = ", ".join(length_text(one) for one in levels)
+    text = replaced("right: [-50 mm, 0 mm, 0 mm]", "right: [50 mm, 0 mm, 0 mm]")
+    text = replaced("levels: [0 mm, 600 mm]", f"levels: [{listed}]", text)
+    text = replaced(
+        "      probes: {z: [[down]], x: [right]}\n", "      probes: {z: [down], x: [[right], [right, down]]}\n", text
+    )
+    text = replaced("    reach: {right: {x: [0 mm, 1 m]}}\n", "", text)
+    found = {
+        (one.plane, one.settings["level"], tuple(one.settings["probes"]), str(one.settings["corner"]))
+        for one in pool_of(tmp_path, text).candidates
+        if one.group == "some"
+    }
+    expected = set()
+    for plane, probes in (("z", ["down"]), ("x", ["right"]), ("x", ["right", "down"])):
+        for level in levels:
+            for first, second in ((0.0, 0.0), (0.0, 0.4)) if plane == "z" else ((0.0, 0.1), (0.4, 0.1)):
+                axes = "xy" if plane == "z" else "yz"
+                corner = {axis: length_text(at) for axis, at in zip(axes, (first, second), strict=True)}
+                drawn = f"{{name: low, artefact: plate, plane: {plane}, level: {length_text(level)}, "
+                drawn += f"corner: {{{axes[0]}: {length_text(first)}, {axes[1]}: {length_text(second)}}}, "
+                drawn += f"probes: [{', '.join(probes)}]}}"
+                alone = text[: text.index("pool:")]
+                start = alone.index("{name: low")
+                alone = alone[:start] + drawn + alone[alone.index("\n", start) :]
+                path = tmp_path / "alone.yaml"
+                path.write_text(
+                    "\n".join(line for line in alone.splitlines() if "kind: bryan" not in line and "two_s" not in line)
+                )
+                try:
+                    load(path)
+                except ExperimentError as error:
+                    assert "puts the scales at" in str(error)
+                else:
+                    expected.add((plane, length_text(level), tuple(probes), str(corner)))
+    drawn_already = ("z", "0 mm", ("down",), str({"x": "0 mm", "y": "0 mm"}))
+    assert found == expected - {drawn_already}
+    assert 0 < len(expected) < 6 * len(levels)
+
+
 @given(st.floats(-1e4, 1e4, allow_subnormal=False).filter(lambda one: one == 0 or abs(one) > 1e-17))
 def test_lengths_are_written_exactly(length: float) -> None:
     assert parse_length(length_text(length)) == length
@@ -322,8 +364,8 @@ MISTAKES = [
         '21:39: pool.candidates[0].probes.x[1]: probe "right" is listed twice; remove one of the two']),
     (f"      {SOME_PROBES}\n", "", ["16:7: pool.candidates[0].probes: missing; add \"probes\", some of: down, right"]),
     ("origin: [100 mm, 100 mm, 100 mm]", "origin: [800 mm, 100 mm, 100 mm]", [
-        '22:7: pool.candidates[1]: ball "2" is at x = 1100 mm, 100 mm above the measuring volume; move the artefact, '
-        "or read fewer balls"]),
+        '22:7: pool.candidates[1]: reading ball "2" with probe "down" puts the scales at x = 1100 mm, 100 mm above '
+        "the measuring volume; move the artefact, or read it otherwise"]),
     ("name: bar, art", "name: low, art", [
         '22:14: pool.candidates[1].name: "low" is the name of positions[0] already; names must differ']),
     ("name: dear", "name: bar", [
@@ -372,6 +414,6 @@ def test_a_pool_that_is_empty(tmp_path: Path) -> None:
 
 def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
     text = replaced("balls: [3, 3]", "balls: [200, 200]")
-    text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 1 m, count: 40}", text)
+    text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 0.9 m, count: 40}", text)
     (line,) = messages(tmp_path, text)
     assert line.startswith("16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most")

@@ -180,6 +180,17 @@ def test_beside_its_source_sections_keep_their_text(source: Path) -> None:
     assert [prior.position for prior in found.priors] == ["more z 500 mm at 100, 100 mm"]
 
 
+def test_a_prior_of_the_machine_stays_though_its_name_begins_as_a_position_left_out_does(source: Path) -> None:
+    (module,) = source.parent.glob("own_scale_model_*.py")
+    module.write_text(MODEL.replace('Parameter("scale"', 'Parameter("two: strain"'))
+    known = 'priors:\n  - {parameter: "two: strain", standard_uncertainty: 1 ppm}\n'
+    source.write_text(source.read_text("utf-8").replace("priors:\n", known, 1), "utf-8")
+    experiment = planned(source, "as is")
+    chosen = by_name(experiment, "more z 500 mm at 100, 100 mm", "one")
+    found = written(experiment, chosen, source.parent / "chosen.yaml")
+    assert [prior.name for prior in found.priors] == ["two: strain", "more z 500 mm at 100, 100 mm: origin x"]
+
+
 def test_elsewhere_files_are_found_again(source: Path, tmp_path: Path) -> None:
     experiment = planned(source, "lower")
     chosen = by_name(experiment, "two", "one", "on", "more z 450 mm at 100, 100 mm")

@@ -188,7 +188,7 @@ def small(**changed: Any) -> dict[str, Any]:
                 "probes": [probe],
             }
             for plane, (probe, axes) in across.items()
-            for where, level, corner, turns in (("low", "100 mm", "20 mm", 0), ("high", "500 mm", "150 mm", 1))
+            for where, level, corner, turns in (("low", "100 mm", "60 mm", 0), ("high", "500 mm", "150 mm", 1))
         ],
         "calibration": [{"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}],
         "evaluation": {"points": {"random": 60, "seed": 1}, "probe": "down"},

@@ -166,6 +166,18 @@ def test_multiple_redundancy_without_scale() -> None:
     assert np.sqrt(found.solution.factor.sum_of_squares / 12) == pytest.approx(57.5, abs=0.05)
 
 
+def test_no_degrees_of_freedom_explain_reeves_sigma_of_the_real_readings() -> None:
+    """Table 2 prints 17.0: 20 of 22 degrees of freedom, counted as for the made-up readings, make it 16.8."""
+    found = fitted("real", "without scale")
+    freedom = found.design.observations - found.design.parameter_count
+    assert freedom == 22 and {e.name: 1e6 * e.value for e in found.estimates}["alpha"] == pytest.approx(
+        -0.66, abs=0.005
+    )
+    by_count = {n: float(np.sqrt(found.solution.factor.sum_of_squares / n)) for n in range(freedom - 6, freedom + 1)}
+    assert {n: round(sigma, 1) for n, sigma in by_count.items() if n in (19, 20, 22)} == {19: 17.2, 20: 16.8, 22: 16.0}
+    assert min(abs(sigma - 17.0) for sigma in by_count.values()) > 0.15
+
+
 def test_multiple_redundancy_with_scale() -> None:
     found = fitted("dummy", "with scale")
     estimates = values(found)

@@ -22,7 +22,7 @@ from simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
 from simulator.geometry.positions import Pose, ball_coordinates
 from simulator.machines.protocol import Array
 
-# Balls may be this far outside the volume, as in a file.
+# Scale readings may be this far outside the volume, as in a file.
 TOLERANCE = 1e-9
 
 
@@ -86,11 +86,15 @@ def go_together(changes: Sequence[Change]) -> bool:
     return len(touched) == len(set(touched))
 
 
-def is_inside(position: Position, layout: BallLayout, volume: Volume) -> bool:
-    """Whether all balls that a position reads are in the volume."""
-    read = np.unique(np.concatenate([group.ball_indices for group in position.readings]))
-    places = ball_coordinates(position.pose, layout)[read]
-    return bool((places >= volume.lower - TOLERANCE).all() and (places <= volume.upper + TOLERANCE).all())
+def is_inside(position: Position, layout: BallLayout, volume: Volume, offsets: Mapping[str, Array]) -> bool:
+    """Whether all scale readings of a position are in the volume, as in a file, with the `offsets` (d,) of probes."""
+    places = ball_coordinates(position.pose, layout)
+    for group in position.readings:
+        for name in group.probes:
+            read = places[group.ball_indices] - offsets[name]
+            if (read < volume.lower - TOLERANCE).any() or (read > volume.upper + TOLERANCE).any():
+                return False
+    return True
 
 
 def with_position(experiment: Experiment, position: Position) -> Experiment:

@@ -50,7 +50,7 @@ def moves(experiment: Experiment) -> Iterator[Change]:
         layout = experiment.layouts[place.artefact]
         for words, pose in (*_turned(experiment, place), *_shifted(experiment, place), *_laid(experiment, place)):
             new = moved(place, *pose)
-            if is_inside(new, layout, volume):
+            if is_inside(new, layout, volume, experiment.probes):
                 told = words.format(f'position "{place.name}"')
                 apply = partial(with_pose, name=place.name, pose=new.pose)
                 yield Change(Kind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), apply)
@@ -106,7 +106,9 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
         for place in experiment.positions:
             if name in probes_of(place) or not is_plate(experiment, place.artefact) or experiment.dimension == 2:
                 continue
-            more = further(place, name)
+            more, layout = further(place, name), experiment.layouts[place.artefact]
+            if not is_inside(more, layout, experiment.machine.volume, {name: offset}):
+                continue
             cost = float(count_readings([more]))
             words = f'read position "{place.name}" with probe {name} too'
             if name in tips:

@@ -48,7 +48,7 @@ def positions(experiment: Experiment) -> Iterator[Change]:
             every = np.arange(len(layout.names))
             name = _free_name(experiment, f"more {plane or ''}".strip())
             new = Position(name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),))
-            if d == len(pose[1]) and is_inside(new, layout, volume):
+            if d == len(pose[1]) and is_inside(new, layout, volume, experiment.probes):
                 told = f"read {artefact} once more {words}"
                 if d == 3 and len(experiment.probes) > 1:
                     told += f", with {'probe' if len(names) == 1 else 'probes'} {' and '.join(names)}"

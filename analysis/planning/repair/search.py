@@ -18,7 +18,7 @@ from simulator.threads import single_threaded
 
 from ...rank import independent_mixture
 from ...study import Plan, plan
-from .changes import EFFORT, Change, Kind, apply_all, go_together
+from .changes import EFFORT, Change, Kind, apply_all, go_together, is_inside
 from .covering import covering_pairs, covering_set, different
 from .judging import Examined, Judged, examine, judge, removed, work
 from .offers import allowed, offers
@@ -242,10 +242,17 @@ class _Search:
         return [*found[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
 
     def may_be(self, changes: Sequence[Change]) -> bool:
-        """Whether changes go together, in the pool's limits."""
-        pool = self.base.experiment.pool
+        """Whether changes go together, in the pool's limits and within the volume."""
+        experiment = self.base.experiment
+        pool = experiment.pool
         chosen = tuple(one.candidate for one in changes if one.candidate >= 0)
-        return go_together(changes) and (pool is None or allowed(pool, chosen))
+        if not go_together(changes) or pool is not None and not allowed(pool, chosen):
+            return False
+        # Each alone stays inside; a further probe may not where the position is moved as well.
+        if not {Kind.MOVE, Kind.READ_MORE} <= {one.kind for one in changes}:
+            return True
+        changed, volume = apply_all(changes, experiment), experiment.machine.volume
+        return all(is_inside(one, changed.layouts[one.artefact], volume, changed.probes) for one in changed.positions)
 
     def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """A set that is built up of the change that helps most each time, less what can be left out of it."""

@@ -1,0 +1,114 @@
+"""What a file may say and hardly means is told on standard error, and changes neither results nor status."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.cli import main
+from simulator.experiment import ExperimentError, load
+from simulator.experiment.machine_file import load_machine
+from simulator.machines.description import reference_functions
+
+QUICKSTART = Path("designs/quickstart.yaml")
+
+
+@pytest.mark.parametrize(
+    ("stated", "told"),
+    [
+        ("0.4 mm", "0.4 mm is far more than the readings of a co-ordinate measuring machine scatter; write 0.4 um if"),
+        ("[0.2 um, 0.2 mm, 0.2 um]", "0.2 mm is far more"),
+        ("50 um", ""),
+        ("0.2 um", ""),
+    ],
+)
+def test_a_repeatability_of_another_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], stated: str, told: str
+) -> None:
+    text = QUICKSTART.read_text()
+    line = next(line for line in text.splitlines() if line.strip().startswith("repeatability:"))
+    path = tmp_path / "e.yaml"
+    path.write_text(text.replace(line, f"  repeatability: {stated}"))
+    assert main(["check", str(path)]) == 0
+    err = capsys.readouterr().err
+    number = text.splitlines().index(line) + 1
+    assert err.startswith(f"warning: {path}:{number}:18: machine.repeatability: {told}") if told else err == ""
+
+
+@pytest.mark.parametrize(("turns", "meant"), [(90, "1 for 90 deg"), (270, "3 for 270 deg"), (-90, "3 for -90 deg")])
+def test_quarter_turns_in_degrees_are_refused(tmp_path: Path, turns: int, meant: str) -> None:
+    path, text = tmp_path / "e.yaml", QUICKSTART.read_text()
+    assert "quarter_turns: 1" in text
+    path.write_text(text.replace("quarter_turns: 1", f"quarter_turns: {turns}"))
+    with pytest.raises(ExperimentError, match=rf"\.quarter_turns: {turns} is no number of turns .*; write {meant}"):
+        load(path)
+
+
+@pytest.mark.parametrize(("turns", "same"), [(4, 0), (-1, 3), (6, 2)])
+def test_other_numbers_of_turns_are_refused_with_the_one_that_turns_as_far(
+    tmp_path: Path, turns: int, same: int
+) -> None:
+    path, text = tmp_path / "e.yaml", Path("designs/planning/plate-pool.yaml").read_text()
+    assert "quarter_turns: [0, 1, 2, 3]" in text
+    path.write_text(text.replace("quarter_turns: [0, 1, 2, 3]", f"quarter_turns: [0, {turns}]"))
+    with pytest.raises(ExperimentError) as caught:
+        load(path, planning=True)
+    (message,) = caught.value.messages
+    assert message.path == "pool.candidates[0].quarter_turns[1]"
+    assert message.text.endswith(f"write 0 to 3, such as {same}, which turns as far")
+
+
+MACHINE = """\
+title: m
+arrangement: MB1
+volume: [1 m, 1 m, 1 m]
+{more}errors:
+  {error}
+"""
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        ("EXZ: {polynomial: [2 um, 3 um, 1 um]}", "the straight line through its end points, from 2 um to 6 um,"),
+        ("EXZ: {polynomial: [0 um, 3 um]}", "the straight line through its end points, from 0 mm to 3 um,"),
+        ("EXZ: {polynomial: [0 um, -7.1 um, 7.1 um]}", ""),
+        ("EXZ: {polynomial: [1 um, 3 um], straightness: least squares}", ""),
+        ("EXX: {polynomial: [5 um, 3 um]}", "5 um is taken off, as errors are zero at the reference point"),
+        ("EXX: {polynomial: [0 um, 3 um]}", ""),
+        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 urad is taken off"),
+        ("EXZ: {bandwidth: 1 um}", ""),
+    ],
+)
+def test_what_a_polynomial_loses_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], error: str, told: str
+) -> None:
+    """Just where the function differs from the polynomial as stated."""
+    path = tmp_path / "m.yaml"
+    path.write_text(MACHINE.format(error=error, more=""))
+    assert main(["map", str(path), "--grid", "2,2,2"]) == 0
+    err = capsys.readouterr().err
+    expected = f"warning: {path}:5:{9 + len('polynomial: ')}: errors.{error[:3]}.polynomial: {told}"
+    assert err.startswith(expected) if told else err == ""
+    machine, t = load_machine(path), np.linspace(0, 1, 7)
+    functions = reference_functions(machine)
+    if functions and "least squares" not in error:
+        (stated,) = (one.shape for one in machine.errors)
+        assert stated is not None and hasattr(stated, "coefficients")
+        as_stated = np.polynomial.polynomial.polyval(t, stated.coefficients)
+        (function,) = functions.values()
+        assert (np.abs(function.values(t)[:, 0] - as_stated).max() > 1e-9) == bool(told)
+
+
+def test_an_experiment_tells_it_of_its_true_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine = tmp_path / "m.yaml"
+    machine.write_text(MACHINE.format(error="EXZ: {polynomial: [2 um, 3 um, 1 um]}", more=""))
+    text = QUICKSTART.read_text()
+    start = text.index("true_machine:")
+    end = next(i for i in range(start + 1, len(text)) if text[i] == "\n" and text[i + 1] not in " #\n")
+    path = tmp_path / "e.yaml"
+    path.write_text(text[:start] + "true_machine: {kind: machine, file: m.yaml}" + text[end:])
+    assert main(["check", str(path)]) == 0
+    assert capsys.readouterr().err.startswith(f"warning: {machine}:5:21: errors.EXZ.polynomial: the straight line")
