@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from simulator.design import Integers
 from simulator.machines.protocol import Array
-from simulator.ties import EQUAL, first_largest, is_equal
+from simulator.rounding import comparable
 
 
 def elementary_mixture(directions: Array) -> Array:
@@ -25,7 +26,7 @@ def elementary_mixture(directions: Array) -> Array:
     own = []
     for _ in range(directions.shape[1]):
         # What is left of a parameter's row is how far the space can change it without those chosen before.
-        row = first_largest(np.sqrt((left**2).sum(axis=1)))
+        row = int(comparable((left**2).sum(axis=1)).argmax())
         unit = left[row] / np.linalg.norm(left[row])
         left = left - np.outer(left @ unit, unit)
         own.append(row)
@@ -33,7 +34,7 @@ def elementary_mixture(directions: Array) -> Array:
 
 
 def principal_directions(values: Array, root: Array, effect: Array, scale: Array) -> tuple[Array, Array]:
-    """Directions (s, r) and the lengths (r,) of their effects, in one basis where some of the singular values are equal.
+    """Directions (s, r) and the lengths (r,) of their effects, in one basis also where singular values are equal.
 
     `root` (s, r) holds right singular vectors over their `values` (r,), largest first, and `effect` (m, r) what each
     does. Those of equal values are turned until their effects are orthogonal, the largest last; of those whose effects
@@ -42,12 +43,12 @@ def principal_directions(values: Array, root: Array, effect: Array, scale: Array
     root, size = root.copy(), np.sqrt((effect**2).sum(axis=0))
     for group in _equal(values):
         if len(group) > 1:
-            squares, turned = np.linalg.eigh(effect[:, group].T @ effect[:, group])
-            size[group] = np.sqrt(np.maximum(squares, 0.0))
-            root[:, group] = root[:, group] @ turned
-            for alike in _equal(np.where(size[group] > EQUAL * size.max(), size[group], 0.0)):
-                some = [group[k] for k in alike]
-                if len(some) > 1:
+            _, own, turned = np.linalg.svd(np.linalg.qr(effect[:, group], mode="r"))
+            size[group] = np.concatenate([own, np.zeros(len(group) - len(own))])[::-1]
+            root[:, group] = root[:, group] @ turned[::-1].T
+            for alike in _equal(size[group]):
+                if len(alike) > 1:
+                    some = group[alike]
                     told = root[:, some] / scale[:, None]
                     length = np.sqrt((told**2).sum(axis=0)).mean()
                     told = told @ elementary_mixture(told)
@@ -57,12 +58,6 @@ def principal_directions(values: Array, root: Array, effect: Array, scale: Array
     return root, size
 
 
-def _equal(values: Array) -> list[list[int]]:
-    """Indices of values (r,) in groups of neighbours that are equal but for rounding."""
-    groups: list[list[int]] = []
-    for k, value in enumerate(values.tolist()):
-        if groups and is_equal(value, values[groups[-1][0]]):
-            groups[-1].append(k)
-        else:
-            groups.append([k])
-    return groups
+def _equal(values: Array) -> list[Integers]:
+    """Indices of sorted values (r,) in groups of those that are equal but for rounding."""
+    return np.split(np.arange(len(values)), np.flatnonzero(np.diff(comparable(values))) + 1)

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simulator.design import Design, Integers
+from simulator.design import Design
 from simulator.estimation.covariance import Covariance, Spectrum
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array, HasLines
 from simulator.quantities import LengthFunction
-from simulator.ties import above, first_largest, largest_first, without_rounding
+from simulator.rounding import above, comparable, printable
 
 from .bar_directions import reasons
 from .canonical import elementary_mixture, principal_directions
@@ -240,7 +240,7 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
         first = told.lengths[0].change
     else:
         every = np.concatenate([shared / layout.scale, balls.ravel()])
-        first = float(every[first_largest(np.abs(every))])
+        first = float(every[comparable(np.abs(every)).argmax()])
     return told if first >= 0.0 else _told(design, layout, -shared, -balls)
 
 
@@ -289,7 +289,7 @@ def _single_axis(vector: Array, word: str) -> str:
     """The axis that a vector lies along, if it lies along one."""
     if len(vector) == 1 or not vector.any():
         return ""
-    axis = first_largest(np.abs(vector))
+    axis = int(comparable(np.abs(vector)).argmax())
     return f"{word}{'xyz'[axis]}" if abs(vector[axis]) > 0.999 * np.linalg.norm(vector) else ""
 
 
@@ -308,13 +308,13 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
             t = np.linspace(0.0, 1.0, 201)
             lines = model.lines(name, t)
             values = np.stack([line.basis @ a[members] for line in lines])
-            peak = float(values.flat[first_largest(np.abs(values).ravel())])
-            k = first_largest(np.ptp(values, axis=1))
+            peak = float(values.flat[comparable(np.abs(values)).argmax()])
+            k = int(comparable(np.ptp(values, axis=1)).argmax())
             form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
             parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, form))
         else:
             parts.append((effect[members].max(), name, parameter.meaning, float(a[members[0]]), parameter.unit, ""))
-    order = largest_first(np.array([part[0] for part in parts]))
+    order = np.argsort(-comparable([part[0] for part in parts]), kind="stable")
     return tuple(FunctionPart(*parts[k][1:]) for k in order)
 
 
@@ -417,14 +417,14 @@ def length(value: float) -> str:
     >>> length(2.5e-7)
     '0.25 um'
     """
-    return f"{without_rounding(value * 1e6):.3g} um"
+    return f"{printable(value * 1e6):.3g} um"
 
 
 def angle(value: float) -> str:
     """A small angle in microradians."""
-    return f"{without_rounding(value * 1e6):.3g} urad"
+    return f"{printable(value * 1e6):.3g} urad"
 
 
 def ratio(value: float) -> str:
     """A small ratio in parts per million."""
-    return f"{without_rounding(value * 1e6):.3g} ppm"
+    return f"{printable(value * 1e6):.3g} ppm"
