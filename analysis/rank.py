@@ -354,12 +354,12 @@ def deformation(places: Array, displacement: Array) -> str:
     rest = moved - centred @ linear.T
     extent = np.ptp(places, axis=0)
     words = []
-    if float(((centred @ linear.T) ** 2).sum()) > 0.02 * total:
+    if above(((centred @ linear.T) ** 2).sum(), 0.02 * total):
         names = ("x", "y", "z")
         stretch = np.array([linear[i, i] * (extent[i] > 0) for i in range(d)])
         flat = [i for i in range(d) if extent[i] > 0]
         largest = np.abs(linear).max()
-        used = [i for i in flat if abs(stretch[i]) > 0.05 * largest]
+        used = [i for i in flat if above(abs(stretch[i]), 0.05 * largest)]
         if len(used) > 1 and np.ptp(stretch[used]) < 0.02 * largest and len(used) == len(flat):
             words.append("changes its size as a whole")
         else:
@@ -367,10 +367,12 @@ def deformation(places: Array, displacement: Array) -> str:
             shrink = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] < 0)
             if grow:
                 words.append(f"stretches along {grow}" + (f" and shrinks along {shrink}" if shrink else ""))
-        sheared = [(i, j) for i in flat for j in flat if i < j and abs(linear[i, j] + linear[j, i]) > 0.1 * largest]
+        sheared = [
+            (i, j) for i in flat for j in flat if i < j and above(abs(linear[i, j] + linear[j, i]), 0.1 * largest)
+        ]
         words += [f"shears in its {names[i]}{names[j]} plane" for i, j in sheared]
-    if float((rest**2).sum()) > 0.02 * total:
-        out_of_plane = d == 3 and extent[2] == 0 and float((rest[:, 2] ** 2).sum()) > 0.5 * float((rest**2).sum())
+    if above((rest**2).sum(), 0.02 * total):
+        out_of_plane = d == 3 and extent[2] == 0 and above((rest[:, 2] ** 2).sum(), 0.5 * float((rest**2).sum()))
         words.append("bends out of its plane" if out_of_plane else "distorts unevenly")
     return ", ".join(words) if words else "deforms"
 

@@ -21,7 +21,7 @@ SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
 
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
-LEAST_STEP = 1e-12
+LEAST_STEP = 1e-10
 
 # Balls of a plate that a table has room for.
 MOST_BALLS = 100
@@ -192,7 +192,7 @@ def plan_lines(plan: Plan) -> list[str]:
 
 def _step(step: float) -> str:
     """The length of an iteration's step, in metres and radians; a last one may be mere rounding."""
-    return f"{step:.2e}" if not step < LEAST_STEP else f"below {LEAST_STEP:.0e}"
+    return f"{step:.1e}" if not step < LEAST_STEP else f"below {LEAST_STEP:.0e}"
 
 
 def fit_lines(fit: Fit) -> list[str]:
