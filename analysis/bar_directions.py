@@ -15,6 +15,7 @@ from simulator.design import Design
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array
+from simulator.rounding import comparable
 
 from .bar_cures import MISSING, bars_to_add, listed
 
@@ -112,7 +113,7 @@ def _quadric(form: Array) -> str:
     if small.sum() == 1 and len(values) == 3:
         high, low = np.argmax(values), np.argmin(values)
         parts = [np.sqrt(values[high]) * vectors[:, high], np.sqrt(-values[low]) * vectors[:, low]]
-        planes = [_plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1])]
+        planes = sorted(_plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1]))
         return f"lies parallel to {planes[0]} or {planes[1]}"
     for i in range(len(values)):
         others = np.delete(values, i)
@@ -152,7 +153,7 @@ def _told(strains: Array, d: int, without_one: bool) -> str:
 
 
 def _axis(vector: Array) -> str:
-    k = int(np.abs(vector).argmax())
+    k = int(comparable(np.abs(vector)).argmax())
     if abs(vector[k]) > 1.0 - MISSING**2:
         return AXES[k]
     told = np.where(np.abs(vector) > MISSING, vector, 0.0)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from simulator.rounding import comparable
 from simulator.settings import listing
 from simulator.splines.constraints import Constraint
 from simulator.splines.pieces import Pieces, Powers, pieces
@@ -81,7 +82,7 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
     if curve.settings.period is not None:
         lines.append(f"periodic: ends agree in value and {space.order - 2} derivatives")
     lines += _sigma_lines(curve)
-    worst = np.argsort(-np.abs(fitted.residuals / fitted.uncertainties), kind="stable")[:3]
+    worst = np.argsort(-comparable(np.abs(fitted.residuals / fitted.uncertainties)), kind="stable")[:3]
     told = ", ".join(f"{shown(fitted.residuals[k], y, 3)} at point {points.names[k]}" for k in worst)
     lines += [f"largest residuals: {told}", "", *_piece_lines(curve, powers)]
     if len(at):
@@ -106,7 +107,7 @@ def _sigma_lines(curve: Curve) -> list[str]:
         beside = f" ({number(estimated, 3)} from the residuals)"
     places = np.linspace(fitted.space.lower, fitted.space.upper, 501)
     spread = curve.standard_uncertainty(places)
-    worst = int(np.argmax(spread))
+    worst = int(np.argmax(comparable(spread)))
     return [
         f"sigma {what}, {source}{beside}",
         f"standard uncertainty of the curve: median {shown(float(np.median(spread)), y, 3)}, largest "

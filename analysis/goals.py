@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from simulator.quantities import QuantityError, parse_positive_angle, parse_positive_length
+from simulator.rounding import comparable
 from simulator.settings import listing
 
 from .study import Plan, Worth
@@ -146,7 +147,7 @@ def _judge_tasks(plan: Plan | Worth) -> Judgement:
     if undetermined:
         words += f", {undetermined} undetermined"
         return Judgement(False, math.inf, words, undetermined)
-    worst = max(range(len(ratios)), key=ratios.__getitem__)
+    worst = int(comparable(ratios).argmax())
     words += f"; most of its target needs {plan.tasks[worst].name}, {number(100 * ratios[worst])} %"
     return Judgement(within == len(ratios), ratios[worst], words, 0)
 

@@ -10,6 +10,7 @@ import numpy as np
 from simulator.experiment.model import Experiment
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction, format_length
+from simulator.rounding import comparable
 
 from .lengths import Groups, LengthMap, Settings, length_pairs
 from .tables import aligned, finite, number, percent, uncertainty_words
@@ -89,7 +90,8 @@ SHOWN_POINTS = 3
 
 
 def _extremes(found: LengthMap) -> tuple[list[str], Groups]:
-    order = np.argsort(-np.where(np.isnan(found.by_point.maximum_ratio), np.inf, found.by_point.maximum_ratio))
+    ratio = np.where(np.isnan(found.by_point.maximum_ratio), np.inf, found.by_point.maximum_ratio)
+    order = np.argsort(-comparable(ratio), kind="stable")
     chosen = order if len(order) <= 2 * SHOWN_POINTS else np.concatenate([order[:SHOWN_POINTS], order[-SHOWN_POINTS:]])
     names = [_place(found.points[i]).removesuffix(" mm") for i in chosen]
     return names, Groups(**{name: values[chosen] for name, values in vars(found.by_point).items()})

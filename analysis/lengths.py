@@ -16,6 +16,7 @@ from simulator.experiment.model import Experiment
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction
+from simulator.rounding import above, comparable
 from simulator.threads import single_threaded
 
 from .corrections import corrected_points, correction_rows
@@ -125,7 +126,7 @@ def length_map(experiment: Experiment, settings: Settings) -> LengthMap:
         apart = (points[tile.second] - points[tile.first]) / (design.upper - design.lower)
         by_direction.add(direction_classes(apart), values, ratio)
         whole.add(np.zeros(len(values), np.int64), values, ratio)
-        if not tile.is_open.all() and (top := int(np.nanargmax(ratio))) >= 0 and ratio[top] > largest:
+        if not tile.is_open.all() and (top := int(np.nanargmax(comparable(ratio)))) >= 0 and above(ratio[top], largest):
             worst, largest = (int(tile.first[top]), int(tile.second[top])), float(ratio[top])
         for k in np.flatnonzero(tile.is_open)[: NAMED - len(named)]:
             named.append((int(tile.first[k]), int(tile.second[k])))

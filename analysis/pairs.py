@@ -12,6 +12,7 @@ from simulator.design import Integers
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction
+from simulator.rounding import above, comparable
 
 # Places on a side of the tiles in which pairs are worked through: their products stay in cache.
 TILE = 256
@@ -32,12 +33,12 @@ class PairSummary:
     within: int = 0
 
     def __add__(self, other: PairSummary) -> PairSummary:
-        top = self if self.maximum >= other.maximum else other
+        top = other if above(other.maximum, self.maximum) else self
         return PairSummary(
             self.count + other.count,
             self.undetermined + other.undetermined,
             self.total + other.total,
-            top.maximum,
+            max(self.maximum, other.maximum),
             top.where,
             self.within + other.within,
         )
@@ -140,11 +141,11 @@ def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> 
     if not (~open_).any():
         return PairSummary(len(values), int(open_.sum()))
     determined = np.where(open_, -1.0, values)
-    top = int(determined.argmax())
+    top = int(comparable(determined).argmax())
     where = (int(labels[tile.first[top]]), int(labels[tile.second[top]]))
     within = 0 if limit is None else int((~open_ & (values <= limit.at(tile.lengths))).sum())
     return PairSummary(
-        len(values), int(open_.sum()), float(values[~open_].sum()), float(determined[top]), where, within
+        len(values), int(open_.sum()), float(values[~open_].sum()), float(determined.max()), where, within
     )
 
 

@@ -10,17 +10,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simulator.design import Design, Integers
+from simulator.design import Design
 from simulator.estimation.covariance import Covariance, Spectrum
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array, HasLines
 from simulator.quantities import Target
+from simulator.rounding import above, comparable, printable
 
 from .bar_directions import reasons
+from .canonical import elementary_mixture, principal_directions
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01
+
+# What moves points by less than this fraction of a direction's largest part is rounding.
+ROUNDING = 1e-9
 
 # A direction is weak when one standard deviation along it moves corrected points, relative to one another, by more
 # than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
@@ -147,9 +152,9 @@ def verdict(
     target: Target | None = None,
 ) -> Verdict:
     """Judge a design from its spectrum; `spread` supplies how the balls follow the undetermined directions."""
-    columns, effect = _weak_columns(design, layout, found, target)
+    weak, effect = _weak_roots(design, layout, found, target)
     limit = weak_limit(design, target)
-    open_ = np.concatenate([spread.shared_null, found.root[:, columns]], axis=1)
+    open_ = np.concatenate([spread.shared_null, weak], axis=1)
     return Verdict(
         design.parameter_count,
         design.observations,
@@ -158,7 +163,7 @@ def verdict(
         found.values,
         found.gap,
         null_directions(design, layout, spread),
-        _weak_directions(design, layout, found, columns, effect, limit),
+        _weak_directions(design, layout, weak, effect, limit),
         reasons(design, layout, open_),
     )
 
@@ -170,32 +175,20 @@ def null_directions(design: Design, layout: SharedLayout, spread: Covariance) ->
         shared, balls = spread.shared_null @ mixture, spread.ball_null @ mixture
         moved = np.abs(shared / layout.scale).max(initial=0.0)
         size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
-        # Told so that the first of the largest changes is a positive one, whatever sign the decomposition gave.
-        change = np.abs(shared / layout.scale)
-        size *= np.sign(shared[np.flatnonzero(change >= 0.99 * change.max(initial=0.0))[0]]) or 1.0
         found.append(_describe(design, layout, shared / size, balls / size))
     return tuple(found)
 
 
 def independent_mixture(spread: Covariance) -> Array:
     """Mixtures (k, k) of the null directions in which they are told: each involves as little as possible."""
-    return _echelon(spread.shared_null / spread.scale[:, None])
+    return elementary_mixture(spread.shared_null / spread.scale[:, None])
 
 
-def weak_directions(
-    design: Design, layout: SharedLayout, found: Spectrum, target: Target | None
-) -> tuple[Direction, ...]:
-    """Determined directions whose standard deviation spoils the error map, weakest first."""
-    limit = weak_limit(design, target)
-    return _weak_directions(design, layout, found, *_weak_columns(design, layout, found, target), limit)
-
-
-def _weak_columns(
-    design: Design, layout: SharedLayout, found: Spectrum, target: Target | None
-) -> tuple[Integers, Array]:
-    """Columns of the root that are weak, weakest first, and what one standard deviation along each of all adds."""
-    effect = _root_mean_square(effects_at_points(design, layout, found))
-    return np.flatnonzero(effect > weak_limit(design, target))[::-1], effect
+def _weak_roots(design: Design, layout: SharedLayout, found: Spectrum, target: Target | None) -> tuple[Array, Array]:
+    """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to corrected points."""
+    root, effect = _principal(design, layout, found)
+    columns = np.flatnonzero(above(effect, weak_limit(design, target)))[::-1]
+    return root[:, columns], effect[columns]
 
 
 def effects(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
@@ -203,25 +196,24 @@ def effects(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
 
     Relative to one another, that is, as the root mean square over the points; empty where the design has none.
     """
-    return _root_mean_square(effects_at_points(design, layout, found))
+    return _principal(design, layout, found)[1]
 
 
-def _root_mean_square(values: Array) -> Array:
-    return np.asarray(np.sqrt((values**2).mean(axis=0))) if len(values) else np.zeros(0)
-
-
-def effects_at_points(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
-    """What one standard deviation along each determined direction adds to each corrected point, (points, rank) metres.
-
-    Relative to the others, as the root mean square over the co-ordinates.
-    """
+def _principal(design: Design, layout: SharedLayout, found: Spectrum) -> tuple[Array, Array]:
+    """Determined directions (s, rank), one standard deviation long, and the effect of each on corrected points."""
     if not len(design.points) or found.rank == 0:
-        return np.zeros((0, found.rank))
+        return np.zeros((len(layout), 0)), np.zeros(0)
+    change = _changes(design, layout, found.root)
+    # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
+    effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
+    return principal_directions(found.values[: found.rank], found.root, effect, found.scale)
+
+
+def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k) metres."""
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
-    change = without_rigid_motion(design.points, jacobian @ found.root[layout.model])
-    # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
-    return np.asarray(np.sqrt(2.0 * (change**2).mean(axis=1)))
+    return without_rigid_motion(design.points, jacobian @ roots[layout.model])
 
 
 def weak_limit(design: Design, target: Target | None) -> float:
@@ -232,39 +224,42 @@ def weak_limit(design: Design, target: Target | None) -> float:
 
 
 def _weak_directions(
-    design: Design, layout: SharedLayout, found: Spectrum, columns: Integers, effect: Array, limit: float
+    design: Design, layout: SharedLayout, roots: Array, effect: Array, limit: float
 ) -> tuple[Direction, ...]:
+    if not roots.shape[1]:
+        return ()
     directions = []
-    beyond = (effects_at_points(design, layout, found) > limit).sum(axis=0) if len(columns) else np.zeros(0)
-    for column in columns:
-        root = found.root[:, column]
+    of_points = np.sqrt(2.0 * (_changes(design, layout, roots) ** 2).mean(axis=1))
+    beyond = above(of_points, limit).sum(axis=0)
+    for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
         description = _describe(design, layout, root, np.zeros_like(design.balls))
-        size = float(effect[column])
         weak = replace(description, artefacts=(), standard_deviation=size, points=len(design.points))
-        directions.append(replace(weak, beyond=int(beyond[column]), limit=limit))
+        directions.append(replace(weak, beyond=count, limit=limit))
     return tuple(directions)
 
 
-def _echelon(null: Array) -> Array:
-    """Mixtures (k, k) of null directions (s, k) that each have a pivot parameter the others do not touch."""
-    left = null.copy()
-    mixture = np.eye(null.shape[1])
-    for k in range(null.shape[1]):
-        row, column = np.unravel_index(np.abs(left[:, k:]).argmax(), left[:, k:].shape)
-        swap = [k, int(column) + k]
-        left[:, swap], mixture[:, swap] = left[:, swap[::-1]], mixture[:, swap[::-1]]
-        pivot = left[row, k]
-        left[:, k] /= pivot
-        mixture[:, k] /= pivot
-        for other in range(null.shape[1]):
-            if other != k:
-                factor = left[row, other]
-                left[:, other] -= factor * left[:, k]
-                mixture[:, other] -= factor * mixture[:, k]
-    return mixture
-
-
 def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
+    """A direction in words, with the sign that makes the first of its changes a positive one."""
+    shared, balls = _less_rounding(layout, shared, balls)
+    told = _told(design, layout, shared, balls)
+    if told.functions:
+        first = told.functions[0].peak
+    elif told.lengths:
+        first = told.lengths[0].change
+    else:
+        every = np.concatenate([shared / layout.scale, balls.ravel()])
+        first = float(every[comparable(np.abs(every)).argmax()])
+    return told if first >= 0.0 else _told(design, layout, -shared, -balls)
+
+
+def _less_rounding(layout: SharedLayout, shared: Array, balls: Array) -> tuple[Array, Array]:
+    """A direction with zeros for what is mere rounding."""
+    effect = np.abs(shared / layout.scale)
+    least = ROUNDING * max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+    return np.where(effect > least, shared, 0.0), np.where(np.abs(balls) > least, balls, 0.0)
+
+
+def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
     d = design.dimension
     functions = _function_parts(design, layout, shared)
     effect = np.abs(shared / layout.scale)
@@ -273,7 +268,7 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
     for k in design.posed_positions:
         columns = layout.pose_columns[k]
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
-        if effect[columns[columns >= 0]].max(initial=0.0) > NEGLIGIBLE * largest:
+        if above(effect[columns[columns >= 0]].max(initial=0.0), NEGLIGIBLE * largest):
             shift, turn = np.linalg.norm(values[:d]), np.linalg.norm(values[d:])
             along, about = _single_axis(values[:d], " along "), _single_axis(values[d:], " about ")
             positions.append(PositionPart(design.position_names[k], float(shift), float(turn), along, about))
@@ -281,19 +276,19 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
     for artefact in np.flatnonzero(design.is_plate):
         members = np.flatnonzero(design.ball_artefact == artefact)
         moved = np.sqrt((balls[members] ** 2).sum(axis=1))
-        if moved.max(initial=0.0) > NEGLIGIBLE * largest:
-            touched = tuple(design.ball_names[b] for b in members[moved > 0.1 * moved.max()])
+        if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
+            touched = tuple(design.ball_names[b] for b in members[above(moved, 0.1 * moved.max())])
             words = deformation(design.balls[members], balls[members])
             artefacts.append(ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched))
     probes = []
     for k, columns in enumerate(layout.offset_columns):
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
-        if np.abs(values).max() > NEGLIGIBLE * largest:
+        if above(np.abs(values).max(), NEGLIGIBLE * largest):
             probes.append(PositionPart(design.probe_names[k], float(np.linalg.norm(values)), 0.0))
     lengths = tuple(
         LengthPart(name, float(change))
         for name, change in zip(design.length_names, shared[layout.lengths], strict=True)
-        if abs(change) > NEGLIGIBLE * largest
+        if above(abs(change), NEGLIGIBLE * largest)
     )
     return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes), lengths=lengths)
 
@@ -302,7 +297,7 @@ def _single_axis(vector: Array, word: str) -> str:
     """The axis that a vector lies along, if it lies along one."""
     if len(vector) == 1 or not vector.any():
         return ""
-    axis = int(np.abs(vector).argmax())
+    axis = int(comparable(np.abs(vector)).argmax())
     return f"{word}{'xyz'[axis]}" if abs(vector[axis]) > 0.999 * np.linalg.norm(vector) else ""
 
 
@@ -314,23 +309,21 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
     model = design.model
     for name in dict.fromkeys(p.function for p in parameters):
         members = [i for i, p in enumerate(parameters) if p.function == name]
-        if effect[members].max() <= NEGLIGIBLE * largest:
+        if not above(effect[members].max(), NEGLIGIBLE * largest):
             continue
         parameter = parameters[members[0]]
         if isinstance(model, HasLines):
             t = np.linspace(0.0, 1.0, 201)
             lines = model.lines(name, t)
             values = np.stack([line.basis @ a[members] for line in lines])
-            peak = float(values.flat[np.abs(values).argmax()])
-            # The first of the lines along which it changes most, but for rounding.
-            change = np.ptp(values, axis=1)
-            k = int((change >= (1 - 1e-6) * change.max()).argmax())
+            peak = float(values.flat[comparable(np.abs(values)).argmax()])
+            k = int(comparable(np.ptp(values, axis=1)).argmax())
             form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
             parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, form))
         else:
             parts.append((effect[members].max(), name, parameter.meaning, float(a[members[0]]), parameter.unit, ""))
-    parts.sort(key=lambda part: -part[0])
-    return tuple(FunctionPart(*part[1:]) for part in parts)
+    order = np.argsort(-comparable([part[0] for part in parts]), kind="stable")
+    return tuple(FunctionPart(*parts[k][1:]) for k in order)
 
 
 def shape(t: Array, values: Array) -> str:
@@ -369,12 +362,12 @@ def deformation(places: Array, displacement: Array) -> str:
     rest = moved - centred @ linear.T
     extent = np.ptp(places, axis=0)
     words = []
-    if float(((centred @ linear.T) ** 2).sum()) > 0.02 * total:
+    if above(((centred @ linear.T) ** 2).sum(), 0.02 * total):
         names = ("x", "y", "z")
         stretch = np.array([linear[i, i] * (extent[i] > 0) for i in range(d)])
         flat = [i for i in range(d) if extent[i] > 0]
         largest = np.abs(linear).max()
-        used = [i for i in flat if abs(stretch[i]) > 0.05 * largest]
+        used = [i for i in flat if above(abs(stretch[i]), 0.05 * largest)]
         if len(used) > 1 and np.ptp(stretch[used]) < 0.02 * largest and len(used) == len(flat):
             words.append("changes its size as a whole")
         else:
@@ -382,10 +375,12 @@ def deformation(places: Array, displacement: Array) -> str:
             shrink = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] < 0)
             if grow:
                 words.append(f"stretches along {grow}" + (f" and shrinks along {shrink}" if shrink else ""))
-        sheared = [(i, j) for i in flat for j in flat if i < j and abs(linear[i, j] + linear[j, i]) > 0.1 * largest]
+        sheared = [
+            (i, j) for i in flat for j in flat if i < j and above(abs(linear[i, j] + linear[j, i]), 0.1 * largest)
+        ]
         words += [f"shears in its {names[i]}{names[j]} plane" for i, j in sheared]
-    if float((rest**2).sum()) > 0.02 * total:
-        out_of_plane = d == 3 and extent[2] == 0 and float((rest[:, 2] ** 2).sum()) > 0.5 * float((rest**2).sum())
+    if above((rest**2).sum(), 0.02 * total):
+        out_of_plane = d == 3 and extent[2] == 0 and above((rest[:, 2] ** 2).sum(), 0.5 * float((rest**2).sum()))
         words.append("bends out of its plane" if out_of_plane else "distorts unevenly")
     return ", ".join(words) if words else "deforms"
 
@@ -436,14 +431,14 @@ def length(value: float) -> str:
     >>> length(2.5e-7)
     '0.25 um'
     """
-    return f"{value * 1e6:.3g} um"
+    return f"{printable(value * 1e6):.3g} um"
 
 
 def angle(value: float) -> str:
     """A small angle in microradians."""
-    return f"{value * 1e6:.3g} urad"
+    return f"{printable(value * 1e6):.3g} urad"
 
 
 def ratio(value: float) -> str:
     """A small ratio in parts per million."""
-    return f"{value * 1e6:.3g} ppm"
+    return f"{printable(value * 1e6):.3g} ppm"

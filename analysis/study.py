@@ -20,6 +20,7 @@ from simulator.layout import lay_out
 from simulator.machines.protocol import Array, Unit
 from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.readings import ObservedReadings
+from simulator.rounding import comparable
 from simulator.threads import single_threaded
 
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
@@ -255,7 +256,7 @@ def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ..
     standardised = np.concatenate([residual.ravel(), off / uncertainty])
     value = np.concatenate([apart.ravel(), off])
     found = []
-    for place in np.argsort(-np.abs(standardised), kind="stable")[:LARGEST].tolist():
+    for place in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
         i, axis = divmod(place, design.dimension)
         k = place - residual.size
         reading = int(chosen[i] if k < 0 else design.lengths.first[k])

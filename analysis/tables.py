@@ -7,6 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from simulator.estimation.covariance import ROUNDING
+from simulator.rounding import printable
+
 from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates
 from .rank import Verdict
@@ -18,6 +21,9 @@ from .uncertainty import Quantity
 # Small lengths and angles are shown in these; the factor takes metres and radians there.
 SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
 
+
+# Steps of an iteration below this, in metres and radians, are told as rounding.
+LEAST_STEP = 1e-10
 
 # Balls of a plate that a table has room for.
 MOST_BALLS = 100
@@ -44,6 +50,7 @@ def number(value: float, digits: int = 4) -> str:
         return "inf" if value > 0 else "-inf"
     if value == 0:
         return "0"
+    value = printable(value, digits + 5)
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     magnitude = round(value, digits - 1 - math.floor(math.log10(abs(value))))
     return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
@@ -182,11 +189,10 @@ def verdict_lines(judged: Verdict, with_values: bool = False, lengths: Quantity 
     values = judged.singular_values
     if len(values) and with_values:
         rank_of = len(values) - judged.deficiency
-        text = (
-            f"singular values {values[0]:.3g} to {values[rank_of - 1]:.3g}" if rank_of else "no singular value counts"
-        )
-        if judged.deficiency:
-            text += f", then {values[rank_of]:.3g} and below (gap {judged.gap:.2g})"
+        text = "no singular value counts"
+        if rank_of:
+            largest, smallest = printable(values[0]), printable(values[rank_of - 1])
+            text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
         lines.append(text + ", in standard deviations per micrometre")
     for title, directions in (("undetermined", judged.null), ("weakly determined", judged.weak)):
         for k, direction in enumerate(directions[:20], start=1):
@@ -258,6 +264,16 @@ def scale_data(found: Scale | None) -> dict[str, Any] | None:
     }
 
 
+def _border(judged: Verdict) -> str:
+    """What singular values come after those that count; those that are rounding are told by its limit."""
+    if not judged.deficiency:
+        return ""
+    first, limit = judged.singular_values[-judged.deficiency], ROUNDING * judged.singular_values[0]
+    if first <= limit:
+        return f", then less than {printable(limit):.2g} (gap above {printable(judged.gap):.2g})"
+    return f", then {printable(first):.3g} and below (gap {printable(judged.gap):.2g})"
+
+
 def plan_lines(plan: Plan) -> list[str]:
     """A plan as lines of text: title, verdict and table."""
     lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True, lengths=plan.lengths)]
@@ -265,6 +281,11 @@ def plan_lines(plan: Plan) -> list[str]:
     lines += scale_lines(plan.scale)
     lines += ["", *uncertainty_table(plan.quantities)] if plan.quantities else []
     return lines + ["", *task_table(plan.tasks)] if plan.tasks else lines
+
+
+def _step(step: float) -> str:
+    """The length of an iteration's step, in metres and radians; a last one may be mere rounding."""
+    return f"{step:.1e}" if not step < LEAST_STEP else f"below {LEAST_STEP:.0e}"
 
 
 def fit_lines(fit: Fit) -> list[str]:
@@ -278,7 +299,7 @@ def fit_lines(fit: Fit) -> list[str]:
         summary += f" with {freedom_words(fit.degrees_of_freedom)}; sigma = {fit.sigma:.4g} times the stated "
         summary += f"uncertainties ({how})"
     rows = [["iteration", "step", "S^2"]]
-    rows += [[str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
+    rows += [[str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
     lines += [summary, "", *aligned(rows, [True, True, True])]
     if not fit.converged:
         return lines

@@ -12,6 +12,7 @@ from simulator.estimation.covariance import Covariance, blank
 from simulator.estimation.parameters import SharedLayout
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction, Target
+from simulator.rounding import comparable
 from simulator.threads import single_threaded
 
 from .corrections import corrected_points, correction_rows
@@ -165,9 +166,9 @@ def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[st
     open_ = np.isnan(values)
     if open_.all():
         return Quantity(symbol, np.nan, np.nan, unit, len(values), len(values))
-    top = int(np.nanargmax(values))
+    top = int(np.nanargmax(comparable(values)))
     return Quantity(
-        symbol, float(values[top]), float(np.nanmean(values)), unit, len(values), int(open_.sum()), names[top]
+        symbol, float(np.nanmax(values)), float(np.nanmean(values)), unit, len(values), int(open_.sum()), names[top]
     )
 
 

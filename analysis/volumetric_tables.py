@@ -12,6 +12,7 @@ from simulator.machines.curves import NAMES
 from simulator.machines.protocol import Array, Parameter
 from simulator.machines.volumetric import SQUARENESS, meaning, symbol
 from simulator.quantities import format_length
+from simulator.rounding import comparable
 from simulator.settings import hint, listing
 
 from .tables import SHOWN, aligned, number
@@ -129,7 +130,7 @@ def error_lines(found: VolumetricErrors) -> list[str]:
 
 def extreme_lines(found: VolumetricErrors) -> list[str]:
     """Ranges of the components, and the largest resultant."""
-    worst = int(found.resultant.argmax())
+    worst = int(comparable(found.resultant).argmax())
     at = ", ".join(f"{axis} = {format_length(v)}" for axis, v in zip(AXES, found.points[worst].tolist(), strict=True))
     bands = ", ".join(
         f"{axis.upper()} {number(1e6 * float(np.ptp(found.systematic[:, k])))}" for k, axis in enumerate(AXES)

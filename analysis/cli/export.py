@@ -6,6 +6,10 @@ import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..sweeps.store import Store
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -35,12 +39,20 @@ def add_store(parser: ArgumentParser) -> None:
     parser.add_argument("--sweep", metavar="N", type=int, help="which sweep of the store; default: the newest")
 
 
+def warn_of_other_methods(store: Store, sweep: int) -> None:
+    """Tell of rows that this version would compute by another method."""
+    from ..sweeps.store import of_other_methods
+
+    for text in of_other_methods(store, sweep):
+        print(f"{store.path}: {text}; run ballplate sweep again to compute them anew", file=sys.stderr)
+
+
 def run(options: Namespace) -> int:
     """Write the table."""
     from simulator.spreadsheets import cell_of_text
 
     from ..sweeps.frame import frame
-    from ..sweeps.store import StoreError, open_store
+    from ..sweeps.store import StoreError, chosen_sweep, open_store
 
     suffix = options.output.suffix.lower()
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
@@ -52,6 +64,7 @@ def run(options: Namespace) -> int:
     try:
         with closing(open_store(options.store)) as store:
             table = frame(store, options.sweep)
+            warn_of_other_methods(store, chosen_sweep(store, options.sweep))
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from contextlib import closing
 from pathlib import Path
 
-from .export import add_store
+from .export import add_store, warn_of_other_methods
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -39,7 +39,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 def run(options: Namespace) -> int:
     """Write the report."""
     from ..report.results import read_results
-    from ..sweeps.store import StoreError, open_store
+    from ..sweeps.store import StoreError, chosen_sweep, open_store
 
     output: Path | None = options.output
     if output is not None and output.resolve() == options.store.resolve():
@@ -56,6 +56,7 @@ def run(options: Namespace) -> int:
     try:
         with closing(open_store(options.store)) as store:
             results = read_results(store, options.sweep)
+            warn_of_other_methods(store, chosen_sweep(store, options.sweep))
             if form == "html":
                 from ..report.page import page
 

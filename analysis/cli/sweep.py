@@ -89,7 +89,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     from ..sweeps.bundle import changes, definition
     from ..sweeps.execute import run_sweep
     from ..sweeps.local import ChangedError
-    from ..sweeps.store import add_sweep, statuses, sweeps
+    from ..sweeps.store import add_sweep, of_other_methods, statuses, sweeps
     from .progress import ProgressBar
 
     new = definition(sweep, bundle)
@@ -104,6 +104,8 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         return BAD_FILE
     if number is None:
         number = add_sweep(store, new, bundle.files)
+    for text in of_other_methods(store, number):
+        print(f"{store.path}: {text}, and computes these cells anew", file=sys.stderr)
     bar = ProgressBar("cells")
 
     def report(summary: Summary) -> None:

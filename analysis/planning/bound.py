@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from simulator.machines.protocol import Array
+from simulator.rounding import comparable
 from simulator.threads import single_threaded
 
 from ..internal_error import InternalError
@@ -42,6 +43,8 @@ Limits = tuple[Any, Array, Array, Array]
 
 # What a selection may be below its bound by, relatively.
 ROUNDING = 1e-9
+# Binary digits of slopes in linear programmes, where of equal vertices one is taken.
+COMPARED = 36
 
 # What solvers of linear programmes leave, relatively.
 TOLERANCE = 1e-7
@@ -216,7 +219,7 @@ def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
 
     matrix, most, low, high = limits
     cost = np.zeros(matrix.shape[1])
-    cost[:count] = -slope / np.abs(slope).max()
+    cost[:count] = -comparable(slope / np.abs(slope).max(), COMPARED)
     found = linprog(cost, A_ub=matrix, b_ub=most, bounds=np.stack([low, high], axis=1), method="highs")
     if found.status != 0:
         return None
@@ -231,7 +234,7 @@ def _whole(limits: Limits, tangent: _Tangent) -> float:
     count = len(tangent.slope)
     scale = np.abs(tangent.slope).max()
     cost = np.zeros(matrix.shape[1])
-    cost[:count] = -tangent.slope / scale
+    cost[:count] = -comparable(tangent.slope / scale, COMPARED)
     found = milp(
         cost,
         integrality=np.ones(len(cost)),

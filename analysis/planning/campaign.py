@@ -11,6 +11,7 @@ import numpy as np
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment, Position
 from simulator.experiment.pool import AtMost, Candidate, Pool, with_chosen
+from simulator.rounding import comparable
 from simulator.settings import listing
 from simulator.threads import single_threaded
 
@@ -330,13 +331,13 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     relaxed, *found = in_processes(_task, tasks, workers)
     selections = [one for some in found if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
-        by_weight = np.argsort(-relaxed.weights, kind="stable").tolist()
+        by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
         selections.append(improve(problem, starts(problem, by_weight, 0, seed)[-1], Losses(problem), depth))
-    selections = sorted(set(selections), key=lambda one: (one.value, one.chosen))
+    selections = sorted(set(selections), key=lambda one: one.order)
     if not is_small:
         again = in_processes(_task, [(problem, [one.chosen], 2) for one in selections[:BEST_STARTS]], workers)
         selections += [one for some in again if isinstance(some, list) for one in some]
-    best = min(selections, key=lambda one: (one.value, one.chosen))
+    best = min(selections, key=lambda one: one.order)
     return best, relaxed if isinstance(relaxed, Bound) else None
 
 
@@ -367,7 +368,7 @@ def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tu
         for k in best.chosen
         if k not in problem.constraints.done
     ]
-    return tuple(sorted(gains, key=lambda gain: -gain.without))
+    return tuple(sorted(gains, key=lambda gain: -float(comparable(gain.without))))
 
 
 def _left_out(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
@@ -402,10 +403,11 @@ def _curve(
 def _curve_point(problem: Problem, best: Found) -> tuple[Found, float] | None:
     if not problem.constraints.allows(problem.constraints.must):
         return None
-    generous = sorted(best.chosen, key=lambda k: value(problem, set(best.chosen) - {k}), reverse=True)
+    without = comparable([value(problem, set(best.chosen) - {k}) for k in best.chosen])
+    generous = [best.chosen[k] for k in np.argsort(-without, kind="stable")]
     losses = Losses(problem)
     selections = [improve(problem, start, losses, 1) for start in starts(problem, generous, 0, 1)]
-    found = min(selections, key=lambda one: (one.value, one.chosen))
+    found = min(selections, key=lambda one: one.order)
     relaxed = bound(problem) if np.isfinite(found.value) else None
     if relaxed is not None:
         relaxed.check(f"{problem.criterion.name} for {problem.constraints.budget}", found.value)

@@ -16,6 +16,7 @@ import numpy as np
 
 from simulator.design import Integers
 from simulator.machines.protocol import Array
+from simulator.rounding import comparable
 from simulator.threads import scipy_linalg, single_threaded
 
 from .constraints import Constraints
@@ -42,6 +43,9 @@ AT_ONCE = 64
 
 # A relative gain below this is rounding.
 GAIN = 1e-9
+
+# Binary digits, of the order of that gain, in which criteria are compared: of equal selections the first is taken.
+COMPARED = 33
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,11 @@ class Found:
 
     chosen: tuple[int, ...]
     value: float
+
+    @property
+    def order(self) -> tuple[float, tuple[int, ...]]:
+        """The better, the smaller; equal ones by the order of candidates."""
+        return float(comparable(self.value, COMPARED)), self.chosen
 
 
 def full_root(information: Array) -> Array | None:
@@ -134,6 +143,7 @@ class Losses:
             found = float(_deficient(factor)) + LARGE * 2 * len(self._problem.lacking(members))
             if found == 0.0:
                 found = self._problem.criterion.value(_inverse(_counted(self._problem, factor)).T)
+            found = float(comparable(found, COMPARED))
             self._known[members] = found
         return found
 
@@ -144,7 +154,8 @@ def _deficient(factor: Array) -> Array:
     It falls with the determinant, so that what determines most directions, and those best, is chosen first.
     """
     pivots = np.diagonal(factor, axis1=-2, axis2=-1) ** 2
-    missing = -np.log(pivots).mean(axis=-1) / -np.log(RIDGE)
+    # What is undetermined is rounding beside the ridge.
+    missing = -np.log(np.where(pivots < UNDETERMINED, RIDGE, pivots)).mean(axis=-1) / -np.log(RIDGE)
     return np.where(pivots.min(axis=-1) < UNDETERMINED, LARGE * (1.0 + missing), 0.0)
 
 
@@ -164,7 +175,7 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integ
     if len(added) > SLOPED:
         spread = root @ (root[own].T @ half)
         slope = np.tensordot(matrices, spread @ spread.T, axes=2)[added]
-        added = np.sort(added[np.argsort(-slope, kind="stable")[:SLOPED]])
+        added = np.sort(added[np.argsort(-comparable(slope), kind="stable")[:SLOPED]])
     found = np.zeros(len(added))
     for start in range(0, len(added), AT_ONCE):
         some = added[start : start + AT_ONCE]
@@ -197,10 +208,10 @@ def best_addition(
         added, left = _sieve(problem, problem.information.of(members), added)
         if per_second:
             left = (left - left.max()) / seconds[added]
-        added = added[np.argsort(left, kind="stable")[:SIEVED]]
+        added = added[np.argsort(comparable(left), kind="stable")[:SIEVED]]
     after = np.array([losses.of(members | {int(k)}) for k in added])
     gain = after - losses.of(members)
-    best = int((gain / seconds[added] if per_second else gain).argmin())
+    best = int(comparable(gain / seconds[added] if per_second else gain).argmin())
     return int(added[best]), float(after[best])
 
 
@@ -253,7 +264,7 @@ def ranked_additions(problem: Problem, chosen: Collection[int]) -> list[tuple[in
     """Candidates that may be added to a selection, with the criterion that each would give, smallest first."""
     added = problem.constraints.additions(chosen)
     losses = [(int(k), value(problem, {*chosen, int(k)})) for k in added]
-    return sorted(losses, key=lambda item: (item[1], item[0]))
+    return sorted(losses, key=lambda item: (float(comparable(item[1], COMPARED)), item[0]))
 
 
 def starts(problem: Problem, ranked: Sequence[int], count: int, seed: int) -> list[frozenset[int]]:

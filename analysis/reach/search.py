@@ -13,6 +13,7 @@ from simulator.experiment.messages import ExperimentError
 from simulator.experiment.model import Experiment
 from simulator.experiment.variants import override
 from simulator.experiment.yamltree import Mapping, Node, Scalar
+from simulator.rounding import comparable
 from simulator.settings import listing
 from simulator.threads import single_threaded
 
@@ -275,7 +276,7 @@ def _scanned(trials: _Trials) -> Answer:
         remarks.append(f"the file is wrong with {listing([one.words for one in refused], 3)}: {refused[0].refusal}")
     if one.name == "size" and not any(trials.at(step).is_met for step in usable):
         # What just does may lie beside the best of them.
-        best = probes.index(min(usable, key=trials.distance))
+        best = probes.index(usable[int(comparable([trials.distance(step) for step in usable]).argmin())])
         ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
         probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
         usable = [step for step in probes if not trials.at(step).refusal]
@@ -283,7 +284,7 @@ def _scanned(trials: _Trials) -> Answer:
     if good < 0:
         if one.name == "balls":
             remarks.append(f"more than {one.words(one.last)} were not looked at")
-        best = min(usable, key=trials.distance)
+        best = usable[int(comparable([trials.distance(step) for step in usable]).argmin())]
         if trials.undetermined(best):
             told = (
                 f"something stays undetermined with every value from {one.words(usable[0])} to {one.words(usable[-1])}"

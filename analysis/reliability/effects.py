@@ -13,6 +13,7 @@ from simulator.estimation.covariance import Covariance, blank
 from simulator.estimation.parameters import SharedLayout
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array
+from simulator.rounding import comparable
 
 from ..corrections import corrected_points, correction_rows
 from .response import Response
@@ -68,8 +69,8 @@ class Functions:
             if self.own is not None:
                 moved += (self.own @ response.own[some].T).toarray()
             values = np.abs(self.operator @ moved)
-            where[some] = values.argmax(axis=0)
-            change[some] = values[where[some], np.arange(some.stop - some.start)]
+            where[some] = comparable(values, axis=0).argmax(axis=0)
+            change[some] = values.max(axis=0)
         uncertainty = self.uncertainty[where] if len(self.uncertainty) else np.full(count, np.nan)
         return Largest(change, where, uncertainty)
 

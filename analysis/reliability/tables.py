@@ -10,6 +10,7 @@ import numpy as np
 
 from simulator.design import Integers
 from simulator.estimation.parameters import AXIS_NAMES
+from simulator.rounding import comparable
 from simulator.spreadsheets import CsvWriter
 
 from ..tables import SHOWN, aligned, finite, number
@@ -81,7 +82,8 @@ def _positions(result: Reliability) -> list[str]:
     of_u6 = _effect(result, "U6")
     for k in np.unique(position):
         own = readings[position == k]
-        by_bias, by_effect = own[result.detectable[own].argmax()], own[_finite_or_zero(of_u6[own]).argmax()]
+        by_bias = own[comparable(result.detectable[own]).argmax()]
+        by_effect = own[comparable(_finite_or_zero(of_u6[own])).argmax()]
         known = bool(np.isfinite(of_u6[by_effect]))
         u = f"{number(1e6 * of_u6[by_effect], 3)} ({number(1e6 * result.effects['U6'].uncertainty[by_effect], 3)})"
         rows.append(
@@ -141,7 +143,7 @@ def _finite_or_zero(values: np.ndarray) -> np.ndarray:
 
 def _worst_first(result: Reliability, chosen: Integers) -> list[int]:
     """Patterns by their effect on U6, then on U5, those that cannot be detected but do harm first."""
-    keys = [_finite_or_zero(_effect(result, symbol)[chosen]) for symbol in ("U5", "U6")]
+    keys = [comparable(_finite_or_zero(_effect(result, symbol)[chosen])) for symbol in ("U5", "U6")]
     hidden = np.array([_is_dangerous(result, k) for k in chosen.tolist()], bool)
     return [int(chosen[i]) for i in np.lexsort((chosen, -keys[0], -keys[1], ~hidden))]
 

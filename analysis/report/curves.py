@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.rounding import comparable
 from simulator.splines.read import Points
 
 from ..curve import Curve, whole_profile
@@ -122,7 +123,7 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
         handles, labels = axes.get_legend_handles_labels()
         title = f"{points.y_column.words}, magnified {magnification:g} times"
         figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
-        worst = int(np.argmax(np.abs(points.y)))
+        worst = int(np.argmax(comparable(np.abs(points.y))))
         told = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
         largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"
         save(figure, path, f"{told}, magnified {magnification:g} times; {largest_told}")

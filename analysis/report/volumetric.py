@@ -10,6 +10,7 @@ import numpy as np
 from simulator.design import Integers
 from simulator.machines.protocol import Array
 from simulator.machines.volumetric import meaning, symbol
+from simulator.rounding import comparable
 
 from ..tables import SHOWN, number
 from ..volumetric import AlongAxis, LengthErrors, VolumetricErrors
@@ -165,7 +166,7 @@ def draw_line(found: VolumetricErrors, path: Path) -> None:
         axes.plot(positions, 1e6 * found.resultant, color=INK, linewidth=1.2, linestyle=DASHES[3], label="resultant")
         _band_in_legend(axes, bool(found.deviation.any()))
         _finish(axes, f"{name}, mm", "error, µm")
-        worst = int(found.resultant.argmax())
+        worst = int(comparable(found.resultant).argmax())
         told = f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at {positions[worst]:.6g} mm"
         save(figure, path, f"Volumetric errors {along}: {told}")
 

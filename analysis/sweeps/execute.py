@@ -8,6 +8,7 @@ from functools import reduce
 from operator import add
 
 from ..montecarlo.tally import Tally
+from .fingerprint import METHOD, method_of
 from .model import Sweep
 from .store import Store, add_keys, add_rows, block_tally, keys, statuses
 from .task import KEY_ONLY, Row, Task, blocks_of
@@ -69,9 +70,11 @@ def run_sweep(
 
     :raises StoreError: the store cannot be written.
     """
-    run = _Run(store, len(sweep.cells), keys(store, number), statuses(store))
+    known = {cell: key for cell, key in keys(store, number).items() if method_of(key) == METHOD}
+    run = _Run(store, len(sweep.cells), known, statuses(store))
     if {key for key, _ in run.found} - set(run.known.values()):
-        # What another sweep of this store has computed needs no second time.
+        # What another sweep of this store has computed needs no second time. Rows of another method give way before
+        # the first is computed anew, so that none stand beside one another.
         unknown = [Task(k, KEY_ONLY) for k in range(run.cells) if k not in run.known]
         fresh = {row.number: row.key for row in runner(unknown)}
         add_keys(store, number, fresh)

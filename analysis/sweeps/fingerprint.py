@@ -16,11 +16,40 @@ from simulator.experiment.model import Experiment
 from simulator.machines.settings import PythonSettings
 from simulator.settings import Settings
 
+# The methods that figures and verdicts have been computed by, and what each corrected of the one before. A new one
+# begins whenever any experiment comes to other figures or another verdict; its number is part of every cell's key.
+METHODS = {
+    1: "",
+    2: "lengths of standards that share a ball, priors and readings far tighter than others, and the order and number "
+    "of weakly determined directions",
+}
+METHOD = max(METHODS)
+
 # What says nothing about the result: names, and where things stand.
 LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "_folder")
 
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)
+
+
+def with_method(text: str) -> str:
+    """A cell's key: the number of the method, and a text that tells what is computed."""
+    return f"{METHOD} {text}"
+
+
+def method_of(key: str) -> int:
+    """The number of the method that a key's row was computed by; the first had none in its keys.
+
+    >>> method_of("2 0f3a"), method_of("0f3a"), method_of("invalid 0f3a")
+    (2, 1, 1)
+    """
+    number, space, _ = key.partition(" ")
+    return int(number) if space and number.isdigit() else 1
+
+
+def without_method(key: str) -> str:
+    """What a key tells of what is computed, by whatever method."""
+    return key.partition(" ")[2] if key.partition(" ")[0].isdigit() and " " in key else key
 
 
 class _Digest(Protocol):

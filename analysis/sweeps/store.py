@@ -1,13 +1,15 @@
 """The store of a sweep: one SQLite file, written by one process, that survives whatever happens to it.
 
 Every row is on disk before it is reported. The key of a result is the fingerprint of what was computed, and the
-replicate block; so a cell that was computed once is never computed again, whichever sweep file asks for it.
+replicate block; so a cell that was computed once is never computed again, whichever sweep file asks for it, unless a
+later version computes by another method.
 """
 
 from __future__ import annotations
 
 import json
 import sqlite3
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +22,7 @@ from simulator.design import Integers
 from simulator.machines.protocol import Array
 
 from ..montecarlo.tally import QuantityTally, Tally
+from .fingerprint import METHOD, METHODS, method_of
 from .task import Row
 
 FORMAT = "ballplate sweep store 1"
@@ -184,6 +187,27 @@ def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
 def keys(store: Store, sweep: int) -> dict[int, str]:
     """Keys of the cells that are known, by number."""
     return dict(store.connection.execute("SELECT number, key FROM cell WHERE sweep = ?", [sweep]).fetchall())
+
+
+def methods(store: Store, sweep: int) -> dict[int, int]:
+    """How many of a sweep's cells have a result by each method, by its number."""
+    rows = store.connection.execute(
+        "SELECT cell.key FROM cell JOIN result ON result.key = cell.key AND block = 0 WHERE sweep = ?", [sweep]
+    )
+    return dict(sorted(Counter(method_of(key) for (key,) in rows).items()))
+
+
+def of_other_methods(store: Store, sweep: int) -> list[str]:
+    """Words for rows that this version would compute by another method; none where there are none."""
+    found = []
+    for method, count in methods(store, sweep).items():
+        if method == METHOD:
+            continue
+        since = [text for number, text in METHODS.items() if method < number <= METHOD and text]
+        why = f"before corrections to {'; '.join(since)}" if since else "of a later version"
+        rows = f"{count} row{' was' if count == 1 else 's were'} computed by method {method}"
+        found.append(f"{rows}, {why}; this version computes by method {METHOD}")
+    return found
 
 
 def statuses(store: Store) -> dict[tuple[str, int], str]:

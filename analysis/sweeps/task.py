@@ -22,7 +22,7 @@ from ..montecarlo.study import Trials, block_of_trials, combined, trials
 from ..montecarlo.tally import Tally
 from ..study import Plan, plan
 from .columns import symbol_column, unit_suffix
-from .fingerprint import fingerprint
+from .fingerprint import fingerprint, with_method, without_method
 from .load import experiment_of
 from .model import Sweep
 
@@ -51,8 +51,9 @@ class Task:
 class Row:
     """What came of a task. `figures` by name, in SI units with the unit in the name; `details` are texts.
 
-    `key` is the fingerprint of the cell, or a hash of its choices where these make no valid experiment. A failed row
-    has its `reason`. `seconds` is the time that it took, `tally` the sums of a replicate block.
+    `key` is the number of the method and the fingerprint of the cell, or a hash of its choices where these make no
+    valid experiment. A failed row has its `reason`. `seconds` is the time that it took, `tally` the sums of a replicate
+    block.
     """
 
     number: int
@@ -132,18 +133,20 @@ def lost(sweep: Sweep, task: Task) -> Row:
 def key_of(sweep: Sweep, experiment: Experiment) -> str:
     """Key of a cell: of its experiment, what is recorded, and the data sets if there are any."""
     trials = None if sweep.trials is None else (sweep.trials, sweep.seed)
-    return fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code)
+    return with_method(fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code))
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:
     """Key of a cell that makes no valid experiment: of its choices, and of the files."""
     text = f"{sweep.label(number)}\n{sweep.digest}"
-    return "invalid " + hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+    digest = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+    return with_method(f"invalid {digest}")
 
 
 def seed_of(sweep: Sweep, key: str) -> int:
-    """Seed of a cell's data sets: of the sweep's seed and of what is computed, not of the cell's place."""
-    return int.from_bytes(hashlib.blake2b(f"{sweep.seed} {key}".encode(), digest_size=6).digest(), "big")
+    """Seed of a cell's data sets: of the sweep's seed and of what is computed, not of its place, nor of the method."""
+    text = f"{sweep.seed} {without_method(key)}"
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
 
 def plan_figures(planned: Plan, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:

@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 
 from analysis.cli import main
@@ -63,6 +64,64 @@ def test_a_second_run_computes_nothing(
     capsys.readouterr()
     assert sweep(path) == 1
     assert capsys.readouterr().out == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
+
+
+def made_by_the_first_method(path: Path) -> None:
+    """Make of a store one of the first method, whose keys are the fingerprints alone; its figures are 17."""
+    connection = sqlite3.connect(path, isolation_level=None)
+    for table in ("cell", "result"):
+        assert connection.execute(f"UPDATE {table} SET key = substr(key, instr(key, ' ') + 1)").rowcount
+    for key, figures in connection.execute("SELECT key, figures FROM result").fetchall():
+        wrong = np.full(len(figures) // 8, 17.0, "<f8").tobytes()
+        connection.execute("UPDATE result SET figures = ? WHERE key = ?", [wrong, key])
+    connection.close()
+
+
+def test_rows_of_an_earlier_method_are_computed_anew_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, store = small_sweep(tmp_path, 2, "trials: 50\n"), tmp_path / "small.sqlite"
+    assert sweep(path) == 1
+    right = rows(store)
+    made_by_the_first_method(store)
+    capsys.readouterr()
+
+    # Still to be read, with a warning.
+    assert main(["export", str(store), "-o", str(tmp_path / "old.csv")]) == 0
+    told = "4 rows were computed by method 1, before corrections to lengths of standards"
+    assert told in capsys.readouterr().err
+    old = pandas.read_csv(tmp_path / "old.csv")
+    assert (old["U6_average_m"].dropna() == 17.0).all() and len(old) == 4
+
+    assert sweep(path) == 1
+    captured = capsys.readouterr()
+    assert told in captured.err and "this version computes by method 2, and computes these cells anew" in captured.err
+    assert captured.out == f"{store}: 4 cells, 2 done, 2 failed\n"
+    # With the same seeds, so that only what was corrected differs.
+    assert_same(rows(store), right)
+
+    assert main(["export", str(store), "-o", str(tmp_path / "new.csv")]) == 0
+    assert sweep(path) == 1
+    assert "method" not in capsys.readouterr().err
+
+
+def test_an_interrupted_run_leaves_no_rows_of_two_methods(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, store = small_sweep(tmp_path, 2), tmp_path / "small.sqlite"
+    sweep(path)
+    right = rows(store)
+    made_by_the_first_method(store)
+
+    def second_fails(loaded: Sweep, task: Task) -> Row:
+        if task.block == 0 and task.number == 1:
+            raise KeyboardInterrupt
+        return compute(loaded, task)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("analysis.sweeps.local.compute", second_fails)
+        assert sweep(path) == 130
+    assert_same(rows(store), right[:1].reset_index(drop=True))
+    sweep(path)
+    assert_same(rows(store), right)
 
 
 def test_failed_cells_are_tried_again_when_asked(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from simulator.experiment.model import Experiment
 from simulator.experiment.pool import placed_only
 from simulator.layout import lay_out
 from simulator.machines.protocol import Array
+from simulator.rounding import above, comparable
 
 from ...rank import effects, weak_limit
 from .changes import Change, apply_all
@@ -49,7 +50,7 @@ class Judged:
     @property
     def order(self) -> tuple[int, int, float]:
         """The better, the smaller."""
-        return self.deficiency, self.weak, self.spread
+        return self.deficiency, self.weak, float(comparable(self.spread))
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ class Examined:
         limit = weak_limit(self.design, self.experiment.target_accuracy)
         return Judged(
             found.deficiency,
-            int((effect > limit).sum()),
+            int(above(effect, limit).sum()),
             float(effect.max(initial=0.0)),
             float(np.sqrt((effect**2).sum())),
             float(found.values[found.rank - 1]) if found.rank else 0.0,

@@ -14,6 +14,7 @@ import numpy as np
 from simulator.experiment.model import Experiment
 from simulator.experiment.pool import placed_only
 from simulator.machines.protocol import Array
+from simulator.rounding import comparable
 from simulator.threads import single_threaded
 
 from ...rank import independent_mixture
@@ -189,7 +190,7 @@ class _Search:
     def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
         """A repair that leaves nothing weak first, then the cheapest, then the one that leaves least uncertain."""
         after = self.judge(changes)
-        return not self.is_sound(after), sum(one.cost for one in changes), len(changes), after.spread
+        return not self.is_sound(after), sum(one.cost for one in changes), len(changes), float(comparable(after.spread))
 
     def thinned(self, changes: Sequence[Change]) -> list[Change]:
         """No more of them than can be judged, evenly from all."""
@@ -237,7 +238,9 @@ class _Search:
             for i, k in covering_pairs([self.seen[one] for one in few])
             if self.may_be((few[i], few[k]))
         ]
-        found.sort(key=lambda pair: (sum(map(effort, pair)), -weakest_of([self.seen[one] for one in pair])))
+        weakest = comparable([weakest_of([self.seen[one] for one in pair]) for pair in found])
+        order = sorted(range(len(found)), key=lambda k: (sum(map(effort, found[k])), -weakest[k]))
+        found = [found[k] for k in order]
         built = covering_set(additions, self.seen, effort, self.may_be)
         return [*found[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
 
