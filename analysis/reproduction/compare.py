@@ -13,6 +13,7 @@ from ..estimators import Comparison, compare_estimators, share_below
 from ..uncertainty import Quantity
 from .published import (
     REPEATABILITY,
+    SUM_OF_SQUARES,
     SYMBOLS,
     Column,
     Difference,
@@ -26,7 +27,7 @@ from .published import (
     Statistic,
     section_of,
 )
-from .shipped import Shipped, fitted_exactly, planned, shipped_experiment, sums_of_squares, variants
+from .shipped import Shipped, fitted_exactly, planned, shipped_experiment, sums_of_squares, tabulated, variants
 
 Report = Callable[[str, int, int], None]
 
@@ -135,7 +136,7 @@ class ComparedErratum:
 class ProgressLine:
     """One figure of an iteration: a step, or a sum of squares in square metres; `limit` is a factor.
 
-    A published figure is met `within` that factor, bounds ours at `most`, or is `shown` only.
+    A published figure is met `within` that factor, bounds ours at `most`, or is `shown` only; it is NaN if illegible.
     """
 
     quantity: str
@@ -163,7 +164,7 @@ class ComparedProgress:
 
     @property
     def agrees(self) -> bool:
-        return self.settled == self.progress.settles and all(line.agrees for line in self.lines)
+        return self.progress.settles in (None, self.settled) and all(line.agrees for line in self.lines)
 
 
 @dataclass(frozen=True)
@@ -341,7 +342,7 @@ def common_factor(ratios: Iterable[float]) -> float:
 def compare_column(document: Document, shipped: Shipped, column: Column) -> ComparedColumn:
     """Compare the figures of one column after its common factor, in which exceptions have no part."""
     stated = document.statements
-    quantities = planned(shipped, column.design).quantities
+    quantities = tabulated(shipped, column.design)
     ratios = _ratios(column, quantities)
     exceptions = {
         symbol: next((one for one in stated.exceptions if one.concerns(column, symbol)), None) for symbol in ratios
@@ -382,6 +383,12 @@ def compare_remark(shipped: Shipped, remark: Remark) -> ComparedRemark:
     """Compute the ratios that a remark is about."""
     ratios = []
     for design, other in remark.pairs:
+        if remark.quantities == (SUM_OF_SQUARES,):
+            last, compared = (
+                sums_of_squares(fitted_exactly(shipped_experiment(shipped, name)))[-1] for name in (design, other)
+            )
+            ratios.append(last / compared)
+            continue
         plan = planned(shipped, design)
         for symbol in remark.quantities:
             if other == REPEATABILITY:
@@ -401,7 +408,7 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
             table = erratum.figures_of or erratum.table
             if (column.table, column.design) != (table, meant) or column.statistic not in erratum.statistics:
                 continue
-            both = [_ratios(column, planned(shipped, design).quantities) for design in (headed, meant)]
+            both = [_ratios(column, tabulated(shipped, design)) for design in (headed, meant)]
             regular = [
                 symbol
                 for symbol in column.figures
@@ -420,7 +427,7 @@ def compare_progress(document: Document, shipped: Shipped, progress: Progress) -
     limits = document.statements.limits
     found = fitted_exactly(shipped_experiment(shipped, progress.design))
     record = found.solution.iterations
-    sums = sums_of_squares(found)
+    steps, sums = [iteration.step for iteration in record], sums_of_squares(found)
     lines = []
 
     def add(quantity: str, published: float, ours: list[float], k: int, rule: str, limit: float) -> None:
@@ -435,11 +442,19 @@ def compare_progress(document: Document, shipped: Shipped, progress: Progress) -
     for k, published in enumerate(progress.steps, start=1):
         last = progress.settles and k == len(progress.steps)
         rule = "shown" if k in progress.steps_shown_only else "most" if last else "within"
-        add("step", published, [iteration.step for iteration in record], k, rule, limits.step)
+        add("step", published, steps, k, rule, limits.step)
     for k, published in enumerate(progress.sums_of_squares):
-        rule = "within" if k < 2 or progress.misfit else "most"
-        add("S^2", published, sums, k, rule, limits.sum_of_squares)
-    settled = found.solution.status == "converged" and len(record) - 1 <= len(progress.steps)
+        rule = "shown" if k in progress.sums_shown_only else "within" if k < 2 or progress.misfit else "most"
+        # What ours has ended with is what it would have later.
+        add("S^2", published, sums + sums[-1:] * k, k, rule, limits.sum_of_squares)
+    settled = found.solution.status == "converged"
+    if progress.steps:
+        settled = settled and len(record) - 1 <= len(progress.steps)
+    else:
+        for k in range(1, len(record)):
+            add("step", math.nan, steps, k, "shown", limits.step)
+        for k in range(len(sums)):
+            add("S^2", math.nan, sums, k, "shown", limits.sum_of_squares)
     return ComparedProgress(progress, settled, len(record) - 1, tuple(lines))
 
 

@@ -14,6 +14,7 @@ from simulator.settings import Settings
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 Statistic = Literal["maximum", "average"]
 REPEATABILITY = "repeatability"
+SUM_OF_SQUARES = "S^2"
 
 
 class Assumption(Settings):
@@ -93,7 +94,10 @@ class RankStatement(Settings):
 
 
 class Remark(Settings):
-    """What is said of averages in words, as limits of their ratios in pairs of designs."""
+    """What is said of averages in words, as limits of their ratios in pairs of designs.
+
+    The quantity `S^2` is the sum of squares that fits of exact readings end with.
+    """
 
     section: str
     text: str
@@ -106,17 +110,19 @@ class Remark(Settings):
 class Progress(Settings):
     """Length of step and sum of squares, in square metres with weight 1 for a reading, of Gauss-Newton iterations.
 
-    It `settles` by the last of them; with a `misfit` the sum of squares that is left is not that of rounding. Steps
-    that are only shown have a reason.
+    It `settles` by the last of them, or does not, or is not compared in that if None; without any figure, it settles at
+    all. With a `misfit` the sum of squares that is left is not that of rounding. Figures that are only shown have a
+    reason.
     """
 
     table: str
     design: str
-    settles: bool
-    steps: tuple[float, ...]
-    sums_of_squares: tuple[float, ...]
+    settles: bool | None
+    steps: tuple[float, ...] = ()
+    sums_of_squares: tuple[float, ...] = ()
     misfit: bool = False
     steps_shown_only: tuple[int, ...] = ()
+    sums_shown_only: tuple[int, ...] = ()
     reason: str = ""
 
 
@@ -187,7 +193,7 @@ def section_of(design: str) -> str:
 
 @cache
 def npl() -> Document:
-    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 5 to 8 and 11, and what is said."""
+    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 1 to 12, and what is said."""
     name = "npl-cise-15-98"
     folder = files(__package__)
     text = folder.joinpath(f"{name}.yaml").read_text(encoding="utf-8")

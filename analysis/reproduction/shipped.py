@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from simulator.experiment.load import load
@@ -15,6 +15,7 @@ from simulator.readings import ObservedReadings
 from simulator.settings import hint
 
 from ..study import Fit, Plan, fit, plan
+from ..uncertainty import Quantity
 from .quantities import tabulated_quantities
 
 
@@ -25,6 +26,7 @@ class Shipped:
     folder: Path
     loaded: dict[str, dict[str, Experiment]] = field(default_factory=dict)
     plans: dict[str, Plan] = field(default_factory=dict)
+    tabulated: dict[str, dict[str, Quantity]] = field(default_factory=dict)
 
 
 def variants(shipped: Shipped, name: str) -> dict[str, Experiment]:
@@ -56,11 +58,18 @@ def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
 
 
 def planned(shipped: Shipped, label: str) -> Plan:
-    """The plan of a shipped design, at zero machine error, with U2, U3 and U5 in the form of the document's tables."""
+    """The plan of a shipped design, at zero machine error."""
     if label not in shipped.plans:
-        found = plan(shipped_experiment(shipped, label))
-        shipped.plans[label] = replace(found, quantities=found.quantities | tabulated_quantities(found.design))
+        shipped.plans[label] = plan(shipped_experiment(shipped, label))
     return shipped.plans[label]
+
+
+def tabulated(shipped: Shipped, label: str) -> dict[str, Quantity]:
+    """Quantities of a shipped design, at zero machine error, in the form of the document's tables."""
+    if label not in shipped.tabulated:
+        found = planned(shipped, label)
+        shipped.tabulated[label] = found.quantities | tabulated_quantities(found.design)
+    return shipped.tabulated[label]
 
 
 def fitted_exactly(experiment: Experiment) -> Fit:

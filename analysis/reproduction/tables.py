@@ -21,7 +21,7 @@ from .compare import (
     Reproduction,
     Section,
 )
-from .published import REPEATABILITY, SYMBOLS, Document, Remark, Reservation, case_of
+from .published import REPEATABILITY, SUM_OF_SQUARES, SYMBOLS, Document, Remark, Reservation, case_of
 
 
 @dataclass(frozen=True)
@@ -221,9 +221,8 @@ def _remark(one: ComparedRemark) -> str:
     names = ", ".join(one.remark.quantities)
     against = " over the repeatability" if _over_repeatability(one.remark) else ""
     verdict = "agrees" if one.agrees else "DIFFERS"
-    return (
-        f"Said: {one.remark.text}. Ratio of averages of {names}{against}: {ratios}, {_wanted(one.remark)}; {verdict}."
-    )
+    what = "" if one.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
+    return f"Said: {one.remark.text}. Ratio of {what}{names}{against}: {ratios}, {_wanted(one.remark)}; {verdict}."
 
 
 def _over_repeatability(remark: Remark) -> bool:
@@ -260,17 +259,23 @@ def _erratum(one: ComparedErratum) -> list[Block]:
 def _progress(one: ComparedProgress) -> list[Block]:
     progress = one.progress
     text = f"Table {progress.table}, {case_of(progress.design)}: "
-    text += (
-        f"published as {'settling' if progress.settles else 'not settling'} within {len(progress.steps)} iterations, "
-    )
-    text += f"ours {'settles' if one.settled else 'does not'} ({one.iterations} in all); {_verdict(one)}."
+    if progress.settles is None:
+        text += f"published with {len(progress.steps)} iterations"
+    else:
+        text += f"published as {'settling' if progress.settles else 'not settling'}"
+        text += f" within {len(progress.steps)} iterations" if progress.steps else ""
+    text += f", ours {'settles' if one.settled else 'does not'} ({one.iterations} in all); {_verdict(one)}."
     if progress.reason:
-        text += f" Steps without a limit: {progress.reason}."
+        text += f" Figures without a limit: {progress.reason}."
     rows = [
-        (line.quantity, f"{line.published:.3e}", f"{line.ours:.3e}", _wanted_of(line), yes(line.agrees))
+        (line.quantity, _figure(line.published), _figure(line.ours), _wanted_of(line), yes(line.agrees))
         for line in one.lines
     ]
     return [Paragraph(text), _grid(("iteration", "published", "ours", "ours has to be", "agrees"), rows, 1)]
+
+
+def _figure(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3e}"
 
 
 def _verdict(one: ComparedProgress) -> str:
@@ -487,7 +492,7 @@ def _section_data(section: Section) -> dict[str, Any]:
                 "figures": [
                     {
                         "quantity": line.quantity,
-                        "published": line.published,
+                        "published": _finite(line.published),
                         "ours": _finite(line.ours),
                         "rule": line.rule,
                         "limit": line.limit,
