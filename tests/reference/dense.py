@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from math import comb
 from typing import Any
 
@@ -150,6 +150,13 @@ class Problem:
         plates = [k for k in range(len(design.origins)) if design.is_plate[design.position_artefact[k]]]
         return [(k, j) for k in plates for j in range(6) if not design.held[k, j]]
 
+    @cached_property
+    def length_root(self) -> Real:
+        """A root (r, m) of the pseudo-inverse of the lengths' covariance: what follows from others tells nothing."""
+        values, vectors = np.linalg.eigh(length_covariance(self.design))
+        kept = values > FOLLOWS * values[-1]
+        return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
+
     @property
     def parameters(self) -> int:
         return 3 * len(self.plate_balls) + len(self.free_poses) + len(self.a)
@@ -217,7 +224,7 @@ def residuals(problem: Problem, step: Values) -> Values:
         rows.append((balls[given.ball[i], given.axis[i]] - given.value[i]) / given.uncertainty[i])
     given = design.lengths
     if len(given.first):
-        rows.extend(length_root(design) @ length_errors(problem, points))
+        rows.extend(problem.length_root @ length_errors(problem, points))
     return np.array(rows)
 
 
@@ -247,18 +254,8 @@ def length_covariance(design: Any) -> Real:
             u = design.repeatability / np.sqrt(design.readings.repeats[end])
             noise[i, d * end : d * end + d] += sign * given.direction[i] * u
     covariance = noise @ noise.T
-    for i in range(m):
-        for j in range(m):
-            if given.certificate[i] == given.certificate[j]:
-                covariance[i, j] += given.uncertainty[i] * given.uncertainty[j]
-    return np.asarray(covariance)
-
-
-def length_root(design: Any) -> Real:
-    """A root (r, m) of the pseudo-inverse of that covariance: what follows from other lengths tells nothing more."""
-    values, vectors = np.linalg.eigh(length_covariance(design))
-    kept = values > FOLLOWS * values[-1]
-    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
+    same = given.certificate[:, None] == given.certificate
+    return np.asarray(covariance + same * np.outer(given.uncertainty, given.uncertainty))
 
 
 def jacobian(function: Callable[[Values], Values], parameters: int) -> Real:

@@ -1,0 +1,362 @@
+"""Lengths that share readings, against dense computations and data sets drawn as they come about.
+
+The dense reference has the full covariance of all lengths and its pseudo-inverse; ours goes by positions.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.montecarlo.study import trials
+from analysis.study import plan
+from simulator.design import Design, Lengths, State, nominal_state
+from simulator.estimation.covariance import spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.gauss_newton import gauss_newton, newton_step
+from simulator.estimation.length_equations import length_estimate
+from simulator.estimation.observations import expected_readings
+from simulator.estimation.parameters import shared_layout
+from simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from simulator.experiment.model import Experiment
+from simulator.generate import exact_readings, on_true_machine, true_artefacts
+from simulator.geometry.motions import rotation_from_vector
+from simulator.layout import lay_out
+from simulator.machines.spatial_metric import SpatialMetricModel
+from simulator.machines.truth import true_machine
+from tests.estimation.test_against_dense import compare, in_reference_basis
+from tests.reference import dense
+from tests.reference.standards import POSES, bar, experiment, flat, spatial
+
+Real = NDArray[np.float64]
+Make = Callable[[Path], Experiment]
+
+ALL = {"pairs": "all", "standard_uncertainty": "0.5 um"}
+GROWING = {"pairs": "all", "standard_uncertainty": "0.2 um + L/200000"}
+PROJECTED = GROWING | {"form": "projection"}
+COARSE: dict[str, Any] = {"error_model": {"kind": "metric"}}
+
+
+def consecutive(balls: int) -> dict[str, Any]:
+    return {"pairs": [[f"b{k}", f"b{k + 1}"] for k in range(balls - 1)], "standard_uncertainty": "0.3 um"}
+
+
+def some_of_it() -> list[dict[str, Any]]:
+    """Positions in which different balls of a bar are read, more often than once, with one probe or two."""
+    return [
+        {"balls": ["b0", "b1", "b2"], "probes": ["down"], "repeats": 2},
+        {"balls": ["b0", "b2", "b3"], "probes": ["down", "right"]},
+        {"balls": ["b1", "b3"], "probes": ["down"], "repeats": 3},
+        {"probes": ["right"]},
+        {"probes": ["down"]},
+    ]
+
+
+def twice_certified() -> list[dict[str, Any]]:
+    """Two certificates of one bar: of all its lengths, and of some again, one of these each time anew."""
+    return [
+        ALL,
+        {"pairs": [["b0", "b1"], ["b1", "b3"]], "standard_uncertainty": "0.4 um"},
+        {"pairs": [["b0", "b3"]], "standard_uncertainty": "0.8 um", "repeatability": "ignored"},
+    ]
+
+
+CASES: dict[str, Make] = {
+    "two balls": lambda folder: experiment(folder, bar(2), ALL),
+    "three balls, all pairs": lambda folder: experiment(folder, bar(3), ALL),
+    "three balls, projected": lambda folder: experiment(folder, bar(3), PROJECTED),
+    "six balls, all pairs": lambda folder: experiment(folder, bar(6), GROWING),
+    "six balls, consecutive pairs": lambda folder: experiment(folder, bar(6), consecutive(6)),
+    "plate, all pairs": lambda folder: experiment(folder, flat(4), ALL),
+    "plate, all pairs projected": lambda folder: experiment(folder, flat(3), PROJECTED),
+    "plate, neighbours": lambda folder: experiment(folder, flat(4), {**GROWING, "pairs": "neighbours"}),
+    "six balls in space": lambda folder: experiment(folder, spatial(), GROWING),
+    "some balls only": lambda folder: experiment(folder, bar(4), GROWING, some_of_it()),
+    "two certificates": lambda folder: experiment(folder, bar(4), twice_certified(), some_of_it()),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_uncertainty_is_that_of_the_full_covariance(name: str, tmp_path: Path) -> None:
+    design = lay_out(CASES[name](tmp_path))
+    assert compare(design, nominal_state(design), dense.planned(design, 3, 2)) == 0
+    assert len(design.length_whitening) == np.linalg.matrix_rank(dense.length_covariance(design), 1e-9 * 1e-12)
+
+
+@pytest.mark.parametrize(
+    "name", ["three balls, projected", "six balls, all pairs", "plate, all pairs", "some balls only"]
+)
+def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) -> None:
+    """Uncertainties, S^2 and the Newton step, of standards whose lengths are as consistent as in reality."""
+    design = lay_out(CASES[name](tmp_path))
+    random, nominal = np.random.default_rng(3), nominal_state(design)
+    of_plate = np.zeros((len(design.balls), 1))
+    of_plate[design.plate_balls] = 1.0
+    turn = 1e-3 * random.standard_normal((len(design.origins), 3)) * ~design.held[:, 3:]
+    state = State(
+        nominal.balls + 1e-5 * of_plate * random.standard_normal(nominal.balls.shape),
+        rotation_from_vector(turn) @ nominal.rotations,
+        nominal.origins + 1e-4 * random.standard_normal(nominal.origins.shape) * ~design.held[:, :3],
+        1e-5 * random.standard_normal(nominal.a.shape),
+    )
+    scatter = random.standard_normal((len(design.readings), 3))
+    x = expected_readings(design, nominal, design.readings) + 1e-6 * scatter
+    error = random.standard_normal(len(np.unique(design.lengths.certificate)))[design.lengths.certificate]
+    value = design.lengths.value + design.lengths.uncertainty * error
+    design = replace(design, lengths=replace(design.lengths, value=value))
+    problem = dense.planned(design, 3, 2)
+    a = in_reference_basis(problem, design, state.a)
+    problem = replace(problem, scales=x, rotations=state.rotations, origins=state.origins, balls=state.balls, a=a)
+    assert compare(design, state, problem, x) == 0
+    layout = shared_layout(design)
+    factor = eliminate(design, layout, state, x)
+    shared, balls = newton_step(design, factor, spectrum(factor))
+    expected, squares = dense.least_squares_step(problem)
+    ours = np.concatenate(
+        [
+            balls[design.plate_balls].ravel(),
+            shared[layout.poses],
+            in_reference_basis(problem, design, shared[layout.model]),
+        ]
+    )
+    assert factor.sum_of_squares == pytest.approx(squares, rel=1e-9)
+    np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["three balls, all pairs", "six balls, all pairs", "plate, all pairs projected"])
+def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -> None:
+    """W'W is the pseudo-inverse of the covariance, W by itself and its transpose."""
+    design = lay_out(CASES[name](tmp_path))
+    white, m = design.length_whitening, len(design.lengths)
+    covariance = 1e12 * dense.length_covariance(design)
+    twice = 1e-12 * white.pulled(white.whitened(np.eye(m)))
+    expected = np.linalg.pinv(covariance, rcond=1e-12, hermitian=True)
+    np.testing.assert_allclose(covariance @ twice @ covariance, covariance, atol=1e-9 * np.abs(covariance).max())
+    # Outside the range of the covariance nothing is ever observed, so that roots may differ there.
+    within = covariance @ expected
+    np.testing.assert_allclose(within @ twice @ within, expected, atol=1e-9 * np.abs(expected).max())
+    noise = white.whitened(np.linalg.cholesky(covariance + 1e-15 * np.eye(m)) * 1e-6)
+    np.testing.assert_allclose(noise @ noise.T, np.eye(len(white)), atol=1e-6)
+
+
+TRUE = {"true_machine": {"kind": "random", "position": "3 um", "rotation": "6 urad", "seed": 3}}
+FULL = {
+    "error_model": {
+        "kind": "kinematic",
+        "arrangement": "MB2",
+        "position_coefficients": 2,
+        "rotation_coefficients": 2,
+        "rotations": "full",
+    }
+}
+
+
+@pytest.mark.parametrize(
+    ("standard", "known"),
+    [
+        (bar(2), ALL),
+        (bar(3), ALL),
+        (bar(6), GROWING),
+        (bar(6), consecutive(6)),
+        (flat(4), ALL),
+        (flat(3), PROJECTED),
+        (spatial(), GROWING),
+    ],
+    ids=["two", "three", "six", "consecutive", "plate", "projected", "space"],
+)
+def test_replicates_scatter_as_stated(standard: dict[str, Any], known: dict[str, Any], tmp_path: Path) -> None:
+    """Readings are drawn, and lengths formed of them; so is one error of each certificate."""
+    assert_honest(experiment(tmp_path, standard, known, **TRUE), 2048)
+
+
+def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
+    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 256)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("standard", [bar(6), flat(4)], ids=["six", "plate"])
+def test_many_replicates_of_a_model_that_is_not_linear(standard: dict[str, Any], tmp_path: Path) -> None:
+    assert_honest(experiment(tmp_path, standard, ALL, **TRUE, **FULL), 1024)
+
+
+def assert_honest(made: Experiment, count: int) -> None:
+    found = trials(made, count)
+    assert found.trials == count and not found.failed
+    for symbol in ("U1", "U2", "U3", "U4", "U5", "U6"):
+        one = found.comparisons[symbol]
+        assert abs(one.spread.value - 1.0) < 4 * one.spread.error, symbol
+        for share in (one.known, one.estimated):
+            assert abs(share.value - 0.95) < 4 * share.error, symbol
+    misfit = found.misfit
+    assert abs(misfit.mean.value - misfit.degrees_of_freedom) < 4 * misfit.mean.error
+    assert abs(misfit.rejected.value - 0.05) < 4 * misfit.rejected.error
+
+
+def physical(made: Experiment, generator: np.random.Generator) -> tuple[Design, Real, Design, State]:
+    """Readings of a true standard, and certificates that err about it, without any of the program's random numbers.
+
+    The standard's balls are off the drawing by 20 um, and each certified length by its uncertainty from what it truly
+    is; the design has a reading for each of the readings drawn.
+    """
+    design = lay_out(made)
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    on_truth, truth = on_true_machine(design, true_machine(made.true_machine, design.model, *corners))
+    balls = truth.balls.copy()
+    balls[~design.is_plate[design.ball_artefact]] += 2e-5 * generator.standard_normal(3)
+    off = 2e-5 * generator.standard_normal(balls.shape)
+    # What is drawn in line or in a plane stays there.
+    standard = np.flatnonzero(~design.is_plate[design.ball_artefact])
+    extent = np.ptp(design.balls[standard], axis=0) > 0.0
+    balls[standard] += off[standard] * extent
+    truth = replace(truth, balls=balls)
+    _, exact = exact_readings(on_truth, truth)
+    x = exact + design.repeatability * generator.standard_normal(exact.shape)
+    given = design.lengths
+    ends = [balls[design.readings.ball[k]] for k in (given.first, given.second)]
+    error = generator.standard_normal(int(given.certificate.max()) + 1)[given.certificate]
+    value = np.linalg.norm(ends[0] - ends[1], axis=1) + given.uncertainty * error
+    return replace(design, lengths=replace(given, value=value)), x, on_truth, truth
+
+
+@pytest.mark.parametrize(
+    ("standard", "known"),
+    [(bar(3), ALL), (bar(6), GROWING), (flat(3), ALL)],
+    ids=["three", "six", "plate"],
+)
+def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[str, Any], tmp_path: Path) -> None:
+    """Over 150 data sets each parameter scatters by its uncertainty, and S^2 about its degrees of freedom."""
+    made = experiment(tmp_path, standard, known, **COARSE, **TRUE_METRIC)
+    uncertainty = {name: one.maximum for name, one in plan(made).quantities.items()}
+    generator, errors, squares = np.random.default_rng(4), [], []
+    count = 150
+    for _ in range(count):
+        design, x, _, truth = physical(made, generator)
+        found = gauss_newton(design, x, truth)
+        assert found.status == "converged"
+        errors.append(found.state.a - truth.a)
+        squares.append(found.factor.sum_of_squares)
+    design = lay_out(made)
+    layout, state = shared_layout(design), nominal_state(design)
+    root = spectrum(eliminate(design, layout, state)).root[layout.model]
+    stated = root @ root.T
+    assert np.sqrt(np.diag(stated)[:3].max()) == pytest.approx(uncertainty["U3 ratios"], rel=1e-9)
+    # The sum of squares in units of the stated covariance is chi-square with six degrees of freedom for each data set.
+    total = float(np.einsum("ri,ij,rj->", errors, np.linalg.inv(stated), errors))
+    expected = 6 * count
+    assert abs(total - expected) < 4 * np.sqrt(2 * expected)
+    freedom = design.observations - design.parameter_count
+    assert abs(np.mean(squares) - freedom) < 4 * np.sqrt(2 * freedom / count)
+
+
+TRUE_METRIC = {"true_machine": {"kind": "coefficients", "values": {"scale x": "20 ppm", "C0Y": "30 urad"}}}
+
+
+@pytest.mark.parametrize("estimator", RIVALS)
+def test_estimators_of_distances_take_the_same_lengths(estimator: RivalName, tmp_path: Path) -> None:
+    """Without a plate the lengths are all there is, and every estimator is the weighted one of the dense covariance."""
+    made = experiment(tmp_path, bar(4), GROWING, **COARSE, **TRUE_METRIC)
+    design, x, _, _ = physical(made, np.random.default_rng(8))
+    alone = without_plate(design)
+    found = rival_estimate(alone, x, np.zeros((0, 2), np.int64), estimator)
+    expected, spread = weighted(alone, x)
+    assert found.status == "converged" and found.observations == np.linalg.matrix_rank(
+        dense.length_covariance(alone), 1e-21
+    )
+    np.testing.assert_allclose(found.a, expected, rtol=0, atol=1e-6 * spread.min())
+
+
+def without_plate(design: Design) -> Design:
+    """Only the lengths count; the plate's readings stay, of no artefact that is estimated."""
+    return replace(design, is_plate=np.zeros_like(design.is_plate), held=np.ones_like(design.held))
+
+
+def weighted(design: Design, x: Real) -> tuple[Real, Real]:
+    """Gauss-Newton on the lengths alone, with the pseudo-inverse of their covariance: values and uncertainties."""
+    given, inverse = design.lengths, np.linalg.pinv(1e12 * dense.length_covariance(design), 1e-12, hermitian=True)
+
+    def off(a: Real) -> Real:
+        seen = x + design.model.error(x, a, design.probes[design.readings.probe])
+        return 1e6 * (np.linalg.norm(seen[given.first] - seen[given.second], axis=1) - given.value)
+
+    a = np.zeros(len(design.model.parameters))
+    for _ in range(8):
+        rows = np.stack([(off(a + s) - off(a - s)) / 2e-5 for s in 1e-5 * np.eye(len(a))], axis=1)
+        a = a - np.linalg.solve(rows.T @ inverse @ rows, rows.T @ inverse @ off(a))
+    return a, np.sqrt(np.diag(np.linalg.inv(rows.T @ inverse @ rows)))
+
+
+@pytest.mark.parametrize("name", ["consecutive", "all"])
+def test_length_equations_of_shared_balls(name: str, tmp_path: Path) -> None:
+    """Reduced to the lengths that are independent, whatever follows from others."""
+    known = ALL if name == "all" else consecutive(3)
+    made = experiment(tmp_path, bar(3, unequal=False), known, machine=MACHINE, **COARSE, **TRUE_METRIC)
+    design, x, _, _ = physical(made, np.random.default_rng(2))
+    assert isinstance(design.model, SpatialMetricModel)
+    found = length_estimate(design, x)
+    # Two independent lengths in each position, and six unknowns.
+    assert (found.equations, found.degrees_of_freedom) == (2 * len(POSES), 2 * len(POSES) - 6)
+    given = design.lengths
+    pairs, places = list(itertools.combinations(range(3), 2)), len(POSES)
+    seen = x + design.probes[design.readings.probe]
+    difference = seen[given.first] - seen[given.second]
+    rows = np.stack([difference[:, i] * difference[:, j] for i in range(3) for j in range(3)], axis=1)
+    rows = rows[:, [0, 1, 2, 4, 5, 8]] * [1, 2, 2, 1, 2, 1]
+    off = (difference**2).sum(axis=1) - given.value**2
+    # The noise of an equation is 2 D (n - m); it is the same in all three co-ordinates of all readings.
+    noise = np.zeros((len(given), 3 * len(seen)))
+    for k, (first, second, along) in enumerate(zip(given.first, given.second, given.direction, strict=True)):
+        for sign, end in ((2.0, first), (-2.0, second)):
+            noise[k, 3 * end : 3 * end + 3] = sign * along * given.value[k]
+    assert len(given) == places * (len(pairs) if name == "all" else 2)
+    inverse = np.linalg.pinv(noise @ noise.T, 1e-10, hermitian=True)
+    expected = -np.linalg.solve(rows.T @ inverse @ rows, rows.T @ inverse @ off)
+    np.testing.assert_allclose(found.factors, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+MACHINE = {"volume": ["600 mm", "500 mm", "400 mm"], "repeatability": "1 um"}
+
+
+def test_a_ball_a_little_off_the_line_counts_as_in_line(tmp_path: Path) -> None:
+    """What it would add to first order is less than what nobody knows of its place."""
+    crooked = bar(3)
+    crooked["coordinates"]["b1"][1] = "0.003 mm"
+    found = [plan(experiment(tmp_path, one, ALL)).quantities["U6"].average for one in (bar(3), crooked)]
+    assert found[1] == pytest.approx(found[0], rel=1e-4)
+
+
+def test_lengths_that_follow_from_others_tell_nothing_of_the_machine(tmp_path: Path) -> None:
+    """With certificates that are all but exact, the outer length of three balls follows from the other two."""
+    exact = {"standard_uncertainty": "1 pm"}
+    every = experiment(tmp_path, bar(3), {"pairs": "all"} | exact)
+    two = experiment(tmp_path, bar(3), {"pairs": [["b0", "b1"], ["b1", "b2"]]} | exact)
+    for symbol in ("U4", "U5", "U6"):
+        found = [plan(one).quantities[symbol].maximum for one in (every, two)]
+        assert found[0] == pytest.approx(found[1], rel=1e-9)
+    assert lay_out(every).observations == lay_out(two).observations
+
+
+def test_true_standards_differ_from_their_certificates_as_stated(tmp_path: Path) -> None:
+    design = lay_out(experiment(tmp_path, bar(4), consecutive(4)))
+    given = design.lengths
+    generator, off = np.random.default_rng(6), []
+    for _ in range(400):
+        balls = true_artefacts(design, generator)
+        ends = [balls[design.readings.ball[k]] for k in (given.first[:3], given.second[:3])]
+        off.append((np.linalg.norm(ends[0] - ends[1], axis=1) - given.value[:3]) / given.uncertainty[:3])
+    scatter = np.array(off).T @ np.array(off) / 400
+    np.testing.assert_allclose(scatter, np.eye(3), atol=4 * np.sqrt(2 / 400))
+
+
+def test_lengths_without_shared_balls_are_whitened_one_by_one(tmp_path: Path) -> None:
+    design = lay_out(
+        experiment(tmp_path, bar(4), {"pairs": [["b0", "b1"], ["b2", "b3"]], "standard_uncertainty": "1 um"})
+    )
+    assert isinstance(design.lengths, Lengths) and not design.length_whitening.joint
+    assert len(design.length_whitening) == len(design.lengths)
