@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from analysis.cli import main
+from analysis.internal_error import InternalError
+from analysis.planning.bound import Bound
 from analysis.planning.campaign import Request, campaign
 from analysis.planning.constraints import HOUR, Budget
 from analysis.planning.done import done_candidates
 from analysis.planning.earlier import earlier_choice
 from analysis.planning.offer import offer
+from analysis.planning.search import Problem
 from analysis.study import plan
 from simulator.experiment.load import load
 from simulator.experiment.messages import ExperimentError
@@ -225,3 +229,32 @@ def test_the_pool_is_not_overwritten_by_the_choice(tmp_path: Path, capsys: pytes
     assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 3
     assert "the pool stands in" in capsys.readouterr().err
     assert path.read_text() == TEXT
+
+
+@pytest.mark.parametrize("positions", [5, 4])
+def test_a_choice_better_than_its_bound_is_an_internal_error(
+    positions: int, drawn: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bound that is wrong on purpose, of the choice itself and of a point of the curve."""
+    from analysis.planning import campaign as planning
+
+    right = planning.bound
+
+    def wrong(problem: Problem) -> Bound | None:
+        found = right(problem)
+        is_wrong = problem.constraints.budget.positions == positions
+        return replace(found, value=10 * found.value) if found is not None and is_wrong else found
+
+    monkeypatch.setattr(planning, "bound", wrong)
+    monkeypatch.setattr(planning, "in_processes", lambda task, tasks, workers: (task(*one) for one in tasks))
+    assert main(["plan", str(drawn), "--positions", "5", "--curve", "--workers", "1"]) == 70
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("internal error: U6") and "the bound of any choice" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
+    one = Bound(1e-6, 1e-6, np.zeros(3))
+    one.check("U6", 1e-6 * (1 - 5e-10))
+    with pytest.raises(InternalError, match="U6 of the choice, 9.9.*e-07, is below 1e-06"):
+        one.check("U6", 1e-6 * (1 - 5e-9))

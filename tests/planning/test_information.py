@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from analysis.planning.campaign import Request, campaign
 from analysis.planning.constraints import Budget, constraints
 from analysis.planning.criteria import CriterionName, criterion, is_about_balls
 from analysis.planning.information import pool_information
@@ -197,6 +200,36 @@ pool:
 """
 
 
+# What is known of both in any case.
+CERTIFIED = """calibration:
+  - {artefact: small, kind: coordinates, balls: all, standard_uncertainty: 0.5 um}
+  - {artefact: large, kind: distances, pairs: corners, standard_uncertainty: 30 um}
+"""
+
+PLATE_AND_BAR = """
+title: a plate and a bar
+machine: {volume: [600 mm, 500 mm, 450 mm], repeatability: 1 um}
+error_model: {kind: metric}
+probes: {down: [0 mm, 0 mm, -40 mm], right: [40 mm, 0 mm, 0 mm]}
+artefacts:
+  bar: {kind: two_spheres, length: 230 mm, role: length_standard}
+  plate: {kind: grid, balls: [3, 2], size: [240 mm, 160 mm]}
+calibration:
+  - {artefact: bar, kind: distances, pairs: all, standard_uncertainty: 29.2 um}
+  - {artefact: plate, kind: distances, pairs: neighbours, standard_uncertainty: 0.641 um}
+evaluation: {points: {random: 12, seed: 3}, probe: down}
+pool:
+  candidates:
+    - name: bar
+      artefact: bar
+      pose: {origin: [110 mm, 166 mm, 96 mm], rotation: [0 deg, -42 deg, 9 deg]}
+      probes: [down]
+    - {name: y, artefact: plate, plane: y, level: 198 mm, corner: {x: 156 mm, z: 159 mm}, probes: [down, right]}
+    - {name: z, artefact: plate, plane: z, level: 116 mm, corner: {x: 251 mm, y: 151 mm}, probes: [down]}
+    - {name: x, artefact: plate, plane: x, level: 506 mm, corner: {y: 133 mm, z: 111 mm}, probes: [down, right]}
+"""
+
+
 def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
     (experiment,) = load(written(tmp_path, TWO_PLATES), planning=True)
     assert experiment.pool is not None
@@ -243,3 +276,49 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str, n
             compared += 1
             assert found == pytest.approx(in_full(full, name), rel=1e-8)
     assert compared > 5
+
+
+def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_path: Path) -> None:
+    """Whatever certificates say: the choice that is written has no such plate, so that `run` counts the others only."""
+    certified = TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")
+    (experiment,) = load(written(tmp_path, certified), planning=True)
+    assert experiment.pool is not None
+    names = [candidate.name for candidate in experiment.pool.candidates]
+    for name in ("U5", "U5-maximum"):
+        problem = problem_of(experiment, name)  # type: ignore[arg-type]
+        for wanted in (["a", "b"], ["c", "d"], ["a", "b", "of small", "of large"]):
+            assert value(problem, [names.index(one) for one in wanted]) == np.inf
+        chosen = [names.index(one) for one in ("a", "b", "c")]
+        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        assert value(problem, chosen) == pytest.approx(in_full(full, name), rel=1e-9)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("positions", [2, 3, 4])
+def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> None:
+    (experiment,) = load(written(tmp_path, TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")), planning=True)
+    assert experiment.pool is not None
+    found = campaign(experiment, Request("U5", Budget(positions=positions)))
+    candidates = experiment.pool.candidates
+    best = np.inf
+    for size in range(2, len(candidates) + 1):
+        for chosen in combinations(candidates, size):
+            places = [one.item for one in chosen if isinstance(one.item, Position)]
+            if len({one.artefact for one in places}) == 2 and len(places) <= positions:
+                full = plan(with_chosen(experiment, chosen))
+                best = min(best, np.inf if full.verdict.deficiency else full.quantities["U5"].average)
+    assert found.bound <= found.value == pytest.approx(best, rel=1e-9)
+    with pytest.raises(ExperimentError, match='U5 takes in the distances of ".*", of which no position can be read'):
+        campaign(experiment, Request("U5", Budget(positions=1)))
+
+
+def test_rounding_holds_nothing_of_a_standard_that_is_left_out(tmp_path: Path) -> None:
+    """A bar with a loose certificate, which told the machine's parameters where no position placed it."""
+    (experiment,) = load(written(tmp_path, PLATE_AND_BAR), planning=True)
+    assert experiment.pool is not None
+    candidates = experiment.pool.candidates
+    chosen = [k for k, one in enumerate(candidates) if one.item.artefact == "plate"]
+    alone = replace(experiment, pool=replace(experiment.pool, candidates=tuple(candidates[k] for k in chosen)))
+    for name in ("A", "U6"):
+        with_bar = value(problem_of(experiment, name), chosen)  # type: ignore[arg-type]
+        without = value(problem_of(alone, name), range(len(chosen)))  # type: ignore[arg-type]
+        assert with_bar == pytest.approx(without, rel=1e-9) and np.isfinite(without)

@@ -95,6 +95,21 @@ def test_of_the_cheapest_orders_that_which_goes_on_from_what_is_done(
     assert min(cost([end, sequence[0]], changes) for end in ends) == easiest
 
 
+@settings(max_examples=25, deadline=None)
+@given(kinds, st.lists(kinds, min_size=1, max_size=3), change_times)
+def test_going_on_from_what_still_stands_is_paid(standing: Kind, members: list[Kind], changes: ChangeTimes) -> None:
+    rest = position(standing, "rest")
+    own = [position(kind, str(k)) for k, kind in enumerate(members)]
+    sequence = ordered(own, changes, [], rest)
+    assert sequence[0][0] is rest and sorted(sequence[0][1]) == sorted(standing.probes)
+    least = min(
+        cost([(rest, probes), *((position(kind, "p"), some) for kind, some in order)], changes)
+        for order in every_order(members)
+        for probes in permutations(sorted(standing.probes))
+    )
+    assert cost(sequence, changes) == least == changeover(members, changes, standing)
+
+
 def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
     some = [Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])]
     assert len({changeover(order, CHANGES) for order in (some, some[::-1], frozenset(some), tuple(some))}) == 1
