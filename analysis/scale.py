@@ -42,11 +42,11 @@ MOST_ARTEFACTS = 3
 class Carrier:
     """What carries scale, in words; `without` is the relative standard uncertainty of scale if it were not known.
 
-    Infinite where the scale would then be undetermined.
+    Infinite where the scale would then be undetermined; None of the machine's own scales, which are what they are.
     """
 
     words: str
-    without: float
+    without: float | None
 
 
 @dataclass(frozen=True)
@@ -68,15 +68,14 @@ class Scale:
 
     Scale is the mean relative change of the distances between corrected points, weighted by their squares.
     `rests_on_offsets`: whether, but for probe offsets that are held exact, it would be undetermined or at least
-    three times as uncertain; `loosened` then tells what becomes of U6. Without `has_scale` the error model cannot
-    stretch the volume, so that the scale is that of the machine.
+    three times as uncertain; `loosened` then tells what becomes of U6. Where the error model cannot stretch the volume
+    by the same ratio in all directions, the machine's own scales carry as well.
     """
 
     uncertainty: float
     carriers: tuple[Carrier, ...]
     rests_on_offsets: bool = False
     loosened: Loosened | None = None
-    has_scale: bool = True
 
 
 def scale_of(
@@ -87,23 +86,23 @@ def scale_of(
     uncertainty = float(spread.of_shared(row[None])[0])
     if np.isnan(uncertainty):
         return None
-    if not can_stretch(design, state):
-        return Scale(uncertainty, (), has_scale=False)
+    stretches = can_stretch(design, state)
     groups = list(_groups(experiment))
-    if not groups:
-        return None
-    offsets = exact_offsets(experiment)
-    if len(groups) == 1:
+    if len(groups) == 1 and stretches:
+        # Nothing else can: readings alone do not tell the scale.
         carriers = [Carrier(groups[0][0], np.inf)]
     else:
-        found = [Carrier(words, scale_uncertainty(without)) for words, without in groups]
-        carriers = [one for one in found if one.without > CARRIES * uncertainty] or found
-        carriers.sort(key=lambda one: -one.without)
-    rests = any(one.words == EXACT_OFFSETS and one.without > RESTS * uncertainty for one in carriers)
-    loosened = _loosened(experiment, design, layout, state, spread) if rests and offsets else None
+        found = sorted(((scale_uncertainty(rest), words) for words, rest in groups), reverse=True)
+        some = [one for one in found if one[0] > CARRIES * uncertainty] or (found if stretches else [])
+        carriers = [Carrier(words, without) for without, words in some]
+    rests = any(one.words == EXACT_OFFSETS and (one.without or 0.0) > RESTS * uncertainty for one in carriers)
+    loosened = _loosened(experiment, design, layout, state, spread) if rests else None
+    if not stretches:
+        carriers.append(Carrier(OWN_SCALES, None))
     return Scale(uncertainty, tuple(carriers), rests, loosened)
 
 
+OWN_SCALES = "the machine's own scales, which the error model cannot change all alike"
 EXACT_OFFSETS = "the exact probe offsets"
 
 

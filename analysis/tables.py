@@ -225,10 +225,11 @@ def scale_lines(found: Scale | None) -> list[str]:
     """What carries scale as lines of text, and a warning where it rests on offsets that are held exact."""
     if found is None:
         return []
-    if not found.has_scale:
-        return ["scale: the machine's own, which the error model does not change"]
     told = []
     for one in found.carriers:
+        if one.without is None:
+            told.append(one.words)
+            continue
         without = "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
         told.append(f"{one.words} ({without} without)")
     lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm, from {' and '.join(told)}"]
@@ -252,7 +253,10 @@ def scale_data(found: Scale | None) -> dict[str, Any] | None:
     loose = found.loosened
     return {
         "standard_uncertainty": found.uncertainty,
-        "carried_by": [{"text": one.words, "without": finite(one.without)} for one in found.carriers],
+        "carried_by": [
+            {"text": one.words, "without": None if one.without is None else finite(one.without)}
+            for one in found.carriers
+        ],
         "rests_on_exact_offsets": found.rests_on_offsets,
         "with_uncertain_offsets": None
         if loose is None

@@ -12,6 +12,7 @@ import pytest
 from analysis.cli import main
 from analysis.scale import (
     EXACT_OFFSETS,
+    OWN_SCALES,
     can_stretch,
     lengths_with_offsets,
     scale_row,
@@ -146,7 +147,7 @@ def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_p
     assert told["the certificates of plate"] == pytest.approx(scale_uncertainty(bare))
     assert told[EXACT_OFFSETS] == pytest.approx(scale_uncertainty(with_offsets(certified, np.inf)))
     # Two independent sources: the variances of what each alone says add up as their inverses.
-    both = sum(one.without**-2 for one in found.carriers) ** -0.5
+    both = sum(without**-2 for without in told.values() if without is not None) ** -0.5
     assert found.uncertainty == pytest.approx(both, rel=0.02)
 
 
@@ -176,14 +177,28 @@ def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
 
 
 def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) -> None:
+    known = []
     for scale, is_free in (("each", True), ("none", False)):
         experiment = experiment_of(tmp_path, ONE_PROBE.replace("{kind: metric}", f"{{kind: metric, scale: {scale}}}"))
         design = lay_out(experiment)
         assert can_stretch(design, nominal_state(design)) is is_free
         found = check(experiment, with_scale=True)
-        assert found.scale is not None and found.scale.has_scale is is_free
-        told = "\n".join(plan_lines(found))
-        assert ("scale: the machine's own, which the error model does not change" in told) is not is_free
+        assert found.scale is not None
+        assert (OWN_SCALES in [one.words for one in found.scale.carriers]) is not is_free
+        assert ("the machine's own scales" in "\n".join(plan_lines(found))) is not is_free
+        known.append(found.scale.uncertainty)
+    # Without scales in the model only its squareness is left to be uncertain of.
+    assert known[1] < 0.5 * known[0]
+
+
+def test_a_model_that_can_stretch_in_part_has_certificates_and_its_own_scales(tmp_path: Path) -> None:
+    """Splines that are level at their ends cannot stretch evenly, though their scales are uncertain all the same."""
+    (experiment,) = [one for one in load(Path("designs/gilsinn/scales-in-two-parts.yaml")) if one.name == "level ends"]
+    found = check(experiment, with_scale=True).scale
+    assert found is not None and found.uncertainty > 1e-8
+    assert found.carriers[-1].words == OWN_SCALES
+    for one in found.carriers[:-1]:
+        assert one.without is not None and one.without > found.uncertainty
 
 
 def test_a_certificate_is_suggested_and_does_what_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -276,7 +276,11 @@ def test_the_action_checks(tmp_path: Path) -> None:
     action = described("action.yml")
     assert action["runs"]["using"] == "composite"
     *_, check = action["runs"]["steps"]
-    assert check["shell"] == "bash" and check["env"] == {"FILES": "${{ inputs.files }}"}
+    assert check["shell"] == "bash" and check["env"] == {
+        "FILES": "${{ inputs.files }}",
+        "GOALS": "${{ inputs.goals }}",
+        "FAIL_WEAK": "${{ inputs.fail-weak }}",
+    }
     a_repository(tmp_path)
     found = shell(check["run"], tmp_path, FILES=action["inputs"]["files"]["default"])
     assert (found.returncode, found.stderr) == (0, "")
@@ -284,6 +288,11 @@ def test_the_action_checks(tmp_path: Path) -> None:
         "designs/more/of them.yaml",
         "designs/one.yaml",
     ]
+    # Each line is a goal; the second one is missed.
+    goals = "U6 average 1 um\nU6 average 1 pm\n"
+    found = shell(check["run"], tmp_path, FILES="designs/one.yaml", GOALS=goals, FAIL_WEAK="true")
+    assert found.returncode == 1 and "goal met: average U6 at most 1 um" in found.stdout
+    assert found.stdout.startswith("::error file=designs/one.yaml") and "goal not met: average U6" in found.stdout
     (tmp_path / "designs/one.yaml").write_text("title: nothing else\n", encoding="utf-8")
     found = shell(check["run"], tmp_path, FILES="designs/o*.yaml\ndesigns/more/of them.yaml\n")
     assert found.returncode == 3
