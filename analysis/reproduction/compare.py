@@ -313,7 +313,7 @@ def _section(document: Document, shipped: Shipped, name: str, trials: int | None
             if section_of(progress.design) == name
         ),
         tuple(compare_difference(document, shipped, one, trials, report) for one in differences if trials is not None),
-        tuple(Told(label, planned(shipped, label).quantities) for label in told),
+        tuple(Told(label, tabulated(shipped, label)) for label in told),
         illegible,
         skipped,
     )

@@ -32,9 +32,10 @@ def test_section_6_quick(capsys: pytest.CaptureFixture[str]) -> None:
     assert ranks["6.1.1[B]"] == (2, 2) and ranks["6.2.1[n=4 NDEL=7]"] == ("some", 6)
     erratum = sections["6.2.2"]["errata"][0]
     assert erratum["confirmed"] and len(erratum["columns"]) == 6
-    assert all(one["deviation_as_meant"] < 0.1 < one["deviation_as_headed"] for one in erratum["columns"])
+    for one in erratum["columns"]:
+        assert one["deviation_as_meant"] < 0.02 and one["deviation_as_headed"] > 4 * one["deviation_as_meant"]
     # What nobody has explained is told as that.
-    assert [key for key, one in found["exceptions"].items() if one["open"]] == ["3", "4"]
+    assert [key for key, one in found["exceptions"].items() if one["open"]] == ["2", "3"]
     assert len(sections["6.2.3"]["computed_only"]) == 12 and sections["6.2.7"]["left_out"]
 
 
@@ -42,7 +43,7 @@ def test_text_of_one_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*NPL, "--experiment", "6.2.5"]) == 0
     out, err = capsys.readouterr()
     assert err == "" and "Section 6.2.5" in out and "Section 6.2.1" not in out
-    assert "Erratum in Table 11" in out and "Open differences\n4: U3 in Tables 8 and 11" in out
+    assert "Erratum in Table 11" in out and "Open differences" not in out
     tables = [line for line in out.splitlines() if "  " in line]
     assert max(map(len, tables)) <= 80
     assert any(line.split()[:6] == ["11", "U3", "average", "n=7", "NDEL=7", "30.557"] for line in tables)

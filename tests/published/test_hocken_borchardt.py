@@ -7,9 +7,9 @@ which the report's own results come out:
 - made-up readings, ball 8, true and computed x: 1.110020, must be 1.111020; by multiple redundancy 1.110028: 1.111028;
 - made-up readings, ball 5, "true" y: 13.777777, which the readings do not contain; they give 13.777770;
 - made-up readings, ball 4, x by multiple redundancy: .132674, must be .132672;
-- real readings, ball 12, y in position 2: 12.002806, must be 12.002796.
-
-The columns of results for the real readings are not in the copy at hand.
+- made-up readings, ball 9, x by the three-parameter fit: 9.735171, must be 9.735173;
+- real readings, ball 12, y in position 2: 12.002806, must be 12.002796;
+- real readings, ball 8, y by the three-parameter fit: 8.999460, must be 8.999360.
 """
 
 from __future__ import annotations
@@ -56,6 +56,72 @@ REDUNDANT = np.array(
         (12.137508, 9.873530),
         (1.111028, 3.762568),
         (9.735231, 3.164807),
+    ]
+)
+# Table A1: the co-ordinates by the three-parameter fit, relative to the zero of the readings.
+THREE_PARAMETERS = np.array(
+    [
+        (0.000007, -0.000005),
+        (12.526483, 0.0),
+        (3.141604, 2.674324),
+        (0.132673, 11.989642),
+        (12.026455, 13.777775),
+        (6.936251, 7.216943),
+        (12.137433, 9.873466),
+        (1.111026, 3.762539),
+        (9.735173, 3.164785),
+    ]
+)
+# Tables 2 and A1, real readings: by the five-parameter fit, the three-parameter fit, and Reeve's program.
+REAL_FIVE = np.array(
+    [
+        (0.0, 0.0),
+        (-3.000864, 3.999145),
+        (-2.000515, 10.999406),
+        (-4.000532, 13.999428),
+        (0.0, 14.999408),
+        (-8.001196, 1.999381),
+        (-6.000930, 5.999259),
+        (-9.001258, 8.999363),
+        (-7.000682, 12.999380),
+        (-15.002107, 0.999012),
+        (-13.001700, 4.999086),
+        (-12.001292, 9.999367),
+        (-14.002106, 14.998583),
+    ]
+)
+REAL_THREE = np.array(
+    [
+        (0.0, 0.0),
+        (-3.000862, 3.999144),
+        (-2.000514, 10.999401),
+        (-4.000530, 13.999422),
+        (0.0, 14.999401),
+        (-8.001193, 1.999381),
+        (-6.000928, 5.999257),
+        (-9.001253, 8.999360),
+        (-7.000678, 12.999374),
+        (-15.002101, 0.999012),
+        (-13.001694, 4.999084),
+        (-12.001287, 9.999362),
+        (-14.002099, 14.998577),
+    ]
+)
+REAL_REDUNDANT = np.array(
+    [
+        (0.0, 0.0),
+        (-3.000868, 3.999151),
+        (-2.000517, 10.999422),
+        (-4.000537, 13.999447),
+        (0.0, 14.999429),
+        (-8.001207, 1.999384),
+        (-6.000939, 5.999268),
+        (-9.001270, 8.999376),
+        (-7.000692, 12.999398),
+        (-15.002129, 0.999014),
+        (-13.001718, 4.999092),
+        (-12.001309, 9.999381),
+        (-14.002125, 14.998604),
     ]
 )
 TRUE = np.array([(12.026450, 13.777770) if i == 4 else row for i, row in enumerate(FIVE_PARAMETERS)])
@@ -131,6 +197,12 @@ def test_three_parameters() -> None:
     }
     assert round(found.found.sigma / INCH * 1e6, 1) == 7.0
     assert np.abs(found.coordinates / INCH - TRUE).max() < 14e-6
+    # The table's axes go through the zero of the readings, from which ball 1 is off by the mean of both its readings, the
+    # second turned back, and through ball 2.
+    shifted = found.coordinates / INCH + (0.000014 / 2, -0.000010 / 2)
+    turn = shifted[1, 1] / shifted[1, 0]
+    turned = shifted + turn * np.column_stack([shifted[:, 1], -shifted[:, 0]])
+    np.testing.assert_allclose(turned, THREE_PARAMETERS, rtol=0, atol=DIGIT)
     assert any("fit without --no-offsets" in warning for warning in found.warnings)
 
 
@@ -186,6 +258,39 @@ def test_multiple_redundancy_with_scale() -> None:
     assert round(estimates["gamma"], 2) == 13.69
     assert found.solution.status == "converged"
     assert found.verdict.deficiency == 0
+
+
+@pytest.mark.parametrize(
+    ("offsets", "parameters", "sigma", "coordinates"),
+    [
+        (True, {"alpha": -0.67, "beta": -141.27, "gamma": 2.82, "offset x": -14.30, "offset y": -17.58}, 16.9, REAL_FIVE),
+        (False, {"alpha": -0.81, "beta": -140.40, "gamma": 3.69}, 17.6, REAL_THREE),
+    ],
+    ids=["five parameters", "three parameters"],
+)
+def test_published_results_for_the_real_readings(
+    offsets: bool, parameters: dict[str, float], sigma: float, coordinates: np.ndarray
+) -> None:
+    """Tables 2 and A1."""
+    found = reversed_("real", "x", offsets)
+    scales = {"alpha": 1e6, "beta": 1e6, "gamma": 1e6, "offset x": 1e6 / INCH, "offset y": 1e6 / INCH}
+    assert {e.name: round(e.value * scales[e.name], 2) for e in found.estimates} == parameters
+    assert round(found.found.sigma / INCH * 1e6, 1) == sigma
+    # The program computed in single steps: the last digit may differ by one.
+    off = np.abs(found.coordinates / INCH - coordinates)
+    assert off.max() < 1.1 * DIGIT and (off > 0.5 * DIGIT).mean() < 0.35
+
+
+def test_multiple_redundancy_for_the_real_readings() -> None:
+    """Tables 2 and A1: the results of Reeve's program, whose sigma of 17.0 does not come out."""
+    found = fitted("real", "without scale")
+    estimates = values(found)
+    assert round(estimates["alpha"], 2) == -0.66
+    assert round(estimates["first: rotation z"], 1) == -141.5
+    np.testing.assert_allclose(found.plates[0].coordinates / INCH, REAL_REDUNDANT, rtol=0, atol=0.5 * DIGIT)
+    assert found.degrees_of_freedom == 22
+    # With two degrees of freedom less, as for the made-up readings.
+    assert np.sqrt(found.solution.factor.sum_of_squares / 20) == pytest.approx(16.8, abs=0.05)
 
 
 @pytest.mark.parametrize("variant", ["with scale", "without scale"])
