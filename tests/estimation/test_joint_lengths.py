@@ -174,7 +174,7 @@ def test_replicates_scatter_as_stated(standard: dict[str, Any], known: dict[str,
 
 
 def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
-    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 256)
+    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 128)
 
 
 @pytest.mark.long
