@@ -5,7 +5,6 @@ The dense reference has the full covariance of all lengths and its pseudo-invers
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -87,12 +86,10 @@ CASES: dict[str, Make] = {
 def test_every_uncertainty_is_that_of_the_full_covariance(name: str, tmp_path: Path) -> None:
     design = lay_out(CASES[name](tmp_path))
     assert compare(design, nominal_state(design), dense.planned(design, 3, 2)) == 0
-    assert len(design.length_whitening) == np.linalg.matrix_rank(dense.length_covariance(design), 1e-9 * 1e-12)
+    assert len(design.length_whitening) == np.linalg.matrix_rank(dense.length_covariance(design), 1e-21)
 
 
-@pytest.mark.parametrize(
-    "name", ["three balls, projected", "six balls, all pairs", "plate, all pairs", "some balls only"]
-)
+@pytest.mark.parametrize("name", ["three balls, projected", "six balls, all pairs", "plate, all pairs"])
 def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) -> None:
     """Uncertainties, S^2 and the Newton step, of standards whose lengths are as consistent as in reality."""
     design = lay_out(CASES[name](tmp_path))
@@ -142,8 +139,8 @@ def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -
     # Outside the range of the covariance nothing is ever observed, so that roots may differ there.
     within = covariance @ expected
     np.testing.assert_allclose(within @ twice @ within, expected, atol=1e-9 * np.abs(expected).max())
-    noise = white.whitened(np.linalg.cholesky(covariance + 1e-15 * np.eye(m)) * 1e-6)
-    np.testing.assert_allclose(noise @ noise.T, np.eye(len(white)), atol=1e-6)
+    whitened = white.whitened(white.whitened(1e-12 * covariance).T)
+    np.testing.assert_allclose(whitened, np.eye(len(white)), atol=1e-9)
 
 
 TRUE = {"true_machine": {"kind": "random", "position": "3 um", "rotation": "6 urad", "seed": 3}}
@@ -177,7 +174,7 @@ def test_replicates_scatter_as_stated(standard: dict[str, Any], known: dict[str,
 
 
 def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
-    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 256)
+    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 128)
 
 
 @pytest.mark.long
@@ -187,7 +184,8 @@ def test_many_replicates_of_a_model_that_is_not_linear(standard: dict[str, Any],
 
 
 def assert_honest(made: Experiment, count: int) -> None:
-    found = trials(made, count)
+    found = trials(made, count).outcome
+    assert found is not None
     assert found.trials == count and not found.failed
     for symbol in ("U1", "U2", "U3", "U4", "U5", "U6"):
         one = found.comparisons[symbol]
@@ -261,7 +259,7 @@ TRUE_METRIC = {"true_machine": {"kind": "coefficients", "values": {"scale x": "2
 @pytest.mark.parametrize("estimator", RIVALS)
 def test_estimators_of_distances_take_the_same_lengths(estimator: RivalName, tmp_path: Path) -> None:
     """Without a plate the lengths are all there is, and every estimator is the weighted one of the dense covariance."""
-    made = experiment(tmp_path, bar(4), GROWING, **COARSE, **TRUE_METRIC)
+    made = experiment(tmp_path, flat(3), GROWING, **COARSE, **TRUE_METRIC)
     design, x, _, _ = physical(made, np.random.default_rng(8))
     alone = without_plate(design)
     found = rival_estimate(alone, x, np.zeros((0, 2), np.int64), estimator)
@@ -292,18 +290,17 @@ def weighted(design: Design, x: Real) -> tuple[Real, Real]:
     return a, np.sqrt(np.diag(np.linalg.inv(rows.T @ inverse @ rows)))
 
 
-@pytest.mark.parametrize("name", ["consecutive", "all"])
-def test_length_equations_of_shared_balls(name: str, tmp_path: Path) -> None:
-    """Reduced to the lengths that are independent, whatever follows from others."""
-    known = ALL if name == "all" else consecutive(3)
-    made = experiment(tmp_path, bar(3, unequal=False), known, machine=MACHINE, **COARSE, **TRUE_METRIC)
+@pytest.mark.parametrize(("pairs", "lengths", "independent"), [("corner sides", 4, 4), ("all", 6, 5)])
+def test_length_equations_of_shared_balls(pairs: str, lengths: int, independent: int, tmp_path: Path) -> None:
+    """Of four balls in a plane, whose six distances are five pieces of information."""
+    known = {"pairs": pairs, "standard_uncertainty": "0.1 um"}
+    made = experiment(tmp_path, flat(2), known, machine=MACHINE, **COARSE, **TRUE_METRIC)
     design, x, _, _ = physical(made, np.random.default_rng(2))
     assert isinstance(design.model, SpatialMetricModel)
     found = length_estimate(design, x)
-    # Two independent lengths in each position, and six unknowns.
-    assert (found.equations, found.degrees_of_freedom) == (2 * len(POSES), 2 * len(POSES) - 6)
+    equations = independent * len(POSES)
+    assert (found.equations, found.degrees_of_freedom) == (equations, equations - 6)
     given = design.lengths
-    pairs, places = list(itertools.combinations(range(3), 2)), len(POSES)
     seen = x + design.probes[design.readings.probe]
     difference = seen[given.first] - seen[given.second]
     rows = np.stack([difference[:, i] * difference[:, j] for i in range(3) for j in range(3)], axis=1)
@@ -314,7 +311,7 @@ def test_length_equations_of_shared_balls(name: str, tmp_path: Path) -> None:
     for k, (first, second, along) in enumerate(zip(given.first, given.second, given.direction, strict=True)):
         for sign, end in ((2.0, first), (-2.0, second)):
             noise[k, 3 * end : 3 * end + 3] = sign * along * given.value[k]
-    assert len(given) == places * (len(pairs) if name == "all" else 2)
+    assert len(given) == lengths * len(POSES)
     inverse = np.linalg.pinv(noise @ noise.T, 1e-10, hermitian=True)
     expected = -np.linalg.solve(rows.T @ inverse @ rows, rows.T @ inverse @ off)
     np.testing.assert_allclose(found.factors, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
