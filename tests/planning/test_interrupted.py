@@ -271,7 +271,7 @@ def test_without_any_further_position_balls_may_be_unread(pool: Path, capsys: py
     assert command("plan", pool, "--done", readings, "--hours", "2", "--workers", "1") == 0
     capsys.readouterr()
     assert command("plan", pool, "--done", readings, "--hours", "0.01", "--workers", "1") == 3
-    assert "r2c2" in capsys.readouterr().err
+    assert '"plate" was begun, and no position of its other balls can be read' in capsys.readouterr().err
 
 
 def test_a_first_position_is_not_paid_for_twice_in_the_default_budget(pool: Path) -> None:
