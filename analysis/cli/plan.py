@@ -167,7 +167,7 @@ def run(options: Namespace) -> int:
         print_lines(campaign_lines(found, sheet))
     if not _written(found, sheet, options):
         return BAD_FILE
-    is_full = found.plan.verdict.deficiency == found.open_poses
+    is_full = found.plan.verdict.deficiency == found.left_open
     return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
 
 
@@ -184,7 +184,7 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         header = (
             f"Chosen by ballplate plan from {options.files[0].name}: {found.criterion}, no more than {found.budget}."
         )
-        deficiency = found.open_poses or None
+        deficiency = found.left_open or None
         text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent, None, deficiency)
         write(options.output, text, options.force)
     if options.sheet is not None:

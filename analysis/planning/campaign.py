@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -20,10 +20,10 @@ from ..study import Plan, plan
 from .bound import Bound, bound
 from .constraints import Budget, Constraints, Spent, constraints
 from .criteria import CriterionName, criterion, is_about_balls
-from .information import Information, pool_information
-from .offer import Offer, offer
+from .information import pool_information
+from .offer import Offer, offer, open_directions
 from .schedule import Completion
-from .search import Found, Losses, Problem, improve, ranked_additions, starts, value
+from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -80,8 +80,9 @@ class Campaign:
 
     `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
     order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
-    `interrupted` are all that were read in part, and `open_poses` counts the directions of their poses that stay
-    undetermined where they are left so; nothing else depends on these. `value` is infinite where the
+    `interrupted` are all that were read in part, and `left_open` counts the directions of their own poses and lengths
+    that stay undetermined where they are left so; nothing else depends on these. What has been read and is `ignored` is
+    no part of it. `value` is infinite where the
     selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
     `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
     the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
@@ -108,7 +109,8 @@ class Campaign:
     curve: tuple[CurvePoint, ...] = ()
     completed: Completion | None = None
     interrupted: tuple[Candidate, ...] = ()
-    open_poses: int = 0
+    left_open: int = 0
+    ignored: tuple[Candidate, ...] = ()
 
     @property
     def efficiency(self) -> float:
@@ -136,11 +138,11 @@ def campaign(
 ) -> Campaign:
     """Choose from the pool of an experiment.
 
-    `offered` is what may be chosen where some of it has been read already: that is kept and costs nothing more.
+    `offered` is what may be chosen where some of it has been read already: that is kept and costs nothing more, unless
+    it is of a plate that was only begun and is worth less to go on with than to leave out.
     `earlier` are the indices of an earlier choice, which the plan is compared with and never worse than within the same
     budget; without it that is the experiment's own positions. Without a budget the choice may cost what these do, less
-    what is done. The result does not depend on the number of `workers`; `report` is told what is
-    being done.
+    what is done. The result does not depend on the number of `workers`; `report` is told what is being done.
 
     :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
     :raises InternalError: the choice is better than the bound of any choice.
@@ -151,12 +153,48 @@ def campaign(
             experiment, "pool", "missing; add candidates to choose from, or see what check --suggest tells"
         )
     offered = offered or offer(pool)
+    refusal: ExperimentError | None = None
+    found, less = None, offered.without_begun(experiment)
+    try:
+        found = _campaign(experiment, pool, request, offered, earlier, workers, report)
+    except ExperimentError as error:
+        if less is offered:
+            raise
+        refusal = error
+    if less is offered:
+        assert found is not None
+        return found
+    try:
+        request = replace(request, budget=request.budget or (None if found is None else found.budget))
+        names = None if earlier is None else [offered.candidates[k].name for k in earlier]
+        other = _campaign(experiment, pool, request, less, None if names is None else less.find(names), workers, report)
+    except ExperimentError as error:
+        if found is None:
+            raise refusal or error from None
+        return found
+    if found is not None and found.value <= other.value * (1 + GAIN):
+        return found
+    kept = {one.name for one in other.done}
+    return replace(other, ignored=tuple(offered.candidates[k] for k in offered.done if offered.name(k) not in kept))
+
+
+def _campaign(
+    experiment: Experiment,
+    pool: Pool,
+    request: Request,
+    offered: Offer,
+    earlier: Collection[int] | None,
+    workers: int,
+    report: Callable[[str], None],
+) -> Campaign:
     candidates, standing = offered.candidates, offered.standing
     report(f"information of {len(candidates)} candidates")
-    information = _information(experiment, offered, is_about_balls(request.criterion))
+    whole, completed_by = offered.weighed
+    information = pool_information(experiment, whole, is_about_balls(request.criterion), completed_by)
     wanted = criterion(information, experiment, request.criterion)
     own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
     drawn = sorted(earlier or own)
+    begun = offered.begun(experiment)
     free = constraints(
         candidates,
         pool.changes,
@@ -164,7 +202,7 @@ def campaign(
         offered.must,
         _limits(experiment, pool, offered),
         offered.done,
-        offered.at_least,
+        (*offered.at_least, *begun.values()),
         None if standing is None else standing.rest,
     )
     reference = sorted({*drawn, *free.must})
@@ -177,12 +215,12 @@ def campaign(
     best, relaxed = _search(problem, drawn, request.seed, workers)
     if relaxed is not None:
         relaxed.check(request.criterion, best.value)
-    _refuse_lacking(experiment, problem, best)
+    _refuse_lacking(experiment, problem, best, begun)
     completed = None
     if standing is not None and standing.rest in best.chosen:
         completed = Completion(candidates[standing.rest], standing.whole)
-    chosen = _together(offered, best.chosen)
-    open_poses = _open_poses(offered, information, best.chosen)
+    chosen = offered.together(best.chosen)
+    left_open = open_directions(offered, information, best.chosen)
     _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
     report("gains")
@@ -204,42 +242,12 @@ def campaign(
         wanted.target,
         _gains(problem, best, candidates),
         _left_out(unlimited, best, candidates),
-        plan(replace(with_chosen(experiment, chosen), expected_rank_deficiency=open_poses or None)),
+        plan(replace(with_chosen(experiment, chosen), expected_rank_deficiency=left_open or None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         tuple(candidates[one.part] for one in offered.interrupted),
-        open_poses,
+        left_open,
     )
-
-
-def _information(experiment: Experiment, offered: Offer, all_balls: bool) -> Information:
-    """Information of what is offered; the rest of an interrupted position is weighed together with its part."""
-    candidates, completed = list(offered.candidates), {}
-    for one in offered.interrupted:
-        if one.rest is not None:
-            candidates[one.rest] = one.whole
-            completed[one.rest] = one.part
-    return pool_information(experiment, candidates, all_balls, completed)
-
-
-def _together(offered: Offer, chosen: Sequence[int]) -> list[Candidate]:
-    """Chosen candidates in order, a position that is completed as one, those left interrupted at the end."""
-    found = {k: offered.candidates[k] for k in chosen}
-    for one in offered.interrupted:
-        part = found.pop(one.part)
-        if one.rest is not None and one.rest in found:
-            del found[one.rest]
-            found[one.part] = one.whole
-        else:
-            found[len(offered.candidates) + one.part] = part
-    return [found[k] for k in sorted(found)]
-
-
-def _open_poses(offered: Offer, information: Information, chosen: Collection[int]) -> int:
-    """Parameters of the poses of interrupted positions, not completed, that their readings leave undetermined."""
-    left = [one for one in offered.interrupted if one.rest is None or one.rest not in chosen]
-    ranks = information.pose_ranks
-    return sum(max(ranks[one.again] - ranks[one.part], 0) for one in left)
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
@@ -275,8 +283,14 @@ def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget
             raise _impossible(experiment, "pool.limits.keep", text)
 
 
-def _refuse_lacking(experiment: Experiment, problem: Problem, best: Found) -> None:
+def _refuse_lacking(
+    experiment: Experiment, problem: Problem, best: Found, begun: Mapping[str, tuple[int, ...]]
+) -> None:
     """Refuse a choice without what every choice needs."""
+    for plate, others in begun.items():
+        if set(others).isdisjoint(best.chosen):
+            text = f'"{plate}" was begun, and no position of its other balls can be read with'
+            raise _impossible(experiment, "pool", f"{text} {problem.constraints.budget}; allow more")
     for members in problem.constraints.at_least:
         if set(members).isdisjoint(best.chosen):
             name = problem.information.candidates[members[0]].name

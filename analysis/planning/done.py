@@ -25,6 +25,8 @@ from simulator.settings import hint
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
+# How what completes a position, and what sets it up again, is named.
+REST = "rest of "
 AGAIN = re.compile(r"(.*) again(?: ([1-9][0-9]*))?", re.DOTALL)
 
 # How often a ball is read with a probe, by ball and probe.
@@ -166,7 +168,7 @@ def _set_up(
     rest = _with_readings(candidate, missing)
     probes = {probe for group in missing for probe in group.probes}
     seconds = rest.readings * candidate.reading_seconds + (len(probes) - 1) * experiment.pool.changes.probe
-    rest = replace(rest, name=f"rest of {candidate.name}", seconds=seconds, drawn=False)
+    rest = replace(rest, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
     return SetUp(base, read, whole, rest, is_last)
 
 

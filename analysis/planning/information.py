@@ -82,7 +82,8 @@ class Information:
     `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z) what each adds.
     `deficiency` counts shared directions (c, deficiency), `open_` in micrometres, that even all candidates together
     leave undetermined. `frames` (candidates that calibrate co-ordinates) hold what each fixes of its plate's frame.
-    `pose_ranks` tells how many parameters of its own pose each candidate determines, were all else known.
+    `pose_ranks` tells how many parameters of its own pose each candidate determines, were all else known, and
+    `has_rows` whether it observes anything.
     """
 
     drawn: Drawn
@@ -93,6 +94,7 @@ class Information:
     open_: Array
     frames: Frames
     pose_ranks: tuple[int, ...] = ()
+    has_rows: tuple[bool, ...] = ()
 
     @property
     def deficiency(self) -> int:
@@ -230,10 +232,11 @@ def pool_information(
     for whole, part in (completed or {}).items():
         matrices[whole] -= matrices[part]
     transformed = in_basis(base)
-    unplaced = _unplaced(drawn, candidates, basis, all_balls)
+    has_rows = tuple(len(rows) > 0 for rows in own)
+    unplaced = _unplaced(drawn, candidates, basis, all_balls, has_rows)
     frames = replace(_frames(drawn, even_known, even_items, basis), artefacts=unplaced)
     own_base = transformed.T @ transformed
-    return Information(drawn, tuple(candidates), basis, own_base, matrices, open_, frames, tuple(pose_ranks))
+    return Information(drawn, tuple(candidates), basis, own_base, matrices, open_, frames, tuple(pose_ranks), has_rows)
 
 
 def _in_amounts(rows: Rows, balls: Array) -> Array:
@@ -449,7 +452,7 @@ def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:
 
 
 def _unplaced(
-    drawn: Drawn, candidates: Sequence[Candidate], basis: Basis, all_balls: bool
+    drawn: Drawn, candidates: Sequence[Candidate], basis: Basis, all_balls: bool, has_rows: Sequence[bool]
 ) -> tuple[tuple[frozenset[int], Array], ...]:
     """For each artefact, which candidates place it, and what holds the parameters that are its own."""
     design, found = drawn.design, []
@@ -457,7 +460,8 @@ def _unplaced(
     for number, name in enumerate(design.artefact_names):
         if all_balls and design.is_plate[number] and _placing(candidates, name):
             continue
-        placing = frozenset(_placing(candidates, name))
+        # A standard of which no length has been read is not there.
+        placing = frozenset(k for k in _placing(candidates, name) if has_rows[k])
         own = np.flatnonzero(design.ball_artefact == number)
         by_ball = basis.balls[own].reshape(len(own) * d, -1)
         # Of balls that no combination moves there is nothing to hold, and rounding must not be taken for it.

@@ -6,12 +6,14 @@ its set-up is paid again nor what has been read; and to be set up anew in full. 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from simulator.experiment.model import Experiment, Position
 from simulator.experiment.pool import AtMost, Candidate, Pool
 
-from .done import SetUp, next_name, renamed
+from .done import REST, SetUp, base_name, next_name, renamed
+from .information import Information
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,70 @@ class Offer:
     at_least: tuple[tuple[int, ...], ...]
     interrupted: tuple[Interrupted, ...]
     replaced: dict[int, tuple[int, ...]]
+    pool: Pool
+    taken: tuple[SetUp, ...]
+    is_standing: bool
 
     @property
     def standing(self) -> Interrupted | None:
         """The interrupted position that may be completed."""
         return next((one for one in self.interrupted if one.rest is not None), None)
+
+    @property
+    def weighed(self) -> tuple[list[Candidate], dict[int, int]]:
+        """Candidates as they are weighed: what completes another with all its readings, and which that is."""
+        candidates, completed = list(self.candidates), {}
+        for one in self.interrupted:
+            if one.rest is not None:
+                candidates[one.rest] = one.whole
+                completed[one.rest] = one.part
+        return candidates, completed
+
+    def together(self, chosen: Sequence[int]) -> list[Candidate]:
+        """Chosen candidates in order, a position that is completed as one, those left interrupted at the end."""
+        found = {k: self.candidates[k] for k in chosen}
+        for one in self.interrupted:
+            part = found.pop(one.part)
+            if one.rest is not None and one.rest in found:
+                del found[one.rest]
+                found[one.part] = one.whole
+            else:
+                found[len(self.candidates) + one.part] = part
+        return [found[k] for k in sorted(found)]
+
+    def begun(self, experiment: Experiment) -> dict[str, tuple[int, ...]]:
+        """Plates of which some balls alone have been read, and the candidates that read all the others."""
+        balls: dict[str, set[int]] = {}
+        for k in self.done:
+            balls.setdefault(self.candidates[k].item.artefact, set()).update(_balls(self.candidates[k]))
+        found = {}
+        for name in dict.fromkeys(self.candidates[one.part].item.artefact for one in self.interrupted):
+            unread = set(range(len(experiment.layouts[name].names))) - balls[name]
+            if unread and experiment.artefacts[name].role == "plate":
+                found[name] = tuple(
+                    k
+                    for k, one in enumerate(self.candidates)
+                    if k not in self.done and one.item.artefact == name and unread <= _balls(one)
+                )
+        return found
+
+    def without_begun(self, experiment: Experiment) -> Offer:
+        """The offer as if nothing had been read in part of plates that were only begun."""
+        plates = self.begun(experiment)
+        if not plates:
+            return self
+        left = [one for one in self.taken if one.rest is None or one.read.item.artefact not in plates]
+        return offer(self.pool, left, self.is_standing)
+
+    def find(self, names: Sequence[str]) -> list[int]:
+        """Candidates by name, or those of the pool that they go back to."""
+        index = {one.name: k for k, one in enumerate(self.candidates)}
+        bases = [index.get(name, index.get(base_name(name.removeprefix(REST)))) for name in names]
+        return sorted({k for k in bases if k is not None})
+
+    def name(self, k: int) -> str:
+        """Name of a candidate."""
+        return self.candidates[k].name
 
     def now(self, k: int) -> int:
         """The candidate that stands for one of the pool."""
@@ -101,6 +162,33 @@ def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Off
         tuple(one for one in left if len(one) > 1),
         tuple(interrupted),
         replaced,
+        pool,
+        tuple(taken),
+        standing,
+    )
+
+
+def open_directions(offered: Offer, information: Information, chosen: Collection[int]) -> int:
+    """What interrupted positions that are not completed leave undetermined of their own poses and lengths.
+
+    These are parameters that nothing else depends on: of a pose that too few balls were read in, and the unknown length
+    of a standard of which no length was read.
+    """
+    left = [one for one in offered.interrupted if one.rest is None or one.rest not in chosen]
+    ranks, design = information.pose_ranks, information.drawn.design
+    poses = sum(max(ranks[one.again] - ranks[one.part], 0) for one in left)
+    placed = {offered.candidates[one.part].item.artefact for one in left}
+    told = {offered.candidates[k].item.artefact for k in chosen if information.has_rows[k]}
+    lengths = [length.rpartition(": ")[0] for length in design.length_names]
+    return poses + sum(name in placed - told for name in lengths)
+
+
+def _balls(candidate: Candidate) -> set[int]:
+    item = candidate.item
+    return (
+        {ball for group in item.readings for ball in group.ball_indices.tolist()}
+        if isinstance(item, Position)
+        else set()
     )
 
 

@@ -55,9 +55,14 @@ def _interrupted(found: Campaign) -> list[str]:
         else:
             text += "; it is left so"
         lines.append(text)
-    if found.open_poses:
-        count = "one direction" if found.open_poses == 1 else f"{found.open_poses} directions"
+    if found.left_open:
+        count = "one direction" if found.left_open == 1 else f"{found.left_open} directions"
         lines.append(f"too little was read there to determine {count} of where it stood; nothing else depends on that")
+    for one in found.ignored:
+        lines.append(
+            f"{one.name} is left out: nothing else worth its time reads the other balls of {one.item.artefact}; "
+            "take its readings out of the file"
+        )
     return lines
 
 
@@ -136,7 +141,8 @@ def campaign_data(found: Campaign, sheet: RunSheet) -> dict[str, Any]:
         "done": [candidate.name for candidate in found.done],
         "interrupted": [{"name": one.name, "readings": one.readings} for one in found.interrupted],
         "completed": None if found.completed is None else found.completed.whole.name,
-        "open_poses": found.open_poses,
+        "left_open": found.left_open,
+        "ignored": [candidate.name for candidate in found.ignored],
         "gains": [_gain_data(gain) for gain in found.gains],
         "left_out": [_gain_data(gain) for gain in found.left_out],
         "curve": [_point_data(point) for point in found.curve],

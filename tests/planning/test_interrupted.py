@@ -208,7 +208,7 @@ def test_a_position_set_up_again_may_be_interrupted_again(pool: Path, capsys: py
     assert command(*plan_on, "--done", readings, "-o", rest) == 0
     found = json.loads(capsys.readouterr().out)
     # Two balls tell nothing of a turn about their line, and what has to be chosen is not done with them.
-    assert found["open_poses"] == 1 and {"low", "low again"} <= set(found["chosen"])
+    assert found["left_open"] == 1 and {"low", "low again"} <= set(found["chosen"])
     assert found["chosen"][-1] == "low"
     assert load(rest)[0].expected_rank_deficiency == 1 and command("check", rest) == 0
     assert command("simulate", rest, "-o", data) == 0
@@ -271,7 +271,7 @@ def test_without_any_further_position_balls_may_be_unread(pool: Path, capsys: py
     assert command("plan", pool, "--done", readings, "--hours", "2", "--workers", "1") == 0
     capsys.readouterr()
     assert command("plan", pool, "--done", readings, "--hours", "0.01", "--workers", "1") == 3
-    assert "r2c2" in capsys.readouterr().err
+    assert '"plate" was begun, and no position of its other balls can be read' in capsys.readouterr().err
 
 
 def test_a_first_position_is_not_paid_for_twice_in_the_default_budget(pool: Path) -> None:
@@ -295,3 +295,52 @@ positions:
     whole: Experiment = load(pool)[0]
     assert found.drawn == pytest.approx(plan(whole).quantities["U6"].average, rel=1e-9)
     assert found.value <= found.drawn  # type: ignore[operator]
+
+
+SECOND = """
+    - {name: small low, artefact: small, plane: z, level: 20 mm, corner: {x: 400 mm, y: 20 mm}, probes: [down]}
+    - {name: small high, artefact: small, plane: z, level: 380 mm, corner: {x: 20 mm, y: 300 mm}, probes: [down]}
+"""
+
+
+@pytest.mark.parametrize("minutes", [5, 12, 31, 70])
+def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
+    pool: Path, minutes: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No experiment may hold a plate with unread balls; its readings are left out if they are not worth the rest."""
+    small = "size: [300 mm, 200 mm]}, small: {kind: square, balls: 2, size: 100 mm}}"
+    text = TEXT.replace("size: [300 mm, 200 mm]}}", small).replace(
+        "probes: [down]}", "probes: [down], artefact: plate}"
+    )
+    text = text.replace("repeats: 2}", "repeats: 2, artefact: plate}").replace(
+        "down]}\n    - {name: f", "down], artefact: plate}\n    - {name: f"
+    )
+    text = text.replace("probes: [right]}", "probes: [right], artefact: plate}").replace(
+        "{kind: distances", "{artefact: plate, kind: distances"
+    )
+    pool.write_text(text.rstrip("\n") + SECOND)
+    readings = readings_of(pool, ["side", "low", "small low"], 2)
+    (experiment,) = load(pool, planning=True)
+    assert experiment.pool is not None
+    budget = Budget(seconds=60.0 * minutes)
+    taken = done_candidates(readings, experiment)
+    found = {
+        standing: campaign(experiment, Request("U6", budget), offer(experiment.pool, taken, standing))
+        for standing in (True, False)
+    }
+    less = campaign(experiment, Request("U6", budget), offer(experiment.pool, taken[:2]))
+    for one in found.values():
+        assert one.value <= less.value * (1 + 1e-9)
+        full = plan(with_chosen(experiment, one.chosen))
+        assert one.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
+        assert [left.name for left in one.ignored] == ([] if "small low" in names_of(one) else ["small low"])
+    assert found[True].value <= found[False].value * (1 + 1e-9)
+    # Two readings of a minute complete it where it stands, which is all that a few minutes are good for; ten minutes
+    # more are needed if it does not.
+    assert not found[True].ignored or minutes > 14
+    assert bool(found[False].ignored) or minutes > 14
+    capsys.readouterr()
+    status = command("plan", pool, "--done", readings, "--hours", minutes / 60, "--moved", "--workers", "1")
+    assert status == 0
+    told = capsys.readouterr().out
+    assert ("small low is left out: nothing else worth its time" in told) == bool(found[False].ignored)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.planning.campaign import Campaign
+from analysis.planning.campaign import TINY_POOL, Campaign
 from analysis.planning.constraints import Spent
 from analysis.planning.criteria import CriterionName
 from analysis.planning.experiment_file import experiment_text
@@ -64,7 +64,7 @@ def written(found: Campaign, folder: Path) -> Experiment:
     """The choice as `plan -o` writes it, read again."""
     path = folder / "chosen.yaml"
     path.write_text(
-        experiment_text(found.experiment, sheet_of(found).chosen, "", folder, None, found.open_poses or None)
+        experiment_text(found.experiment, sheet_of(found).chosen, "", folder, None, found.left_open or None)
     )
     return load(path)[0]
 
@@ -119,7 +119,7 @@ def check_choice(pool: RandomPool, folder: Path) -> bool:
         assert by_run(experiment, pool.criterion) == pytest.approx(found.value, rel=1e-9)
     if not taken and len(found.pool.candidates) <= FEW and not found.excluded:
         assert best_of_all(pool) == pytest.approx(found.value, rel=1e-9)
-    if pool.readings is not None:
+    if pool.readings is not None and not found.ignored:
         # What has been read is part of what the file plans, and with the rest of it nothing is missing.
         design = lay_out(experiment)
         with pool.readings.open(newline="", encoding="utf-8") as stream:
@@ -136,13 +136,18 @@ def check_choice(pool: RandomPool, folder: Path) -> bool:
 
 
 def check_more_data(pool: RandomPool) -> bool:
-    """Whether there is an interrupted position, with whose readings the plan has to be no worse than without."""
+    """Whether there is an interrupted position, with whose readings the plan has to be no worse than without.
+
+    A better direction makes the condition worse, and larger pools are searched, not tried out.
+    """
+    if pool.criterion == "condition":
+        return False
     try:
         taken = pool.taken
         less = pool.planned(tuple(one for one in taken if one.rest is None))
     except ExperimentError:
         return False
-    if all(one.rest is None for one in taken):
+    if all(one.rest is None for one in taken) or len(less.pool.candidates) > TINY_POOL:
         return False
     more = pool.planned(taken)
     assert more.value <= less.value * (1 + 1e-9)
