@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,12 @@ import numpy as np
 
 from simulator.design import Design
 from simulator.estimation.length_equations import LengthEstimator, LengthSolution, NotAMetricError, length_estimate
+from simulator.estimation.spheres import FLAT, fit_sphere
 from simulator.experiment.load import place_in
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
 from simulator.geometry.artefacts import TwoSpheresSettings
+from simulator.machines.protocol import Array
 from simulator.machines.spatial_metric import SpatialMetricModel
 from simulator.readings import ObservedReadings
 
@@ -26,7 +29,8 @@ FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 class LengthFit:
     """Length equations solved for an experiment's readings; `pivots` have the names of the gauges' positions.
 
-    `factors`, `pivots` and `lengths` are NaN where they are open.
+    `factors`, `pivots` and `lengths` are NaN where they are open. `spheres` are the radii of spheres through each
+    position's readings of a gauge, a length in scale readings that is told even where no length is known.
     `remarks` tell what should be known beside the figures.
     """
 
@@ -38,6 +42,7 @@ class LengthFit:
     pivots: tuple[tuple[str, tuple[float, float, float]], ...]
     lengths: tuple[tuple[str, float], ...]
     remarks: tuple[str, ...]
+    spheres: tuple[tuple[str, float], ...] = ()
 
 
 def has_all_errors(design: Design) -> bool:
@@ -101,7 +106,18 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
         tuple((design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions),
         tuple(zip(design.length_names, lengths.tolist(), strict=True)),
         tuple(remarks),
+        tuple(_spheres(design, observed.x)),
     )
+
+
+def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
+    """Positions of gauges with the radius (m) of the sphere through their readings x (m, d), where they fix one."""
+    for k in design.gauge_positions:
+        rows = design.readings.position == k
+        points = x[rows] + design.probes[design.readings.probe[rows]]
+        extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if len(points) > design.dimension and extent[-1] > FLAT * extent[0]:
+            yield design.position_names[k], fit_sphere(points, design.origins[k])[1]
 
 
 def length_fit_lines(fit: LengthFit) -> list[str]:
@@ -120,6 +136,8 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(fit.adjustments)]
     where = [f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm" for name, centre in fit.pivots]
     lines += [f"pivots: {'; '.join(where)}, in scale readings"] if where else []
+    radii = [f"{name} {_millimetres(radius, 5)} mm" for name, radius in fit.spheres]
+    lines += [f"radii of the spheres through the readings: {'; '.join(radii)}, in scale readings"] if radii else []
     return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
 
 
@@ -141,6 +159,7 @@ def length_fit_data(fit: LengthFit) -> dict[str, Any]:
         "factors": {name: finite(value) for name, value in zip(FACTORS, fit.factors, strict=True)},
         "adjustments": adjustment_data(fit.adjustments),
         "pivots": {name: [finite(value) for value in centre] for name, centre in fit.pivots},
+        "spheres": dict(fit.spheres),
         "lengths": {name: finite(value) for name, value in fit.lengths},
         "remarks": list(fit.remarks),
     }

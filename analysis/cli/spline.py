@@ -105,6 +105,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.set_defaults(run=run)
 
 
+# A polynomial through so many points keeps seven digits; with each further order it loses nearly one.
+MOST_ORDER = 16
+
 POWERS = "polynomials in the distance from the start of each piece (default), or in the abscissa itself"
 
 
@@ -216,8 +219,8 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
     knots = None
     if options.knots is not None:
         knots = () if options.knots.strip() == "none" else tuple(sorted(_list("--knots", options.knots, x)))
-    if not 2 <= options.order <= 12:
-        raise OptionError("--order should be 2 to 12; 4 is a cubic spline")
+    if not 2 <= options.order <= MOST_ORDER:
+        raise OptionError(f"--order should be 2 to {MOST_ORDER}; 4 is a cubic spline")
     period = None
     if options.period is not None:
         period = _positive(options.period, x, "--period")

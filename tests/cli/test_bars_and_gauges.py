@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from analysis.cli import main
 from analysis.sweeps.fingerprint import fingerprint
 from simulator.experiment.load import load
+from simulator.layout import lay_out
 
 FOLDER = Path("designs/hurt_foss")
 BARS, GAUGE = str(FOLDER / "bar-bell.yaml"), str(FOLDER / "bryan-gauge.yaml")
@@ -227,6 +229,28 @@ def test_a_wrong_reading_of_a_gauge_stands_first_among_residuals(
     assert "warning: S^2 is" in err
     first = out.split("largest residuals")[1].splitlines()[1].split()
     assert first[:4] == ["pivot", "17", "magnet", "radius"]
+
+
+@pytest.mark.parametrize("estimator", ["length-equations", "sphere-then-metric"])
+def test_the_radius_in_scale_readings_is_told_where_the_scale_is_open(
+    estimator: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The sphere of least distances, by another library's solver; the radius itself stays open."""
+    arguments = ["fit", GAUGE, KNOWN[1], "--variant", "radius unknown", "--estimator", estimator]
+    rows = np.loadtxt(KNOWN[1], delimiter=",", skiprows=1, usecols=(3, 4, 5)) * 1e-3
+    points = rows + lay_out(load(Path(GAUGE))[0]).probes[0]
+
+    def off(unknown: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(points - unknown[:3], axis=1) - unknown[3]
+
+    start = np.array([*points.mean(axis=0), 0.3])
+    radius = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15).x[3]
+    found = json_of(capsys, *arguments)
+    # Squares are minimised here, distances there: a difference of the misfit's square over the radius.
+    assert found["spheres"]["pivot"] == pytest.approx(radius, abs=2e-8)
+    assert found["lengths"] == {"gauge: radius": None}
+    main(arguments)
+    assert f"readings: pivot {1e3 * found['spheres']['pivot']:.5f} mm, in scale readings" in capsys.readouterr().out
 
 
 def test_simulate_run_trials_and_fit_go_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

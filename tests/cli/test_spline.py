@@ -7,6 +7,7 @@ import json
 import math
 from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -195,7 +196,7 @@ def test_drawings(tmp_path: Path) -> None:
         (("--start-value", "1 urad"), "--start-value:"),
         (("--at", "3 mm", "bend", "0"), '--at: "bend" should be value or slope'),
         (("--start", "end"), "the curve starts at its start"),
-        (("--order", "1"), "--order should be 2 to 12"),
+        (("--order", "1"), "--order should be 2 to 16"),
         (("--periodic",), "--periodic: the abscissa is a length; state the period"),
         (("--period", "-1 mm"), '--period: "-1 mm" must be above zero'),
         (("--boundary", "1 mm, 2 mm, 3 mm"), "should be one abscissa, or two nominal co-ordinates"),
@@ -290,3 +291,35 @@ def test_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert leave.value.code == 0
     out = capsys.readouterr().out
     assert "--start-slope SLOPE" in out and "--whiskers FILE" in out
+
+
+@pytest.mark.parametrize("order", [4, 13, 16])
+def test_a_polynomial_through_as_many_points_as_its_order(
+    order: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Lagrange's form in fifty digits, between the points and by the polynomial that is written."""
+    positions = [20 + 60 * k for k in range(order)]
+    errors = np.random.default_rng(order).normal(0, 3, order).round(2).tolist()
+    path = tmp_path / "curve.csv"
+    rows = "".join(f"{x},{y}\n" for x, y in zip(positions, errors, strict=True))
+    path.write_text(f"position_mm,error_um\n{rows}", encoding="utf-8")
+    places = [20, 35, 50, 333, positions[-1] - 25]
+    at = ", ".join(f"{x} mm" for x in places if x <= positions[-1])
+    assert run(path, "--order", order, "--knots", "none", "--evaluate", at, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    with mpmath.workdps(50):
+
+        def exact(at: int) -> float:
+            terms = []
+            for k, x in enumerate(positions):
+                others = [mpmath.mpf(at - other) / (x - other) for other in positions if other != x]
+                terms.append(mpmath.mpf(str(errors[k])) * mpmath.fprod(others))
+            return float(mpmath.fsum(terms)) * 1e-6
+
+        expected = [exact(x) for x in places if x <= positions[-1]]
+    (piece,) = found["pieces"]
+    size = max(map(abs, expected))
+    for told, true in zip(found["values"], expected, strict=True):
+        assert abs(told["curve"] - true) < 1e-6 * size
+        by_piece = np.polynomial.polynomial.polyval(told["x"] - piece["start"], piece["coefficients"])
+        assert abs(by_piece - true) < 1e-6 * size
