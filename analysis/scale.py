@@ -103,7 +103,7 @@ def scale_of(
 
 
 OWN_SCALES = "the machine's own scales, which the error model cannot change all alike"
-EXACT_OFFSETS = "the exact probe offsets"
+EXACT_OFFSETS = "exact probe offsets"
 
 
 def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
@@ -112,14 +112,14 @@ def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
     sets = [[name] for name in names] if len(names) <= MOST_ARTEFACTS else [names]
     for some in sets:
         rest = tuple(item for item in experiment.calibration if item.artefact not in some)
-        yield f"the certificates of {listing(some, 3)}", replace(experiment, calibration=rest)
+        yield f"certificates of {listing(some, 3)}", replace(experiment, calibration=rest)
     if experiment.priors:
-        yield "the priors", replace(experiment, priors=())
+        yield "priors", replace(experiment, priors=())
     unknown = np.full(experiment.dimension, np.inf)
     stated = {name: u for name, u in experiment.offset_uncertainties.items() if np.isfinite(u).any()}
     if stated:
         freed = {**experiment.offset_uncertainties, **dict.fromkeys(stated, unknown)}
-        yield "the probe offsets with a standard uncertainty", replace(experiment, offset_uncertainties=freed)
+        yield "probe offsets with a standard uncertainty", replace(experiment, offset_uncertainties=freed)
     if exact_offsets(experiment):
         yield EXACT_OFFSETS, with_offsets(experiment, np.inf)
 

@@ -127,6 +127,8 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
         )
         told.add(name)
     lines = aligned(rows, [False, False, True, True, False, False, False])
+    places = list(dict.fromkeys(place for quantity in quantities.values() for place in quantity.places))
+    lines += [f"({', '.join(places)})"] if places else []
     for quantity in quantities.values():
         if quantity.within_target is not None:
             by = uncertainty_words(quantity.coverage_factor)
@@ -232,7 +234,7 @@ def scale_lines(found: Scale | None) -> list[str]:
             continue
         without = "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
         told.append(f"{one.words} ({without} without)")
-    lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm, from {' and '.join(told)}"]
+    lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm from {' and '.join(told)}"]
     if not found.rests_on_offsets:
         return lines
     warning = "warning: the scale rests on probe offsets that are held exact"
@@ -490,6 +492,7 @@ def _quantity_data(q: Quantity) -> dict[str, Any]:
         "count": q.count,
         "undetermined": q.undetermined,
         "largest_at": q.largest,
+        **({"largest_places": list(q.places)} if q.places else {}),
         **compared,
         "description": q.description,
     }

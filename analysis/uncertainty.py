@@ -43,7 +43,8 @@ class Quantity:
     `count` of them there are, `undetermined` of which the observations leave open; the maximum and the
     average are NaN when nothing is left, and `largest` then is empty, otherwise it names where the maximum stands.
     `within_target` is the share of distances whose uncertainty, `coverage_factor` times the standard one, is within the
-    target accuracy, those undetermined counted as not; None where no target is compared with.
+    target accuracy, those undetermined counted as not; None where no target is compared with. `places` tell where in
+    the volume the evaluation points are that `largest` names.
     """
 
     symbol: str
@@ -55,6 +56,7 @@ class Quantity:
     largest: str = ""
     within_target: float | None = None
     coverage_factor: float = 1.0
+    places: tuple[str, ...] = ()
 
     @property
     def description(self) -> str:
@@ -120,8 +122,11 @@ def uncertainties(
 
     if len(design.points):
         of_points, lengths = _of_points(design, layout, state, found, sigma, target)
-        point_names = [f"{axis} of {_point(design, i)}" for i in range(len(design.points)) for axis in axes]
+        point_names = [f"point {i + 1} {axis}" for i in range(len(design.points)) for axis in axes]
         add("U4", of_points.ravel(), "m", point_names)
+        if (top := result["U4"].largest) != "":
+            i = point_names.index(top) // len(axes)
+            result["U4"] = replace(result["U4"], places=(_point(design, i),))
         if lengths is not None:
             result["U6"] = lengths
     tasks = task_uncertainties(design, layout, state, found, sigma)
@@ -151,14 +156,16 @@ def _of_points(
     if not pairs.count:
         return of_points, None
     share = None if target is None else pairs.within / pairs.count
-    lengths = _of_pairs("U6", pairs, sigma, lambda i: _point(design, i), share)
+    lengths = _of_pairs("U6", pairs, sigma, lambda i: f"point {i + 1}", share)
+    if lengths.largest:
+        lengths = replace(lengths, places=tuple(_point(design, i) for i in pairs.where))
     return of_points, lengths if target is None else replace(lengths, coverage_factor=target.coverage_factor)
 
 
 def _point(design: Design, i: int) -> str:
     """An evaluation point by its number from 1, as in the file, and its place."""
     place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in design.points[i])
-    return f"point {i + 1} ({place}) mm"
+    return f"point {i + 1} at ({place}) mm"
 
 
 def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> Quantity:

@@ -83,7 +83,7 @@ def _comparison(found: Campaign) -> list[str]:
         words = found.drawn_words + ("" if found.drawn_is_within else " (more than allowed)")
         rows.append([words, *_value(found, found.drawn), *_spent(found.drawn_spent)])
     if found.target is not None:
-        rows.append(["target", *_value(found, found.target), "", "", ""])
+        rows.append(["target (of u)", *_value(found, found.target), "", "", ""])
     return aligned(rows, [False, True, False, True, True, True])
 
 

@@ -144,7 +144,7 @@ def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_p
     assert found is not None and not found.rests_on_offsets and found.loosened is None
     told = {one.words: one.without for one in found.carriers}
     bare = experiment_of(tmp_path, without_certificate(QUICKSTART))
-    assert told["the certificates of plate"] == pytest.approx(scale_uncertainty(bare))
+    assert told["certificates of plate"] == pytest.approx(scale_uncertainty(bare))
     assert told[EXACT_OFFSETS] == pytest.approx(scale_uncertainty(with_offsets(certified, np.inf)))
     # Two independent sources: the variances of what each alone says add up as their inverses.
     both = sum(without**-2 for without in told.values() if without is not None) ** -0.5
@@ -154,7 +154,7 @@ def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_p
 def test_one_probe_leaves_nothing_but_the_certificate(tmp_path: Path) -> None:
     found = check(experiment_of(tmp_path, ONE_PROBE), with_scale=True)
     assert found.verdict.deficiency == 0 and found.scale is not None
-    assert [one.words for one in found.scale.carriers] == ["the certificates of plate"]
+    assert [one.words for one in found.scale.carriers] == ["certificates of plate"]
     bare = ONE_PROBE[: ONE_PROBE.index("calibration:")] + ONE_PROBE[ONE_PROBE.index("evaluation:") :]
     open_ = check(experiment_of(tmp_path, bare), with_scale=True)
     assert open_.verdict.deficiency and open_.scale is None
@@ -169,10 +169,10 @@ def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
         stated = stated.replace(line, f"  {name}: {{offset: {offset}, standard_uncertainty: 1 um}}")
     found = check(experiment_of(tmp_path, stated), with_scale=True).scale
     assert found is not None and not found.rests_on_offsets
-    assert [one.words for one in found.carriers] == ["the probe offsets with a standard uncertainty"]
+    assert [one.words for one in found.carriers] == ["probe offsets with a standard uncertainty"]
     prior = stated + "\npriors:\n  - {parameter: EXX t^1, value: 0 um, standard_uncertainty: 0.1 um}\n"
     both = check(experiment_of(tmp_path, prior), with_scale=True).scale
-    assert both is not None and both.carriers[0].words == "the priors"
+    assert both is not None and both.carriers[0].words == "priors"
     assert both.uncertainty < found.uncertainty
 
 

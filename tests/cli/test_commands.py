@@ -78,6 +78,14 @@ def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", QUICKSTART) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines if line[:1] == "U"] == list(SYMBOLS)
+    # Lengths and angles have rows of their own, and points their place.
+    assert not any("um, urad" in line for line in lines)
+    points = lay_out(load(QUICKSTART)[0]).points
+    places = dict(re.findall(r"(point [0-9]+) at \(([0-9., ]+)\) mm", "\n".join(lines)))
+    named = re.findall(r"point [0-9]+", "\n".join(line for line in lines if line[:2] in ("U4", "U6")))
+    assert len(named) == 3 and set(places) == set(named)
+    for name, place in places.items():
+        assert [float(one) for one in place.split(", ")] == (1e3 * points[int(name[6:]) - 1]).round(1).tolist()
     assert max(map(len, lines)) <= 120
 
 

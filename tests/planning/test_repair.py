@@ -332,6 +332,13 @@ def test_the_cheapest_of_a_pool() -> None:
     assert from_pool(experiment, pool) == ['add "turned" of the pool (1.5 h)']
 
 
+def test_what_costs_nothing_is_told_before_what_the_pool_has_a_price_for() -> None:
+    experiment = design("npl/6.1.1", "B")
+    found = repairs(replace(experiment, pool=pool_of(experiment, [60.0, 5400.0, 1800.0])), most=2)
+    assert found is not None and not any(one.weak or one.is_faint for one in found.complete)
+    assert [[change.kind for change in one.changes] for one in found.complete] == [[Kind.MOVE], [Kind.POOL]]
+
+
 def test_a_pool_of_a_file(tmp_path: Path) -> None:
     """Two positions left of a day's plan; of its pool also the bar, which nothing else places."""
     said = plain(Path("designs/planning/campaign.yaml"), None)
