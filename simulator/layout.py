@@ -13,6 +13,7 @@ from .geometry.artefacts import BryanGaugeSettings
 from .lengths import standard_lengths
 from .machines.protocol import Array
 from .machines.settings import build_error_model
+from .rounding import comparable
 
 # Evaluation points of an experiment that names none.
 DEFAULT_POINTS = 200
@@ -284,7 +285,7 @@ def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray
     left = motions.copy()
     for k in range(motions.shape[1]):
         size = np.where(chosen, -1.0, (left**2).sum(axis=1))
-        row = waiting[k] if k < len(waiting) else int(size.argmax())
+        row = waiting[k] if k < len(waiting) else int(comparable(size).argmax())
         if size[row] <= FLAT:
             break
         chosen[row] = True

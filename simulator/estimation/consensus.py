@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array
+from ..rounding import comparable
 
 # Subsets tried, and the points that each is judged by. With a third of the points wrong, three right ones are
 # drawn together more than once in four draws.
@@ -32,7 +33,7 @@ def consensus_motion(source: Array, target: Array, reach: Array) -> tuple[Array,
     moved = np.einsum("cij,mj->cmi", rotations, source[judges]) + origins[:, None]
     apart = np.sqrt(((moved - target[judges]) ** 2).sum(axis=2)) / reach[judges]
     # Of motions that as many points agree with, the one they agree with best.
-    best = int(np.argmin(np.minimum(apart, 1.0).sum(axis=1)))
+    best = int(np.argmin(comparable(np.minimum(apart, 1.0).sum(axis=1))))
     rotation, origin = rotations[best], origins[best]
     agreeing = distances(source, target, rotation, origin) < reach
     for _ in range(20):

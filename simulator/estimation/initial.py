@@ -12,6 +12,7 @@ import numpy as np
 from ..design import Design, Integers, State
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array
+from ..rounding import comparable
 from .spheres import fit_sphere
 
 # Points whose spread across their main line is below this fraction of their length do not fix a pose.
@@ -94,7 +95,7 @@ def _assemble(seen: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Ar
     waiting = [k for k in range(len(seen)) if k != first]
     while waiting:
         shared = [present[k] & ~np.isnan(shape[:, 0]) for k in waiting]
-        choice = int(np.argmax([_strength(shape[s], d) for s in shared]))
+        choice = int(np.argmax(comparable([_strength(shape[s], d) for s in shared])))
         k, common = waiting.pop(choice), shared[choice]
         if _strength(shape[common], d) > 0:
             rotation, origin = fit_motion(shape[common], seen[k, common])
