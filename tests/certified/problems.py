@@ -255,7 +255,9 @@ def unknown_offsets() -> Problem:
     add_plate(given, "plate", grid(3, 3, 0.6, 0.6))
     for k, (name, plane, level, corner, turns) in enumerate(SIX):
         tips = TIPS[plane] if plane == "z" else (*TIPS[plane], "down")
-        add_plate_position(given, name, plane, level, corner, turns, tips, [2e-7] * 3, free=k > 0)
+        # Within the volume, whatever the offsets are found to be.
+        within = tuple(round(0.1 + 0.5 * c, 9) for c in corner)
+        add_plate_position(given, name, plane, level, within, turns, tips, [2e-7] * 3, free=k > 0)
     add_distances(given, SIDES_OF_THREE, 2e-7)
     add_points(given, SPREAD)
     return given
