@@ -114,7 +114,7 @@ def test_balls_and_size_are_the_smallest_of_all_that_do(tmp_path: Path) -> None:
     for size, does in ((edge, True), (edge - 1, False)):
         value = average(tmp_path, ("[750 mm, 750 mm]", f"[{size} mm, {size} mm]"))
         assert (value <= 1.2 * by_number[4]) is does
-    assert found.remarks[0].startswith("from 751 mm x 751 mm on the file is wrong: positions[1]: ball")
+    assert found.remarks[0].startswith("from 751 mm x 751 mm on the file is wrong: positions[1]: reading ball")
 
 
 def test_sides_and_axes_keep_their_ratio_and_are_rounded_to_the_safe_side(tmp_path: Path) -> None:
