@@ -10,12 +10,10 @@ from .design import Design
 from .estimation.length_ratios import LengthRatio, doubtful_lengths
 from .estimation.misreadings import WrongPosition, WrongReading, find_misreadings
 from .experiment.messages import ExperimentError, Message
+from .experiment.model import SLIGHTLY
 from .experiment.yamltree import Mark
 from .machines.protocol import Array
 from .quantities import format_length
-
-# Fraction of the volume by which readings are outside where artefacts are not set up just as drawn.
-SLIGHTLY = 1e-3
 
 
 def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:

@@ -21,7 +21,7 @@ from ..settings import listing
 from .curves import read_curves
 from .machine_file import load_machine
 from .messages import ExperimentError, Message, Steps
-from .model import Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
+from .model import SLIGHTLY, Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
 from .problems import Problems, written_text
 from .references import References
 from .structure import Sections
@@ -205,7 +205,8 @@ def check_inside(
 ) -> None:
     """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those of the probes.
 
-    Error models are functions of the scale readings, where the ball is less the probe's offset. Balls may be outside.
+    Error models are functions of the scale readings, where the ball is less the probe's offset. Balls may be outside,
+    and scale readings by a thousandth of the volume.
     """
     layout = references.layouts[position.artefact]
     rows = [
@@ -219,7 +220,7 @@ def check_inside(
     places = ball_coordinates(position.pose, layout)
     balls = np.concatenate([indices for indices, _, _ in rows])
     by_how_much, axes, sides = excess(np.concatenate([places[one] - offset for one, _, offset in rows]), volume)
-    outside = np.flatnonzero(by_how_much > TOLERANCE)
+    outside = np.flatnonzero(by_how_much > SLIGHTLY * (volume.upper - volume.lower)[axes])
     if len(outside) == 0:
         return
     # The first of those furthest outside, whatever rounding makes of equal ones.

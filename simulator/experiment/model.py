@@ -23,12 +23,23 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
+# Fraction of the volume by which scale readings may be outside: measured offsets of probes are no round numbers, and
+# artefacts are not set up just as drawn.
+SLIGHTLY = 1e-3
+
+
 @dataclass(frozen=True, eq=False)
 class Volume:
     """The measuring volume: ``lower`` and ``upper`` (d,) in metres."""
 
     lower: Floats
     upper: Floats
+
+    @property
+    def of_readings(self) -> tuple[Floats, Floats]:
+        """Limits (d,) of scale readings, a thousandth of the volume outside it."""
+        slightly = SLIGHTLY * (self.upper - self.lower)
+        return self.lower - slightly, self.upper + slightly
 
 
 @dataclass(frozen=True, eq=False)

@@ -161,7 +161,7 @@ def _reasons(
     for probes in group.probes[plane]:
         one = found.copy()
         for offset in (bounds.offsets[probe] for probe in probes if probe in bounds.offsets):
-            one[~is_within(read - offset, bounds.volume.lower, bounds.volume.upper)] = "outside the volume"
+            one[~is_within(read - offset, *bounds.volume.of_readings)] = "outside the volume"
         for probe in probes:
             if probe in bounds.reach:
                 one[(one == "") & ~is_within(read, *bounds.reach[probe])] = f"out of reach of probe {probe}"

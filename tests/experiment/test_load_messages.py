@@ -248,9 +248,9 @@ POSITIONS = [
     (LOW, LOW.replace("x: 0 mm", "x: 600 mm"), [
         '11:5: positions[0]: reading ball "r1c3" with probe "down" puts the scales at x = 1100 mm, 100 mm above the '
         "measuring volume, and 2 more readings; move the artefact, or read it otherwise"]),
-    (LOW, LOW.replace("level: 0 mm", "level: -50.000002 mm"), [
-        '11:5: positions[0]: reading ball "r1c1" with probe "down" puts the scales at z = -2 nm (the ball at '
-        "-50.000002 mm less the offset of -50 mm), 2 nm below the measuring volume, and 8 more readings; move the "
+    (LOW, LOW.replace("level: 0 mm", "level: -52.000002 mm"), [
+        '11:5: positions[0]: reading ball "r1c1" with probe "down" puts the scales at z = -2.000002 mm (the ball at '
+        "-52.000002 mm less the offset of -50 mm), 2.000002 mm below the measuring volume, and 8 more readings; move the "
         "artefact, or read it otherwise"]),
     ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
         '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',

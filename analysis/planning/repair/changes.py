@@ -22,9 +22,6 @@ from simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
 from simulator.geometry.positions import Pose, ball_coordinates
 from simulator.machines.protocol import Array
 
-# Scale readings may be this far outside the volume, as in a file.
-TOLERANCE = 1e-9
-
 
 class Kind(IntEnum):
     """What is changed, the cheapest first."""
@@ -89,10 +86,11 @@ def go_together(changes: Sequence[Change]) -> bool:
 def is_inside(position: Position, layout: BallLayout, volume: Volume, offsets: Mapping[str, Array]) -> bool:
     """Whether all scale readings of a position are in the volume, as in a file, with the `offsets` (d,) of probes."""
     places = ball_coordinates(position.pose, layout)
+    lower, upper = volume.of_readings
     for group in position.readings:
         for name in group.probes:
             read = places[group.ball_indices] - offsets[name]
-            if (read < volume.lower - TOLERANCE).any() or (read > volume.upper + TOLERANCE).any():
+            if (read < lower).any() or (read > upper).any():
                 return False
     return True
 
