@@ -250,8 +250,8 @@ POSITIONS = [
         "measuring volume, and 2 more readings; move the artefact, or read it otherwise"]),
     (LOW, LOW.replace("level: 0 mm", "level: -52.000002 mm"), [
         '11:5: positions[0]: reading ball "r1c1" with probe "down" puts the scales at z = -2.000002 mm (the ball at '
-        "-52.000002 mm less the offset of -50 mm), 2.000002 mm below the measuring volume, and 8 more readings; move the "
-        "artefact, or read it otherwise"]),
+        "-52.000002 mm less the offset of -50 mm), 2.000002 mm below the measuring volume, and 8 more readings; move "
+        "the artefact, or read it otherwise"]),
     ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
         '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',
         '12:16: positions[1].artefact: unknown artefact "baar"; did you mean "bar"?',
