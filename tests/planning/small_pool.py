@@ -7,7 +7,7 @@ title: a small pool
 machine: {volume: [600 mm, 500 mm, 400 mm], repeatability: 1 um}
 error_model: {kind: kinematic, arrangement: MB2, position_coefficients: 2, rotation_coefficients: 2}
 probes:
-  down: [0 mm, 0 mm, -80 mm]
+  down: [0 mm, 0 mm, -50 mm]
   right: [60 mm, 0 mm, 0 mm]
   back: [0 mm, 60 mm, 0 mm]
 artefacts:
