@@ -223,8 +223,13 @@ def _monotone(trials: _Trials, deficiency: int) -> Answer:
     """The largest uncertainty, or the smallest number, that does."""
     one = trials.one
     best, worst = (one.last, one.first) if one.grows else (one.first, one.last)
+    remarks = []
+    if not one.grows and not trials.is_right(worst):
+        # An uncertainty that grows with length has an end where no file may state it.
+        worst = _border(trials, one.drawn, worst)
+        remarks.append(f"more than {one.words(worst)} is not possible: {trials.at(worst + 1).refusal}")
     if trials.at(worst).is_met:
-        return _told(trials, "any", worst, [])
+        return _told(trials, "any", worst, remarks)
     remarks = []
     if one.grows and not trials.is_right(best):
         best = _border(trials, one.first, best)

@@ -195,6 +195,17 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
     assert f"all directions together: U6 {1e6 * found.lengths.average:.4f}"[:38] in "\n".join(lines)
 
 
+def test_a_certificate_that_may_be_any_ends_where_no_file_may_state_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is refused beyond is no certificate that misses the goal."""
+    text = with_target("5 um").replace("standard_uncertainty: 0.2 um   #", "standard_uncertainty: 0.1 um + L/1000000 #")
+    assert main(["reach", str(written(tmp_path, text)), "--by", "certificate", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)["answers"]["certificate"]
+    assert answer["status"] == "any" and answer["next"] is None
+    assert answer["needed"].endswith(" um + L/10100") and "is not possible" in answer["remarks"][0]
+
+
 def test_no_weak_direction_and_yet_a_target_that_is_missed(tmp_path: Path) -> None:
     """Many moderate directions add up: nothing is weak, and `check` tells the share all the same."""
     found = plan(experiment_of(tmp_path, SMALL))
