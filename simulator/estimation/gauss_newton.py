@@ -107,8 +107,8 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
 
     What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as in NPL Report CISE
     15/98, section 5.4, where the iteration wanders along it without leaving the neighbourhood, and held if that fails
-    or ends far away, where less seems to be open than as drawn: poses a little off their nominal ones then call for
-    steps of metres.
+    or goes far: poses a little off their nominal ones call for steps of metres. Rank and null space of the solution are
+    those of the design as drawn in any case.
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
