@@ -197,8 +197,8 @@ def test_three_parameters() -> None:
     }
     assert round(found.found.sigma / INCH * 1e6, 1) == 7.0
     assert np.abs(found.coordinates / INCH - TRUE).max() < 14e-6
-    # The table's axes go through the zero of the readings, from which ball 1 is off by the mean of both its readings, the
-    # second turned back, and through ball 2.
+    # The table's axes go through the zero of the readings, from which ball 1 is off by the mean of both its readings,
+    # the second turned back, and through ball 2.
     shifted = found.coordinates / INCH + (0.000014 / 2, -0.000010 / 2)
     turn = shifted[1, 1] / shifted[1, 0]
     turned = shifted + turn * np.column_stack([shifted[:, 1], -shifted[:, 0]])
@@ -251,7 +251,12 @@ def test_multiple_redundancy_with_scale() -> None:
 @pytest.mark.parametrize(
     ("offsets", "parameters", "sigma", "coordinates"),
     [
-        (True, {"alpha": -0.67, "beta": -141.27, "gamma": 2.82, "offset x": -14.30, "offset y": -17.58}, 16.9, REAL_FIVE),
+        (
+            True,
+            {"alpha": -0.67, "beta": -141.27, "gamma": 2.82, "offset x": -14.30, "offset y": -17.58},
+            16.9,
+            REAL_FIVE,
+        ),
         (False, {"alpha": -0.81, "beta": -140.40, "gamma": 3.69}, 17.6, REAL_THREE),
     ],
     ids=["five parameters", "three parameters"],
