@@ -6,6 +6,7 @@ Three of its six quantities depend on choices that it does not state; these give
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simulator.design import Design, State, nominal_state, pose_size
 from simulator.estimation.covariance import Covariance, covariance, spectrum
@@ -66,7 +67,7 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
     """
     reported = design.model.reported()
     names, matrix = list(reported.names), reported.matrix.copy()
-    dropped = np.asarray(~matrix.any(axis=1))
+    dropped: NDArray[np.bool_] = ~np.asarray(matrix.any(axis=1))
     if isinstance(design.model, KinematicModel):
         functions = [name.partition(" ")[0] for name in names]
         for function in dict.fromkeys(functions):
