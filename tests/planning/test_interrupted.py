@@ -259,8 +259,19 @@ def test_readings_with_uncertainties_of_their_own_are_written_with_them(
 
 def test_three_balls_in_a_line_may_stand_in_any_turn_about_it(pool: Path) -> None:
     """Nothing is told of a turn that the readings leave open; exact ones were taken for a plate turned over."""
+    turned = """
+    - planes: [x, y, z]
+      levels: [200 mm, 111 mm]
+      corners: {x: 101 mm, y: 33 mm, z: 25 mm}
+      quarter_turns: [0, 1, 2, 3]
+      probes: [down]
+"""
+    pool.write_text(TEXT.rstrip("\n") + turned)
     (experiment,) = load(pool, planning=True)
-    for name in ("low", "front", "left"):
+    assert experiment.pool is not None
+    names = [one.name for one in experiment.pool.candidates if one.name.startswith(("x ", "y ", "z "))]
+    assert len(names) == 24
+    for name in names:
         for count in (1, 2, 3):
             (taken,) = done_candidates(readings_of(pool, [name], count), experiment)
             assert taken.read.readings == count
