@@ -24,6 +24,7 @@ from simulator.estimation.length_equations import length_estimate
 from simulator.estimation.observations import expected_readings
 from simulator.estimation.parameters import shared_layout
 from simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from simulator.experiment.load import load
 from simulator.experiment.model import Experiment
 from simulator.generate import exact_readings, on_true_machine, true_artefacts
 from simulator.geometry.motions import rotation_from_vector
@@ -136,10 +137,41 @@ def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) 
     np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", ["three balls, all pairs", "six balls, all pairs", "plate, all pairs projected"])
+def in_a_plane(folder: Path) -> Experiment:
+    """A machine of two dimensions, and readings of unequal uncertainty."""
+    path = folder / "plane.yaml"
+    path.write_text(PLANE, encoding="utf-8")
+    (found,) = load(path)
+    return found
+
+
+PLANE = """
+title: a bar and a tile on a table
+machine: {volume: [600 mm, 500 mm], repeatability: [1 um, 2 um]}
+error_model: {kind: metric}
+probes: {one: [0 mm, 0 mm], two: [30 mm, 0 mm]}
+artefacts:
+  bar: {kind: balls, coordinates: {a: [0 mm, 0 mm], b: [90 mm, 0 mm], c: [250 mm, 0 mm]}, role: length_standard}
+  tile: {kind: grid, balls: [2, 3], size: [200 mm, 150 mm], role: length_standard}
+positions:
+  - {name: along, artefact: bar, pose: {origin: [100 mm, 100 mm]}, probes: [one, two], standard_uncertainty: 0.4 um}
+  - {name: across, artefact: bar, pose: {origin: [300 mm, 100 mm], rotation: 70 deg}, probes: [one], repeats: 2}
+  - {name: part, artefact: bar, pose: {origin: [200 mm, 100 mm], rotation: 20 deg}, probes: [one], balls: [a, c]}
+  - {name: flat, artefact: tile, pose: {origin: [200 mm, 200 mm], rotation: 30 deg}, probes: [two]}
+calibration:
+  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.3 um + L/500000}
+  - {kind: distances, artefact: tile, pairs: all, standard_uncertainty: 0.5 um}
+"""
+CASES_AND_PLANE = CASES | {"plane": in_a_plane}
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["three balls, all pairs", "six balls, all pairs", "plate, all pairs projected", "two certificates", "plane"],
+)
 def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -> None:
     """W'W is the pseudo-inverse of the covariance, W by itself and its transpose."""
-    design = lay_out(CASES[name](tmp_path))
+    design = lay_out(CASES_AND_PLANE[name](tmp_path))
     white, m = design.length_whitening, len(design.lengths)
     covariance = 1e12 * dense.length_covariance(design)
     twice = 1e-12 * white.pulled(white.whitened(np.eye(m)))
