@@ -251,7 +251,8 @@ def length_covariance(design: Any) -> Real:
         if not given.with_repeatability[i]:
             continue
         for sign, end in ((1.0, given.first[i]), (-1.0, given.second[i])):
-            u = design.repeatability / np.sqrt(design.readings.repeats[end])
+            own = design.readings.uncertainty
+            u = (design.repeatability if own is None else own[end]) / np.sqrt(design.readings.repeats[end])
             noise[i, d * end : d * end + d] += sign * given.direction[i] * u
     covariance = noise @ noise.T
     same = given.certificate[:, None] == given.certificate

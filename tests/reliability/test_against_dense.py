@@ -157,9 +157,10 @@ def test_repeats_and_lengths_that_share_a_certificate() -> None:
     covariance = (
         np.diag(noise * ends * given.with_repeatability) + np.outer(given.uncertainty, given.uncertainty) * same
     )
+    np.testing.assert_allclose(problem.length_root @ covariance @ problem.length_root.T, np.eye(3), atol=1e-9)
     for kind, biases in (("length", np.eye(3)), ("length value", np.array([[-1.0], [0.0], [-1.0]]))):
         pattern = np.zeros((len(basis), biases.shape[1]))
-        pattern[-3:] = np.linalg.solve(np.linalg.cholesky(covariance), biases)
+        pattern[-3:] = problem.length_root @ biases
         left = ((pattern - basis @ (basis.T @ pattern)) ** 2).sum(axis=0)
         found = result.information[result.patterns.of_kind(kind)]  # type: ignore[arg-type]
         np.testing.assert_allclose(found, left, rtol=1e-7)
