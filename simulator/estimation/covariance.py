@@ -20,9 +20,6 @@ from .parameters import SharedLayout
 # and the weakest determined direction of a usable design is many orders of magnitude above.
 EXACT = 1e-10
 
-# What kernels for linear algebra may leave where a singular value is zero, as a fraction of the largest.
-ROUNDING = 1e-13
-
 # The size of change that a singular value is quoted for.
 MICROMETRE = 1e-6
 
@@ -51,13 +48,10 @@ class Spectrum:
 
     @property
     def gap(self) -> float:
-        """Ratio of the smallest value counted as determined to the largest counted as undetermined.
-
-        The latter counts as `ROUNDING` of the largest of all at least, so that rounding does not show.
-        """
+        """Ratio of the smallest value counted as determined to the largest counted as undetermined."""
         if not 0 < self.deficiency < len(self.values):
             return float("inf")
-        return float(self.values[self.rank - 1] / max(self.values[self.rank], ROUNDING * self.values[0]))
+        return float(self.values[self.rank - 1] / max(self.values[self.rank], np.finfo(float).tiny))
 
     @property
     def null(self) -> Array:
