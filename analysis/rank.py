@@ -27,6 +27,9 @@ NEGLIGIBLE = 0.01
 # What moves points by less than this fraction of a direction's largest part is rounding.
 ROUNDING = 1e-9
 
+# A gap beyond this is one to mere rounding, and counts as this.
+GREAT = 1e9
+
 # A direction is weak when one standard deviation along it moves corrected points, relative to one another, by more
 # than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
 WEAK = 10.0
@@ -119,7 +122,7 @@ class Verdict:
     """Whether a design determines its parameters.
 
     `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`; `gap` is the ratio
-    across the border between determined and undetermined. `reasons` tell what bars and gauges lack.
+    across the border between determined and undetermined, `GREAT` at most. `reasons` tell what bars and gauges lack.
     """
 
     parameters: int
@@ -161,7 +164,7 @@ def verdict(
         found.deficiency,
         expected,
         found.values,
-        found.gap,
+        found.gap if np.isinf(found.gap) else min(found.gap, GREAT),
         null_directions(design, layout, spread),
         _weak_directions(design, layout, weak, effect, limit),
         reasons(design, layout, open_),

@@ -7,12 +7,11 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from simulator.estimation.covariance import ROUNDING
 from simulator.rounding import printable
 
 from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates
-from .rank import Verdict
+from .rank import GREAT, Verdict
 from .scale import Scale
 from .study import Fit, Plan
 from .tasks import TaskUncertainty, is_determined
@@ -271,12 +270,12 @@ def scale_data(found: Scale | None) -> dict[str, Any] | None:
 
 
 def _border(judged: Verdict) -> str:
-    """What singular values come after those that count; those that are rounding are told by its limit."""
+    """What singular values come after those that count; what they are is not told where they are rounding."""
     if not judged.deficiency:
         return ""
-    first, limit = judged.singular_values[-judged.deficiency], ROUNDING * judged.singular_values[0]
-    if first <= limit:
-        return f", then less than {printable(limit):.2g} (gap above {printable(judged.gap):.2g})"
+    if judged.gap >= GREAT:
+        return f", then rounding (gap above {GREAT:.0e})"
+    first = judged.singular_values[-judged.deficiency]
     return f", then {printable(first):.3g} and below (gap {printable(judged.gap):.2g})"
 
 

@@ -22,9 +22,6 @@ from .substitution import in_order, solve_balls, solve_kept
 # and the weakest determined direction of a usable design is many orders of magnitude above.
 EXACT = 1e-10
 
-# What kernels for linear algebra may leave where a singular value is zero, as a fraction of the largest.
-ROUNDING = 1e-13
-
 # The size of change that a singular value is quoted for.
 MICROMETRE = 1e-6
 
@@ -40,8 +37,7 @@ class Spectrum:
     is then the number of standard deviations by which the observations show such a change. `directions` (s, s)
     holds the right singular vectors as columns, in the parameters' own units, in the order of `values` (s,),
     largest first; `deficiency` counts those that the observations leave wholly open, and `gap` is the ratio of the
-    smallest value counted as determined to the largest counted as undetermined, where these were told apart; the latter
-    counts as `ROUNDING` of the largest of all at least, so that rounding does not show.
+    smallest value counted as determined to the largest counted as undetermined, where these were told apart.
     """
 
     values: Array
@@ -86,7 +82,7 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
         rank = len(values) - deficiency
         gap = float("inf")
         if 0 < deficiency < len(values):
-            gap = float(values[rank - 1] / max(values[rank], ROUNDING * largest))
+            gap = float(values[rank - 1] / max(values[rank], np.finfo(float).tiny))
         if judged is factor:
             return Spectrum(values, scale[:, None] * right.T, scale, deficiency, gap)
         null = right[rank:].T
