@@ -159,6 +159,8 @@ def certified(problem: Problem, state: exact.State | None) -> Problem:
     }
     if state is None:
         return found
+    # What nothing determines as drawn, errors and noise seem to determine a little, which is no answer to certify.
+    assert not drawn.null
     solution = exact.estimate(problem, state)
     assert not solution.null and solution.steps[-1] < mpf(10) ** exact.SMALL_STEP, solution.steps
     model = problem["error_model"]

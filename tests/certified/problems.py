@@ -218,7 +218,7 @@ def certified_coordinates() -> Problem:
         )
     ):
         uncertainty = [3e-7, 2e-7, 5e-7] if k % 2 else [4e-7, 4e-7, 1e-6]
-        add_plate_position(given, name, plane, level, corner, turns, TIPS[plane][:1], uncertainty)
+        add_plate_position(given, name, plane, level, corner, turns, TIPS[plane], uncertainty)
     add_coordinates(given, list(range(12)), 5e-7)
     add_points(given, SPREAD)
     return given
