@@ -94,7 +94,7 @@ def test_experiments_drawn_at_random(tmp_path: Path, seed: int) -> None:
 
 @pytest.mark.long
 def test_many_experiments_drawn_at_random(tmp_path: Path) -> None:
-    """Where a direction is all but open the iteration may take longer than it is given, and rank is told all the same."""
+    """Where a direction is all but open the iteration may take longer than it has, and rank is told all the same."""
     slow = []
     for seed in range(100, 400):
         experiment = random_experiment(seed, tmp_path)
