@@ -30,11 +30,14 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 Kind = Literal[
-    "reading", "length", "prior", "coordinate", "distance", "ball", "shift", "turn", "probe", "length value", "scale",
-    "expansion",
+    "reading", "length", "prior", "coordinate", "distance", "ball", "moved", "shift", "turn", "probe", "length value",
+    "scale", "expansion",
 ]  # fmt: skip
 SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
 UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
+
+# A slip leaves at least so many readings of the position on either side, and is looked for before at most so many.
+LEAST_PART, MOST_STARTS = 3, 60
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,9 @@ class Block:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
     `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe or artefact;
-    of a certified length, the first that has it, and of a ball, its first reading in that position. `axis` (count,)
-    is along or about which, -1 without one; `start` (count,) the first reading after a slip, -1 without one.
+    of a certified length, the first that has it, and of a ball, its first reading in that position, or from that
+    position on. `axis` (count,) is along or about which, -1 without one, the plate's own axis of a ball that moved;
+    `start` (count,) the first reading after a slip, -1 without one.
     """
 
     kind: Kind
@@ -76,7 +80,7 @@ class Patterns:
     @cached_property
     def is_local(self) -> np.ndarray:
         """Which patterns (k,) are of rows that come together: of one ball at the most, or one kind."""
-        return np.isin(self.kind, [*SINGLE, "ball", "length value"])
+        return np.isin(self.kind, [*SINGLE, "ball", "moved", "length value"])
 
     def of_kind(self, *kinds: Kind) -> Integers:
         """Indices of the patterns of some kinds."""
@@ -90,11 +94,14 @@ class Patterns:
         return UNITS.get(kind, "m")
 
 
-def patterns(design: Design, state: State, x: Array | None) -> Patterns:
-    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones."""
+def patterns(design: Design, state: State, x: Array | None, every_start: bool = False) -> Patterns:
+    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones.
+
+    Slips are half-way and between probes, or with `every_start` at every reading, up to `MOST_STARTS` of a position.
+    """
     from scipy.sparse import coo_array
 
-    at = _Place(design, state, x, row_places(design))
+    at = _Place(design, state, x, row_places(design), every_start)
     blocks = [block for build in BUILDERS for block in build(at)]
     start = np.cumsum([0, *(block.count for block in blocks)])
     column = np.concatenate([block.column + first for block, first in zip(blocks, start, strict=False)])
@@ -126,8 +133,10 @@ def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
 class _Place:
     """A design where it is linearised, with what several kinds of patterns need."""
 
-    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces) -> None:
-        self.design, self.state, self.places = design, state, places
+    def __init__(
+        self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool
+    ) -> None:
+        self.design, self.state, self.places, self.every_start = design, state, places, every_start
         self.chosen = design.plate_readings
         self.readings = design.readings.select(self.chosen)
         self.weight = reading_weights(design, self.readings)
@@ -221,16 +230,48 @@ def _dirty_balls(at: _Place) -> Iterator[Block]:
     yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
 
 
+def _moved_balls(at: _Place) -> Iterator[Block]:
+    """Balls that have been displaced on their plate, along its axes, from one position on."""
+    d = at.design.dimension
+    order = position_order(at.design)
+    turn = at.state.rotations[at.readings.position]
+    by_ball = np.argsort(at.readings.ball, kind="stable")
+    for rows in np.split(by_ball, np.flatnonzero(np.diff(at.readings.ball[by_ball])) + 1):
+        places = order[at.readings.position[rows]]
+        for place in np.unique(places)[1:]:
+            later = rows[places >= place]
+            first = rows[places == place][0]
+            yield _block("moved", at.of_readings(later, turn[later]), [at.chosen[first]] * d, np.arange(d))
+
+
+def position_order(design: Design) -> Integers:
+    """Place (positions,) of each position in the order in which the readings were taken."""
+    order = np.full(len(design.position_names), len(design.position_names))
+    found, first = np.unique(design.readings.position, return_index=True)
+    order[found[np.argsort(first)]] = np.arange(len(found))
+    return order
+
+
+def _slip_starts(at: _Place, rows: Integers) -> Integers:
+    """Places among a position's `rows` that a slip may come before."""
+    if at.every_start:
+        count = len(rows) - 2 * LEAST_PART + 1
+        if count < 1:
+            return np.zeros(0, np.int64)
+        return np.unique(np.linspace(LEAST_PART, len(rows) - LEAST_PART, min(count, MOST_STARTS)).astype(np.int64))
+    probe = at.readings.probe[rows]
+    changes = np.flatnonzero(np.diff(probe)) + 1
+    # Between probes only where each has its readings together.
+    between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
+    return np.unique(np.append(between, len(rows) // 2))
+
+
 def _slips(at: _Place) -> Iterator[Block]:
-    """Plates that slipped after half of a position's readings, or between two probes."""
+    """Plates that slipped within a position."""
     d = at.design.dimension
     for k in at.has_plate:
         rows = np.flatnonzero(at.readings.position == k)
-        probe = at.readings.probe[rows]
-        changes = np.flatnonzero(np.diff(probe)) + 1
-        # Between probes only where each has its readings together.
-        between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
-        for start in np.unique(np.append(between, len(rows) // 2)):
+        for start in _slip_starts(at, rows):
             moved = rows[start:]
             if not 0 < start < len(rows):
                 continue
@@ -314,6 +355,7 @@ BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (
     _single_lengths,
     _single_items,
     _dirty_balls,
+    _moved_balls,
     _slips,
     _probes,
     _length_values,

@@ -1,0 +1,147 @@
+"""What the estimate, and suspects taken out of it, leave of residuals and of biases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.design import Design, Integers, State
+from simulator.estimation.covariance import covariance, spectrum
+from simulator.estimation.elimination import eliminate
+from simulator.estimation.hat import hat_rows, row_places, whitened_residuals
+from simulator.estimation.parameters import shared_layout
+from simulator.machines.protocol import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array, csr_array
+
+# A direction of which no more than this share is left in the residuals is not tested.
+HIDDEN = 1e-8
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """Residuals (n,), whitened, orthogonal to the columns of Q, the root of the hat matrix, of which rows have a part
+    `common` (n, r) and a part `own` (n, d) in the columns of `ball` (n,), -1 without one. What has been taken out
+    stands in further columns of `common`. `freedom` are the degrees of freedom.
+    """
+
+    residual: Array
+    common: Array
+    own: Array
+    ball: Integers
+    balls: int
+    freedom: int
+
+    @property
+    def sum_of_squares(self) -> float:
+        return float(self.residual @ self.residual)
+
+    def of(self, columns: Array) -> Array:
+        """What is left of biases (n, k)."""
+        left = columns - self.common @ (self.common.T @ columns)
+        at = self.ball >= 0
+        by_ball = np.zeros((self.balls, self.own.shape[1], columns.shape[1]))
+        np.add.at(by_ball, self.ball[at], self.own[at][:, :, None] * columns[at][:, None, :])
+        left[at] -= np.einsum("nd,ndk->nk", self.own[at], by_ball[self.ball[at]])
+        return np.asarray(left)
+
+    def without(self, columns: Array) -> Leftover:
+        """The same after biases (n, k) have been taken out, those that are not hidden."""
+        unit = orthonormal(self.of(columns), np.sqrt((columns**2).sum(axis=0)))
+        residual = self.residual - unit @ (unit.T @ self.residual)
+        common = np.concatenate([self.common, unit], axis=1)
+        return replace(self, residual=residual, common=common, freedom=self.freedom - unit.shape[1])
+
+    def own_columns(self) -> csr_array:
+        """The parts of single balls as a matrix (n, balls d)."""
+        from scipy.sparse import csr_array
+
+        d = self.own.shape[1]
+        at = np.flatnonzero(self.ball >= 0)
+        columns = d * self.ball[at][:, None] + np.arange(d)
+        entries = (self.own[at].ravel(), (np.repeat(at, d), columns.ravel()))
+        return csr_array(entries, shape=(len(self.ball), d * self.balls))
+
+
+def orthonormal(left: Array, size: Array) -> Array:
+    """An orthonormal basis (n, q) of what is left (n, k) of columns of some size (k,)."""
+    use = size > 0.0
+    u, values, _ = np.linalg.svd(left[:, use] / size[use], full_matrices=False)
+    return np.asarray(u[:, values**2 > HIDDEN])
+
+
+def leftover(design: Design, state: State, x: Array, freedom: int) -> Leftover:
+    """What an estimate at `state` from scale readings x (readings, d) leaves, to first order."""
+    layout = shared_layout(design)
+    factor = eliminate(design, layout, state, x)
+    spread = covariance(design, factor, spectrum(factor))
+    n, d = len(row_places(design)), design.dimension
+    common, own, ball = np.zeros((n, spread.ball.shape[2])), np.zeros((n, d)), np.full(n, -1)
+    for some in hat_rows(design, layout, state, x, spread):
+        common[some.rows], own[some.rows], ball[some.rows] = some.common, some.own, some.ball
+    residual = whitened_residuals(design, layout, state, x)
+    found = Leftover(residual, common, own, ball, len(design.balls), freedom)
+    return replace(found, residual=found.of(residual[:, None])[:, 0])
+
+
+@dataclass(frozen=True)
+class Explained:
+    """Sums of squares (g,) that groups of columns explain, and in how many `dimensions` (g,)."""
+
+    square: Array
+    dimensions: Array
+
+
+class Columns:
+    """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat matrix."""
+
+    def __init__(self, matrix: csc_array, of: Leftover) -> None:
+        self.matrix = matrix
+        self.square = np.asarray(matrix.power(2).sum(axis=0)).ravel()
+        self.own = (matrix.T @ of.own_columns()).tocsr()
+        self.own_square = np.asarray(self.own.power(2).sum(axis=1)).ravel()
+        self.update(of)
+
+    def update(self, of: Leftover) -> None:
+        """Work out the products with another leftover of the same estimate."""
+        self.product = np.asarray(self.matrix.T @ of.residual)
+        self.common = np.asarray(self.matrix.T @ of.common)
+        information = self.square - (self.common**2).sum(axis=1) - self.own_square
+        self.information = np.where(information > HIDDEN * self.square, information, 0.0)
+
+    def statistics(self) -> Array:
+        """Estimated biases (k,) in their standard uncertainties, 0 for what cannot be tested."""
+        can = self.information > 0.0
+        return np.asarray(np.where(can, self.product / np.sqrt(np.where(can, self.information, 1.0)), 0.0))
+
+    def gram(self, index: Integers) -> Array:
+        """Products (g, q, q) of what is left of the columns of groups (g, q), each column in units of its size."""
+        g, q = index.shape
+        size = np.sqrt(np.maximum(self.square[index], np.finfo(float).tiny))
+        common = self.common[index] / size[:, :, None]
+        found = -np.einsum("gir,gjr->gij", common, common, optimize=True)
+        csr = self.matrix.T.tocsr()
+        for i in range(q):
+            for j in range(i, q):
+                plain = (csr[index[:, i]].multiply(csr[index[:, j]])).sum(axis=1)
+                private = self.own[index[:, i]].multiply(self.own[index[:, j]]).sum(axis=1)
+                value = (np.asarray(plain).ravel() - np.asarray(private).ravel()) / (size[:, i] * size[:, j])
+                found[:, i, j] += value
+                if i != j:
+                    found[:, j, i] += value
+        return found
+
+    def explained(self, index: Integers) -> Explained:
+        """What groups of columns (g, q) explain together."""
+        if index.shape[1] == 1:
+            single = index[:, 0]
+            return Explained(self.statistics()[single] ** 2, (self.information[single] > 0.0).astype(float))
+        size = np.sqrt(np.maximum(self.square[index], np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(self.gram(index))
+        along = np.einsum("gij,gi->gj", vectors, self.product[index] / size)
+        known = values > HIDDEN
+        square = np.where(known, along**2 / np.where(known, values, 1.0), 0.0).sum(axis=1)
+        return Explained(square, known.sum(axis=1).astype(float))
