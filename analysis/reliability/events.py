@@ -14,39 +14,33 @@ from .patterns import Kind, Patterns
 
 # Kinds whose patterns come one for each axis, of one subject together.
 BY_AXIS: tuple[Kind, ...] = ("reading", "ball", "moved", "probe")
+SLIP: tuple[Kind, ...] = ("shift", "turn")
 
 
-@dataclass(frozen=True)
-class Groups:
-    """Events of one sort: each a row of `index` (g, q), the columns of its patterns."""
-
-    index: Integers
-
-
-def event_groups(given: Patterns) -> list[Groups]:
-    """All events that are looked for: single patterns, and groups of what one cause may do."""
-    found = [Groups(np.flatnonzero(given.kind != "moved")[:, None])]
+def event_groups(given: Patterns) -> list[Integers]:
+    """All events that are looked for, as arrays (g, q) of patterns: single ones, and groups of what one cause may do."""
+    found = [np.flatnonzero(given.kind != "moved")[:, None]]
     for kind in BY_AXIS:
         found += _by_subject(given, kind)
-    shift, turn = (_by_start(given, kind) for kind in ("shift", "turn"))
+    shift, turn = (_by_start(given, kind) for kind in SLIP)
     if len(shift):
-        found += [Groups(shift), Groups(np.concatenate([shift, turn], axis=1))]
+        found += [shift, np.concatenate([shift, turn], axis=1)]
     expansion = given.of_kind("expansion")
     artefact = given.design.position_artefact[given.subject[expansion]]
     pairs = [
         expansion[[i, j]] for i, j in combinations(range(len(expansion)), 2) if artefact[i] == artefact[j]
     ]
     if pairs:
-        found.append(Groups(np.array(pairs)))
+        found.append(np.array(pairs))
     return found
 
 
-def _by_subject(given: Patterns, kind: Kind) -> Iterator[Groups]:
+def _by_subject(given: Patterns, kind: Kind) -> Iterator[Integers]:
     """Groups of the patterns of each subject, those of as many axes together."""
     columns = given.of_kind(kind)
     _, start, count = np.unique(given.subject[columns], return_index=True, return_counts=True)
     for q in np.unique(count[count > 1]):
-        yield Groups(columns[start[count == q][:, None] + np.arange(q)])
+        yield columns[start[count == q][:, None] + np.arange(q)]
 
 
 def _by_start(given: Patterns, kind: Kind) -> Integers:
@@ -59,18 +53,29 @@ def _by_start(given: Patterns, kind: Kind) -> Integers:
     return columns.reshape(-1, int(count[0]))
 
 
-def cause(given: Patterns, columns: Integers) -> tuple[str, tuple[int, ...], int]:
-    """Which cause patterns are of: the kind, what it is about, and the first reading after a slip or -1."""
+@dataclass(frozen=True)
+class Cause:
+    """What patterns come of: a `kind` (that of the patterns, or "slip"), its `subjects`, what is wrong as in
+    `patterns.Block`, and the first reading after a slip, or -1.
+    """
+
+    kind: str
+    subjects: tuple[int, ...]
+    start: int = -1
+
+
+def cause(given: Patterns, columns: Integers) -> Cause:
+    """Which cause some patterns are of."""
     kind = str(given.kind[columns[0]])
     subjects = tuple(sorted({int(given.subject[k]) for k in columns}))
-    return ("slip" if kind in ("shift", "turn") else kind), subjects, int(given.start[columns[0]])
+    return Cause("slip" if kind in SLIP else kind, subjects, int(given.start[columns[0]]))
 
 
 def whole(given: Patterns, columns: Integers) -> Integers:
     """All patterns of the cause that `columns` are of."""
-    kind, subjects, start = cause(given, columns)
-    if kind == "expansion" or given.kind[columns[0]] not in (*BY_AXIS, "shift", "turn"):
+    kind: Kind = given.kind[columns[0]]
+    if kind not in (*BY_AXIS, *SLIP):
         return columns
-    kinds: tuple[Kind, ...] = ("shift", "turn") if kind == "slip" else (given.kind[columns[0]],)
-    same = given.of_kind(*kinds)
-    return same[(given.subject[same] == subjects[0]) & (given.start[same] == start)]
+    found = cause(given, columns)
+    same = given.of_kind(*(SLIP if kind in SLIP else (kind,)))
+    return same[(given.subject[same] == found.subjects[0]) & (given.start[same] == found.start)]

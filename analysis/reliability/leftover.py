@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -96,20 +97,29 @@ class Explained:
 
 
 class Columns:
-    """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat matrix."""
+    """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat matrix.
 
-    def __init__(self, matrix: csc_array, of: Leftover) -> None:
-        self.matrix = matrix
-        self.square = np.asarray(matrix.power(2).sum(axis=0)).ravel()
-        self.own = (matrix.T @ of.own_columns()).tocsr()
-        self.own_square = np.asarray(self.own.power(2).sum(axis=1)).ravel()
+    `groups` are arrays (g, q) of columns that are tested together.
+    """
+
+    def __init__(self, matrix: csc_array, groups: Sequence[Integers], of: Leftover) -> None:
+        self.rows = matrix.T.tocsr()
+        self.square = np.asarray(self.rows.power(2).sum(axis=1)).ravel()
+        self.size = np.sqrt(np.maximum(self.square, np.finfo(float).tiny))
+        common = self.rows @ of.common
+        own = (self.rows @ of.own_columns()).tocsr()
+        private = np.asarray(own.power(2).sum(axis=1)).ravel()
+        self._information = self.square - (common**2).sum(axis=1) - private
+        self._width = of.common.shape[1]
+        self._grams = [self._gram(index, common, own) if index.shape[1] > 1 else None for index in groups]
+        self.groups = groups
         self.update(of)
 
     def update(self, of: Leftover) -> None:
         """Work out the products with another leftover of the same estimate."""
-        self.product = np.asarray(self.matrix.T @ of.residual)
-        self.common = np.asarray(self.matrix.T @ of.common)
-        information = self.square - (self.common**2).sum(axis=1) - self.own_square
+        self.product = np.asarray(self.rows @ of.residual)
+        self.further = np.asarray(self.rows @ of.common[:, self._width :])
+        information = self._information - (self.further**2).sum(axis=1)
         self.information = np.where(information > HIDDEN * self.square, information, 0.0)
 
     def statistics(self) -> Array:
@@ -117,31 +127,30 @@ class Columns:
         can = self.information > 0.0
         return np.asarray(np.where(can, self.product / np.sqrt(np.where(can, self.information, 1.0)), 0.0))
 
-    def gram(self, index: Integers) -> Array:
+    def _gram(self, index: Integers, common: Array, own: csr_array) -> Array:
         """Products (g, q, q) of what is left of the columns of groups (g, q), each column in units of its size."""
         g, q = index.shape
-        size = np.sqrt(np.maximum(self.square[index], np.finfo(float).tiny))
-        common = self.common[index] / size[:, :, None]
-        found = -np.einsum("gir,gjr->gij", common, common, optimize=True)
-        csr = self.matrix.T.tocsr()
+        scaled = common[index] / self.size[index][:, :, None]
+        found = -scaled @ scaled.transpose(0, 2, 1)
+        plain, private = [self.rows[column] for column in index.T], [own[column] for column in index.T]
         for i in range(q):
             for j in range(i, q):
-                plain = (csr[index[:, i]].multiply(csr[index[:, j]])).sum(axis=1)
-                private = self.own[index[:, i]].multiply(self.own[index[:, j]]).sum(axis=1)
-                value = (np.asarray(plain).ravel() - np.asarray(private).ravel()) / (size[:, i] * size[:, j])
+                product = plain[i].multiply(plain[j]).sum(axis=1) - private[i].multiply(private[j]).sum(axis=1)
+                value = np.asarray(product).ravel() / (self.size[index[:, i]] * self.size[index[:, j]])
                 found[:, i, j] += value
                 if i != j:
                     found[:, j, i] += value
-        return found
+        return np.asarray(found)
 
-    def explained(self, index: Integers) -> Explained:
-        """What groups of columns (g, q) explain together."""
-        if index.shape[1] == 1:
+    def explained(self, number: int) -> Explained:
+        """What the groups of some number explain together."""
+        index, gram = self.groups[number], self._grams[number]
+        if gram is None:
             single = index[:, 0]
             return Explained(self.statistics()[single] ** 2, (self.information[single] > 0.0).astype(float))
-        size = np.sqrt(np.maximum(self.square[index], np.finfo(float).tiny))
-        values, vectors = np.linalg.eigh(self.gram(index))
-        along = np.einsum("gij,gi->gj", vectors, self.product[index] / size)
+        further = self.further[index] / self.size[index][:, :, None]
+        values, vectors = np.linalg.eigh(gram - further @ further.transpose(0, 2, 1))
+        along = np.einsum("gij,gi->gj", vectors, self.product[index] / self.size[index])
         known = values > HIDDEN
         square = np.where(known, along**2 / np.where(known, values, 1.0), 0.0).sum(axis=1)
         return Explained(square, known.sum(axis=1).astype(float))

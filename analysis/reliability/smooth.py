@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 from numpy.polynomial import legendre
 
-from simulator.design import Design, Integers, State
-from simulator.estimation.observations import length_geometry, reading_weights
+from simulator.design import Design, Integers, State, probe_offsets
+from simulator.estimation.observations import length_geometry, reading_weights, rotation_sensitivity
 from simulator.estimation.parameters import AXIS_NAMES
 from simulator.machines.protocol import Array
 
@@ -20,8 +20,8 @@ SAME_PLACE = 1e-3
 # Places on a scale that each have a value of their own; of more, waves up to so many half periods.
 MOST_PLACES, WAVES = 60, 20
 
-# Degrees of polynomials along one axis with levers, and of those in all co-ordinates together.
-ALONG, TOGETHER = 7, 4
+# Degrees of polynomials along one axis with levers, of those that turn probes, and of those in all co-ordinates.
+ALONG, OF_PROBES, TOGETHER = 7, 4, 4
 
 # Half periods of a drift over all readings.
 DRIFT = 6
@@ -51,6 +51,13 @@ def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
         values = (along[:, :, None] * levers[:, None, :]).reshape(len(t), -1)
         words = f"displacements and rotations that depend on {letter}"
         yield Smooth(words, _rows(design, state, x, _of_all_axes(values, d)))
+    offsets = probe_offsets(design, state)[design.readings.probe]
+    turned = rotation_sensitivity(offsets)
+    for axis, letter in enumerate(letters):
+        along = legendre.legvander(t[:, axis], OF_PROBES)
+        for about in range(turned.shape[2]):
+            words = f"a rotation of the probes about {letters[about] if d == 3 else 'z'} that depends on {letter}"
+            yield Smooth(words, _rows(design, state, x, turned[:, :, [about]] * along[:, None, :]))
     by_axis = [legendre.legvander(t[:, axis], TOGETHER) for axis in range(d)]
     terms = [
         np.prod([one[:, power] for one, power in zip(by_axis, powers, strict=True)], axis=0)

@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reliability.events import cause
+from analysis.reliability.events import Cause, cause
 from analysis.reliability.power import noncentrality
-from analysis.reliability.suspects import FAMILY, Diagnosis, Search, diagnosis
+from analysis.reliability.search import FAMILY, Search, diagnosis
+from analysis.reliability.suspects import Diagnosis
 from simulator.design import Design, Integers, Readings, State
 from simulator.estimation.gauss_newton import estimate
 from simulator.experiment.load import load
@@ -31,7 +32,6 @@ from simulator.machines.truth import TrueMachine, true_machine
 from simulator.readings import observe
 
 Real = NDArray[np.float64]
-Cause = tuple[str, tuple[int, ...], int]
 Generator = np.random.Generator
 LOWER, UPPER = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
@@ -56,18 +56,18 @@ class World:
         plain = self.drawn(self.machine(1), generator)
         solution = estimate(plain.design, plain.x)
         self.freedom = self.design.observations - self.design.parameter_count
-        self.search = Search(plain.design, solution, plain.x, self.freedom, True)
+        self.search = Search(plain.design, solution.state, plain.x, self.freedom, True)
         self.least = noncentrality(0.5 * FAMILY / self.search.tests, 0.8, self.freedom - 1)
 
-    def machine(self, seed: int, position: float = 2e-6, rotation: float = 4e-6) -> TrueMachine:
-        settings = RandomSettings(kind="random", position=f"{position} m", rotation=f"{rotation} rad", seed=seed)
+    def machine(self, seed: int) -> TrueMachine:
+        settings = RandomSettings(kind="random", position="2 um", rotation="4 urad", seed=seed)
         return true_machine(settings, self.design.model, LOWER, UPPER)
 
     def drawn(self, machine: TrueMachine, generator: Generator) -> DataSet:
         design, truth = on_true_machine(self.design, machine)
         certificate = noisy_certificate(self.design, truth, generator, machine.model)
         readings, x = noisy_readings(design, truth, generator)
-        return DataSet(certificate, readings, x, ("", (), -1))
+        return DataSet(certificate, readings, x, Cause("", ()))
 
     def detectable(self, change: Real) -> float:
         """Size of a bias of which a unit changes scale readings by `change` (m, d), such as is found so often."""
@@ -101,7 +101,7 @@ def a_reading(world: World, data: DataSet, generator: Generator) -> DataSet:
     i, axis = int(generator.integers(len(data.x))), int(generator.integers(3))
     change = np.zeros_like(data.x)
     change[i, axis] = 1.0
-    return biased(world, data, change, ("reading", (i,), -1), generator)
+    return biased(world, data, change, Cause("reading", (i,)), generator)
 
 
 def swapped_ball(world: World, data: DataSet, generator: Generator) -> DataSet:
@@ -112,7 +112,7 @@ def swapped_ball(world: World, data: DataSet, generator: Generator) -> DataSet:
     change = np.zeros_like(data.x)
     change[later] = (world.design.rotations @ direction(generator))[readings.position[later]]
     first = int(np.flatnonzero(later)[0])
-    return biased(world, data, change, ("moved", (first,), -1), generator)
+    return biased(world, data, change, Cause("moved", (first,)), generator)
 
 
 def dirt(world: World, data: DataSet, generator: Generator) -> DataSet:
@@ -120,7 +120,7 @@ def dirt(world: World, data: DataSet, generator: Generator) -> DataSet:
     k, ball = int(generator.integers(2, 6)), int(generator.integers(25))
     here = (readings.ball == ball) & (readings.position == k)
     change = here[:, None] * direction(generator)
-    return biased(world, data, change, ("ball", (int(np.flatnonzero(here)[0]),), -1), generator)
+    return biased(world, data, change, Cause("ball", (int(np.flatnonzero(here)[0]),)), generator)
 
 
 def slip(where: str) -> Draw:
@@ -136,7 +136,7 @@ def slip(where: str) -> Draw:
         moved[rows[start:]] = True
         turning = 2.0 * np.cross(direction(generator), arm) if generator.random() < 0.5 else np.zeros(3)
         change = moved[:, None] * (direction(generator) + turning)
-        return biased(world, data, change, ("slip", (k,), int(rows[start])), generator)
+        return biased(world, data, change, Cause("slip", (k,), int(rows[start])), generator)
 
     return draw
 
@@ -145,7 +145,7 @@ def probe_offset(world: World, data: DataSet, generator: Generator) -> DataSet:
     """Of probes along the directions that poses do not take up."""
     probe, axis = int(generator.integers(1, 5)), int(generator.integers(3))
     change = (data.readings.probe == probe)[:, None] * np.eye(3)[axis]
-    return biased(world, data, change, ("probe", (probe,), -1), generator)
+    return biased(world, data, change, Cause("probe", (probe,)), generator)
 
 
 def certificate(world: World, data: DataSet, generator: Generator) -> DataSet:
@@ -153,7 +153,7 @@ def certificate(world: World, data: DataSet, generator: Generator) -> DataSet:
     value = data.design.distances.value.copy()
     value[k] += world.of_certificate(k) * generator.choice([-1.0, 1.0])
     design = replace(data.design, distances=replace(data.design.distances, value=value))
-    return replace(data, design=design, cause=("distance", (k,), -1))
+    return replace(data, design=design, cause=Cause("distance", (k,)))
 
 
 def expansion(positions: int) -> Draw:
@@ -164,7 +164,7 @@ def expansion(positions: int) -> Draw:
         for k in some:
             rows = data.readings.position == k
             change[rows] = places[rows] - places[rows].mean(axis=0)
-        return biased(world, data, change, ("expansion", tuple(some.tolist()), -1), generator)
+        return biased(world, data, change, Cause("expansion", tuple(some.tolist())), generator)
 
     return draw
 
@@ -173,14 +173,24 @@ def noise(world: World, data: DataSet, generator: Generator) -> DataSet:
     k = int(generator.integers(6))
     rows = data.readings.position == k
     more = np.sqrt(8.0) * generator.standard_normal(data.x.shape) * world.design.repeatability
-    return replace(data, x=data.x + rows[:, None] * more, cause=("scatter", (k,), -1))
+    return replace(data, x=data.x + rows[:, None] * more, cause=Cause("scatter", (k,)))
+
+
+def share(generator: Generator) -> float:
+    """How large a model error is, of the largest that is drawn."""
+    return float(np.exp(generator.uniform(np.log(0.2), 0.0)))
+
+
+def random_settings(generator: Generator, position: float, rotation: float) -> RandomSettings:
+    seed = int(generator.integers(2**31))
+    return RandomSettings(kind="random", position=f"{position} m", rotation=f"{rotation} rad", seed=seed)
 
 
 def wave(world: World, data: DataSet, generator: Generator) -> DataSet:
-    """A scale that is wrong by a sine of 1 um."""
+    """A scale that is wrong by a sine."""
     axis, length = int(generator.integers(3)), float(generator.uniform(0.05, 0.6))
     x = data.x.copy()
-    x[:, axis] += 1e-6 * np.sin(2.0 * np.pi * (x[:, axis] / length + generator.random()))
+    x[:, axis] += 1e-6 * share(generator) * np.sin(2.0 * np.pi * (x[:, axis] / length + generator.random()))
     return replace(data, x=x)
 
 
@@ -194,36 +204,38 @@ def other_machine(make: Callable[[World, Generator], TrueMachine]) -> Draw:
 def richer(world: World, generator: Generator) -> TrueMachine:
     """Polynomials of seven coefficients where five are estimated."""
     model = kinematic_model(ARRANGEMENTS["MB2"], 7, 7, LOWER, UPPER)
-    settings = RandomSettings(kind="random", position="2 um", rotation="4 urad", seed=int(generator.integers(2**31)))
+    size = share(generator)
+    settings = random_settings(generator, 2e-6 * size, 4e-6 * size)
     return true_machine(settings, model, LOWER, UPPER)
 
 
 def full_rotations(world: World, generator: Generator) -> TrueMachine:
-    """A machine with rotations of a milliradian, whose products count."""
+    """A machine with rotations of up to a milliradian, whose products count."""
     model = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, LOWER, UPPER, full_rotations=True)
-    settings = RandomSettings(kind="random", position="2 um", rotation="1 mrad", seed=int(generator.integers(2**31)))
+    settings = random_settings(generator, 2e-6, 1e-3 * share(generator))
     return true_machine(settings, model, LOWER, UPPER)
 
 
 def other_arrangement(world: World, generator: Generator) -> TrueMachine:
     names = sorted(set(ARRANGEMENTS) - {"MB2"})
     model = kinematic_model(ARRANGEMENTS[names[generator.integers(len(names))]], 5, 5, LOWER, UPPER)
-    settings = RandomSettings(kind="random", position="2 um", rotation="4 urad", seed=int(generator.integers(2**31)))
+    size = share(generator)
+    settings = random_settings(generator, 2e-6 * size, 4e-6 * size)
     return true_machine(settings, model, LOWER, UPPER)
 
 
 def tilted_axes(world: World, data: DataSet, generator: Generator) -> DataSet:
-    """A machine that tilts about one of its axes as another axis moves, by 10 urad at its end, with all that it carries."""
+    """A machine that tilts about one of its axes as another axis moves, by up to 10 urad at its end, with all that it carries."""
     along, about = int(generator.integers(3)), int(generator.integers(3))
-    angle = 10e-6 * data.x[:, along]
+    angle = 10e-6 * share(generator) * data.x[:, along]
     turn = np.cross(np.eye(3)[about], data.x + world.design.probes[data.readings.probe])
     return replace(data, x=data.x - angle[:, None] * turn)
 
 
 def drift(world: World, data: DataSet, generator: Generator) -> DataSet:
-    """The machine drifts against the plate, by 10 um over all readings."""
+    """The machine drifts against the plate, by up to 10 um over all readings."""
     time = np.linspace(0.0, 1.0, len(data.x))
-    return replace(data, x=data.x + 10e-6 * time[:, None] * direction(generator))
+    return replace(data, x=data.x + 10e-6 * share(generator) * time[:, None] * direction(generator))
 
 
 def nothing(world: World, data: DataSet, generator: Generator) -> DataSet:
@@ -231,12 +243,12 @@ def nothing(world: World, data: DataSet, generator: Generator) -> DataSet:
 
 
 MODEL_ERRORS: dict[str, Draw] = {
-    "a wave of 1 um in a scale": wave,
-    "polynomials of degree 6 for 4": other_machine(richer),
-    "full rotations, of 1 mrad": other_machine(full_rotations),
+    "a wave in a scale, 0.2 to 1 um": wave,
+    "polynomials of degree 6, not 4": other_machine(richer),
+    "full rotations, 0.2 to 1 mrad": other_machine(full_rotations),
     "another arrangement": other_machine(other_arrangement),
-    "axes that tilt by 10 urad": tilted_axes,
-    "a drift of 10 um": drift,
+    "tilting axes, 2 to 10 urad": tilted_axes,
+    "a drift, 2 to 10 um": drift,
 }
 MISTAKES: dict[str, Draw] = {
     "a reading": a_reading,
@@ -254,24 +266,31 @@ MISTAKES: dict[str, Draw] = {
 OUTCOMES = ("right", "model", "nothing", "wrong")
 
 
-def equal_causes(true: Cause, told: Cause) -> bool:
-    return true[:2] == told[:2] and (true[0] != "slip" or abs(true[2] - told[2]) <= 3)
-
-
 def outcome(data: DataSet, found: Diagnosis) -> str:
-    """What a diagnosis is worth: every cause that is told must be the true one, or cannot be told from it."""
+    """What a diagnosis is worth: every cause that is told must be the true one, or cannot be told from it.
+
+    A slip must have come in the range that is told.
+    """
     if found.unexplained:
         return "model"
-    told = [[cause(one.patterns, one.columns), *one.alternatives] for one in found.suspects]
-    if found.scatter:
-        told.append([("scatter", (found.scatter.of.position,), -1)])
-    if not told:
+    if not found:
         return "nothing"
-    right = [any(equal_causes(data.cause, cause) for cause in causes) for causes in told]
-    if data.cause[0] == "expansion" and all(causes[0][0] == "expansion" for causes in told):
-        named = {position for causes in told for position in causes[0][1]}
-        right = [named == set(data.cause[1])]
-    return "right" if all(right) else "wrong"
+    if not data.cause.kind:
+        of_model = found.suspects and not found.scatter and all(one.of_model for one in found.suspects)
+        return "model" if of_model else "wrong"
+    expanded: set[int] = set()
+    for one in found.suspects:
+        told = [cause(one.patterns, np.array(columns)) for columns in (one.columns, *one.alternatives)]
+        if told[0].kind == data.cause.kind == "expansion":
+            expanded |= set(told[0].subjects)
+        elif told[0].kind == data.cause.kind == "slip":
+            if told[0].subjects != data.cause.subjects or not one.first <= data.cause.start <= one.last:
+                return "wrong"
+        elif data.cause not in told:
+            return "wrong"
+    if found.scatter and Cause("scatter", (found.scatter.of.position,)) != data.cause:
+        return "wrong"
+    return "right" if not expanded or expanded == set(data.cause.subjects) else "wrong"
 
 
 def draw_one(world: World, make: Draw, seed: int) -> tuple[DataSet, Diagnosis]:
@@ -283,15 +302,16 @@ def draw_one(world: World, make: Draw, seed: int) -> tuple[DataSet, Diagnosis]:
 
 
 def counts(world: World, kind: str, sets: int, show: bool = False) -> Counter[str]:
-    make = {**MODEL_ERRORS, **MISTAKES, "nothing": nothing}[kind]
+    kinds = {"nothing": nothing, **MODEL_ERRORS, **MISTAKES}
+    make, first = kinds[kind], 10_000 * list(kinds).index(kind)
     found: Counter[str] = Counter()
     for r in range(sets):
-        data, told = draw_one(world, make, 1000 + r)
+        data, told = draw_one(world, make, first + r)
         result = outcome(data, told)
         found[result] += 1
         if show and result != "right" or show and kind in MODEL_ERRORS:
             text = told.unexplained.words if told.unexplained else ""
-            print(" ", r, result, data.cause, [cause(s.patterns, s.columns) + (round(s.statistic, 1), s.alternatives) for s in told.suspects],
+            print(" ", r, result, data.cause, [(cause(s.patterns, s.columns), round(s.statistic, 1), s.first, s.last, len(s.alternatives), s.of_model) for s in told.suspects],
                   told.scatter and (told.scatter.of.position, told.scatter.of.probe, told.scatter.times), text,
                   told.unexplained and (round(told.unexplained.times, 2), round(told.unexplained.statistic, 1)))
     return found
