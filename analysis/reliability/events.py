@@ -1,4 +1,4 @@
-"""Events as groups of patterns: one cause, in whatever direction, and the readings, balls or positions that it is about."""
+"""Events as groups of patterns: one cause in whatever direction."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SLIP: tuple[Kind, ...] = ("shift", "turn")
 
 
 def event_groups(given: Patterns) -> list[Integers]:
-    """All events that are looked for, as arrays (g, q) of patterns: single ones, and groups of what one cause may do."""
+    """All events that are looked for, as arrays (g, q) of patterns: single ones, and what one cause may do together."""
     found = [np.flatnonzero(given.kind != "moved")[:, None]]
     for kind in BY_AXIS:
         found += _by_subject(given, kind)
@@ -27,9 +27,7 @@ def event_groups(given: Patterns) -> list[Integers]:
         found += [shift, np.concatenate([shift, turn], axis=1)]
     expansion = given.of_kind("expansion")
     artefact = given.design.position_artefact[given.subject[expansion]]
-    pairs = [
-        expansion[[i, j]] for i, j in combinations(range(len(expansion)), 2) if artefact[i] == artefact[j]
-    ]
+    pairs = [expansion[[i, j]] for i, j in combinations(range(len(expansion)), 2) if artefact[i] == artefact[j]]
     if pairs:
         found.append(np.array(pairs))
     return found

@@ -133,9 +133,7 @@ def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
 class _Place:
     """A design where it is linearised, with what several kinds of patterns need."""
 
-    def __init__(
-        self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool
-    ) -> None:
+    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool) -> None:
         self.design, self.state, self.places, self.every_start = design, state, places, every_start
         self.chosen = design.plate_readings
         self.readings = design.readings.select(self.chosen)

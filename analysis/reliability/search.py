@@ -34,7 +34,7 @@ ROUNDING = 1e-6
 SAME = 1e-3
 
 # Times by which a mistake must be less by chance than what a lacking model or a drift explains, or it is not named.
-CLEARLY = math.log(300.0)
+CLEARLY = math.log(1000.0)
 
 # Chance below which a position is one of several that expand together, and a direction one of a cause's several.
 TOGETHER, DIRECTIONS = math.log(1e-4), math.log(1e-2)
@@ -132,9 +132,7 @@ class Search:
             elif scatter is None and of_scatter < min(self.other_limit, of_smooth - CLEARLY):
                 one, limit = self.scatters[int(scattered.argmin())], self.other_limit
                 times = self._weigh(one)
-                scatter = MoreScatter(
-                    self.design, one, times, normal_equivalent(of_scatter), normal_equivalent(limit)
-                )
+                scatter = MoreScatter(self.design, one, times, normal_equivalent(of_scatter), normal_equivalent(limit))
                 for earlier in chosen:
                     self._take_out(earlier.columns)
             elif rival < self.other_limit:
@@ -300,7 +298,7 @@ def _basis(left: Leftover, columns: Array) -> Array:
 
 
 def _further(left: Leftover, basis: Array, since: int) -> Array:
-    """What is left of an orthonormal basis that is orthogonal to the first `since` columns of what has been taken out."""
+    """What is left of an orthonormal basis that is orthogonal to the first `since` columns taken out."""
     later = left.common[:, since:]
     if not later.shape[1]:
         return basis

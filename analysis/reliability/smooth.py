@@ -1,4 +1,4 @@
-"""What residuals look like when the error model lacks something, or when something drifts: smooth errors, not events."""
+"""Smooth errors: what residuals look like when the error model lacks something, or when something drifts."""
 
 from __future__ import annotations
 
@@ -27,6 +27,10 @@ ALONG, OF_PROBES, TOGETHER = 7, 4, 4
 DRIFT = 6
 
 
+# In words what an error is, and its displacements (readings, d, k).
+Displacements = Iterator[tuple[str, Array]]
+
+
 @dataclass(frozen=True)
 class Smooth:
     """Biases (rows, k) that together are one smooth error, and in words what it is."""
@@ -36,43 +40,64 @@ class Smooth:
 
 
 def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
-    """All smooth errors that are looked for."""
-    t, d = _fractions(x), design.dimension
-    letters = AXIS_NAMES[:d]
-    units = np.eye(d)
+    """All smooth errors that are looked for, at scale readings x (readings, d) in the order in which they were taken."""
+    for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
+        for words, displacement in build(design, state, x):
+            yield Smooth(words, _rows(design, state, x, displacement))
+
+
+def _on_scales(design: Design, state: State, x: Array) -> Displacements:
+    """Each component as any function of one scale reading."""
+    letters = AXIS_NAMES[: design.dimension]
     for axis, letter in enumerate(letters):
         values = _places(x[:, axis])
         for component, other in enumerate(letters):
-            words = f"an error in {other} that depends on {letter}"
-            yield Smooth(words, _rows(design, state, x, values[:, None, :] * units[component][:, None]))
-    for axis, letter in enumerate(letters):
+            displacement = values[:, None, :] * np.eye(design.dimension)[component][:, None]
+            yield f"an error in {other} that depends on {letter}", displacement
+
+
+def _along_axes(design: Design, state: State, x: Array) -> Displacements:
+    """All components as polynomials of one scale reading, and of the others as levers of rotations."""
+    t = _fractions(x)
+    for axis, letter in enumerate(AXIS_NAMES[: design.dimension]):
         along = legendre.legvander(t[:, axis], ALONG)
         levers = np.column_stack([np.ones(len(t)), np.delete(t, axis, axis=1)])
         values = (along[:, :, None] * levers[:, None, :]).reshape(len(t), -1)
-        words = f"displacements and rotations that depend on {letter}"
-        yield Smooth(words, _rows(design, state, x, _of_all_axes(values, d)))
-    offsets = probe_offsets(design, state)[design.readings.probe]
-    turned = rotation_sensitivity(offsets)
+        yield f"displacements and rotations that depend on {letter}", _in_all_directions(values, design.dimension)
+
+
+def _of_probes(design: Design, state: State, x: Array) -> Displacements:
+    """Rotations that act on the probes' offsets, as polynomials of one scale reading."""
+    t, letters = _fractions(x), AXIS_NAMES[: design.dimension]
+    turned = rotation_sensitivity(probe_offsets(design, state)[design.readings.probe])
     for axis, letter in enumerate(letters):
         along = legendre.legvander(t[:, axis], OF_PROBES)
-        for about in range(turned.shape[2]):
-            words = f"a rotation of the probes about {letters[about] if d == 3 else 'z'} that depends on {letter}"
-            yield Smooth(words, _rows(design, state, x, turned[:, :, [about]] * along[:, None, :]))
+        for k in range(turned.shape[2]):
+            about = letters[k] if design.dimension == 3 else "z"
+            words = f"a rotation of the probes about {about} that depends on {letter}"
+            yield words, turned[:, :, [k]] * along[:, None, :]
+
+
+def _in_space(design: Design, state: State, x: Array) -> Displacements:
+    """All components as polynomials of all co-ordinates."""
+    t, d = _fractions(x), design.dimension
     by_axis = [legendre.legvander(t[:, axis], TOGETHER) for axis in range(d)]
-    terms = [
-        np.prod([one[:, power] for one, power in zip(by_axis, powers, strict=True)], axis=0)
-        for powers in product(range(TOGETHER + 1), repeat=d)
-        if 0 < sum(powers) <= TOGETHER
-    ]
-    words = "an error that depends on several co-ordinates together"
-    yield Smooth(words, _rows(design, state, x, _of_all_axes(np.stack(terms, axis=1), d)))
-    time = np.linspace(0.0, 1.0, len(x))
-    values = np.cos(np.pi * np.arange(1, DRIFT + 1) * time[:, None])
-    yield Smooth("a drift over all readings", _rows(design, state, x, _of_all_axes(time[:, None], d)))
-    yield Smooth("a drift over all readings", _rows(design, state, x, _of_all_axes(values, d)))
-    within = _time_within(design)
-    yield Smooth("a drift within each position", _rows(design, state, x, _of_all_axes(within.sum(axis=1)[:, None], d)))
-    yield Smooth("a drift within each position", _rows(design, state, x, _of_all_axes(within, d)))
+    terms = []
+    for powers in product(range(TOGETHER + 1), repeat=d):
+        if 0 < sum(powers) <= TOGETHER:
+            factors = [one[:, power] for one, power in zip(by_axis, powers, strict=True)]
+            terms.append(np.prod(factors, axis=0))
+    yield "an error that depends on several co-ordinates together", _in_all_directions(np.stack(terms, axis=1), d)
+
+
+def _in_time(design: Design, state: State, x: Array) -> Displacements:
+    """Drifts over all readings and, alike in all positions or not, within each."""
+    time, within = np.linspace(0.0, 1.0, len(x)), _time_within(design)
+    waves = np.cos(np.pi * np.arange(1, DRIFT + 1) * time[:, None])
+    for values in (time[:, None], waves):
+        yield "a drift over all readings", _in_all_directions(values, design.dimension)
+    for values in (within.sum(axis=1)[:, None], within):
+        yield "a drift within each position", _in_all_directions(values, design.dimension)
 
 
 def _fractions(x: Array) -> Array:
@@ -102,7 +127,7 @@ def _time_within(design: Design) -> Array:
     return within
 
 
-def _of_all_axes(values: Array, d: int) -> Array:
+def _in_all_directions(values: Array, d: int) -> Array:
     """Displacements (m, d, d k) along each axis by functions (m, k)."""
     found = np.zeros((len(values), d, d, values.shape[1]))
     for axis in range(d):

@@ -10,7 +10,6 @@ from argparse import ArgumentParser
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ from analysis.reliability.events import Cause, cause
 from analysis.reliability.power import noncentrality
 from analysis.reliability.search import FAMILY, Search, diagnosis
 from analysis.reliability.suspects import Diagnosis
-from simulator.design import Design, Integers, Readings, State
+from simulator.design import Design, Readings
 from simulator.estimation.gauss_newton import estimate
 from simulator.experiment.load import load
 from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
@@ -225,7 +224,7 @@ def other_arrangement(world: World, generator: Generator) -> TrueMachine:
 
 
 def tilted_axes(world: World, data: DataSet, generator: Generator) -> DataSet:
-    """A machine that tilts about one of its axes as another axis moves, by up to 10 urad at its end, with all that it carries."""
+    """A machine that tilts with all that it carries, as one of its axes moves, by up to 10 urad at its end."""
     along, about = int(generator.integers(3)), int(generator.integers(3))
     angle = 10e-6 * share(generator) * data.x[:, along]
     turn = np.cross(np.eye(3)[about], data.x + world.design.probes[data.readings.probe])
@@ -311,9 +310,26 @@ def counts(world: World, kind: str, sets: int, show: bool = False) -> Counter[st
         found[result] += 1
         if show and result != "right" or show and kind in MODEL_ERRORS:
             text = told.unexplained.words if told.unexplained else ""
-            print(" ", r, result, data.cause, [(cause(s.patterns, s.columns), round(s.statistic, 1), s.first, s.last, len(s.alternatives), s.of_model) for s in told.suspects],
-                  told.scatter and (told.scatter.of.position, told.scatter.of.probe, told.scatter.times), text,
-                  told.unexplained and (round(told.unexplained.times, 2), round(told.unexplained.statistic, 1)))
+            print(
+                " ",
+                r,
+                result,
+                data.cause,
+                [
+                    (
+                        cause(s.patterns, s.columns),
+                        round(s.statistic, 1),
+                        s.first,
+                        s.last,
+                        len(s.alternatives),
+                        s.of_model,
+                    )
+                    for s in told.suspects
+                ],
+                told.scatter and (told.scatter.of.position, told.scatter.of.probe, told.scatter.times),
+                text,
+                told.unexplained and (round(told.unexplained.times, 2), round(told.unexplained.statistic, 1)),
+            )
     return found
 
 
