@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator.design import Design, Integers, State
-from simulator.estimation.covariance import covariance, spectrum
+from simulator.estimation.covariance import Covariance, covariance, spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.hat import hat_rows, row_places, whitened_residuals
 from simulator.estimation.parameters import shared_layout
@@ -74,11 +74,15 @@ def orthonormal(left: Array, size: Array) -> Array:
     return np.asarray(u[:, values**2 > HIDDEN])
 
 
-def leftover(design: Design, state: State, x: Array, freedom: int) -> Leftover:
-    """What an estimate at `state` from scale readings x (readings, d) leaves, to first order."""
+def leftover(design: Design, state: State, x: Array | None, freedom: int, spread: Covariance | None = None) -> Leftover:
+    """What an estimate at `state` from scale readings x (readings, d), or error-free ones, leaves, to first order.
+
+    `spread` is the covariance there if it is known.
+    """
     layout = shared_layout(design)
-    factor = eliminate(design, layout, state, x)
-    spread = covariance(design, factor, spectrum(factor))
+    if spread is None:
+        factor = eliminate(design, layout, state, x)
+        spread = covariance(design, factor, spectrum(factor))
     n, d = len(row_places(design)), design.dimension
     common, own, ball = np.zeros((n, spread.ball.shape[2])), np.zeros((n, d)), np.full(n, -1)
     for some in hat_rows(design, layout, state, x, spread):
@@ -121,6 +125,10 @@ class Columns:
         self.further = np.asarray(self.rows @ of.common[:, self._width :])
         information = self._information - (self.further**2).sum(axis=1)
         self.information = np.where(information > HIDDEN * self.square, information, 0.0)
+
+    def tests(self) -> int:
+        """Number of groups that can be tested."""
+        return sum(int((self.explained(number).dimensions > 0).sum()) for number in range(len(self.groups)))
 
     def statistics(self) -> Array:
         """Estimated biases (k,) in their standard uncertainties, 0 for what cannot be tested."""

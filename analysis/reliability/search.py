@@ -96,8 +96,7 @@ class Search:
         self.patterns = patterns(self.design, self.state, self.x, every_start=True)
         self.groups = event_groups(self.patterns)
         self.columns = Columns(self.patterns.matrix, self.groups, left)
-        explained = [self.columns.explained(number) for number in range(len(self.groups))]
-        self.tests = max(int(sum((one.dimensions > 0).sum() for one in explained)), 1)
+        self.tests = max(self.columns.tests(), 1)
         every = smooth_errors(self.design, self.state, self.x)
         reduced = [Smooth(one.words, _basis(left, one.columns)) for one in every]
         self.smooth = [one for one in reduced if one.columns.shape[1]]

@@ -40,7 +40,7 @@ class Smooth:
 
 
 def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
-    """All smooth errors that are looked for, at scale readings x (readings, d) in the order in which they were taken."""
+    """All smooth errors that are looked for, at scale readings x (readings, d) in the order they were taken in."""
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, x):
             yield Smooth(words, _rows(design, state, x, displacement))
@@ -62,7 +62,7 @@ def _along_axes(design: Design, state: State, x: Array) -> Displacements:
     for axis, letter in enumerate(AXIS_NAMES[: design.dimension]):
         along = legendre.legvander(t[:, axis], ALONG)
         levers = np.column_stack([np.ones(len(t)), np.delete(t, axis, axis=1)])
-        values = (along[:, :, None] * levers[:, None, :]).reshape(len(t), -1)
+        values = np.asarray((along[:, :, None] * levers[:, None, :]).reshape(len(t), -1), float)
         yield f"displacements and rotations that depend on {letter}", _in_all_directions(values, design.dimension)
 
 

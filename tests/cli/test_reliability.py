@@ -138,7 +138,11 @@ def warm(rows: Rows) -> None:
             ["too high in z .* line 7 of", "too low in x .* line 100 of", "too high in y .* line 202 of"],
             [2e-6, 2e-6, 2.5e-6],
         ),
-        (slip, ["plate slipped in position z high, by 1.* along y, between lines 3[678] and (39|40) of r.csv"], [1.2e-6]),
+        (
+            slip,
+            ["plate slipped in position z high, by 1.* along y, between lines 3[678] and (39|40) of r.csv"],
+            [1.2e-6],
+        ),
         (
             probe,
             ["offset z of probe (left|right) stated [12].* too .*; it cannot be told from offset z of probe "],

@@ -14,8 +14,8 @@ from scipy.stats import binom
 from analysis.reliability.leftover import Columns, leftover
 from analysis.reliability.patterns import Patterns, patterns
 from analysis.reliability.power import alarm_limit, chance_of_alarm, noncentrality
-from analysis.reliability.study import Reliability, reliability_of
 from analysis.reliability.search import diagnosis
+from analysis.reliability.study import Reliability, reliability_of
 from simulator.design import Design, nominal_state
 from simulator.estimation.covariance import covariance, spectrum
 from simulator.estimation.elimination import eliminate
