@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,12 +43,8 @@ class Leftover:
 
     def of(self, columns: Array) -> Array:
         """What is left of biases (n, k)."""
-        left = columns - self.common @ (self.common.T @ columns)
-        at = self.ball >= 0
-        by_ball = np.zeros((self.balls, self.own.shape[1], columns.shape[1]))
-        np.add.at(by_ball, self.ball[at], self.own[at][:, :, None] * columns[at][:, None, :])
-        left[at] -= np.einsum("nd,ndk->nk", self.own[at], by_ball[self.ball[at]])
-        return np.asarray(left)
+        own = self.own_columns
+        return np.asarray(columns - self.common @ (self.common.T @ columns) - own @ (own.T @ columns))
 
     def without(self, columns: Array) -> Leftover:
         """The same after biases (n, k) have been taken out, those that are not hidden."""
@@ -56,6 +53,7 @@ class Leftover:
         common = np.concatenate([self.common, unit], axis=1)
         return replace(self, residual=residual, common=common, freedom=self.freedom - unit.shape[1])
 
+    @cached_property
     def own_columns(self) -> csr_array:
         """The parts of single balls as a matrix (n, balls d)."""
         from scipy.sparse import csr_array
@@ -111,7 +109,7 @@ class Columns:
         self.square = np.asarray(self.rows.power(2).sum(axis=1)).ravel()
         self.size = np.sqrt(np.maximum(self.square, np.finfo(float).tiny))
         common = self.rows @ of.common
-        own = (self.rows @ of.own_columns()).tocsr()
+        own = (self.rows @ of.own_columns).tocsr()
         private = np.asarray(own.power(2).sum(axis=1)).ravel()
         self._information = self.square - (common**2).sum(axis=1) - private
         self._width = of.common.shape[1]

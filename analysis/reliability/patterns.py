@@ -144,12 +144,18 @@ class _Place:
         self.arm = turned
         self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
 
-    def of_readings(self, rows: Integers, by_axis: Array) -> tuple[Integers, Integers, Array]:
-        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns."""
+    def of_readings(
+        self, rows: Integers, by_axis: Array, group: Integers | None = None
+    ) -> tuple[Integers, Integers, Array]:
+        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns.
+
+        With `group` (m,) each group has k columns of its own.
+        """
         m, d, k = by_axis.shape
         value = self.weight[rows][:, :, None] * by_axis
         row = d * rows[:, None, None] + np.arange(d)[:, None] + np.zeros(k, np.int64)
-        column = np.broadcast_to(np.arange(k), value.shape)
+        number = np.zeros(m, np.int64) if group is None else group
+        column = np.broadcast_to(k * number[:, None, None] + np.arange(k), value.shape)
         used = value != 0.0
         return row[used], column[used], value[used]
 
@@ -230,16 +236,29 @@ def _dirty_balls(at: _Place) -> Iterator[Block]:
 
 def _moved_balls(at: _Place) -> Iterator[Block]:
     """Balls that have been displaced on their plate, along its axes, from one position on."""
-    d = at.design.dimension
-    order = position_order(at.design)
-    turn = at.state.rotations[at.readings.position]
-    by_ball = np.argsort(at.readings.ball, kind="stable")
-    for rows in np.split(by_ball, np.flatnonzero(np.diff(at.readings.ball[by_ball])) + 1):
-        places = order[at.readings.position[rows]]
-        for place in np.unique(places)[1:]:
-            later = rows[places >= place]
-            first = rows[places == place][0]
-            yield _block("moved", at.of_readings(later, turn[later]), [at.chosen[first]] * d, np.arange(d))
+    d, readings = at.design.dimension, at.readings
+    place = position_order(at.design)[readings.position]
+    order = np.lexsort((np.arange(len(place)), place, readings.ball))
+    ball, place = readings.ball[order], place[order]
+    same_ball = np.diff(ball) == 0
+    starts = 1 + np.flatnonzero(same_ball & (np.diff(place) > 0))
+    end = np.searchsorted(ball, ball[starts], side="right")
+    group, rows = _runs(starts, end)
+    rows = order[rows]
+    turn = at.state.rotations[readings.position[rows]]
+    first = np.repeat(at.chosen[order[starts]], d)
+    yield _block("moved", at.of_readings(rows, turn, group), first, np.tile(np.arange(d), len(starts)))
+
+
+def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
+    """All of several ranges (g,) one after the other: the number of each one's range, and what stands in it.
+
+    >>> _runs(np.array([3, 7]), np.array([5, 8]))
+    (array([0, 0, 1]), array([3, 4, 7]))
+    """
+    length = end - start
+    group = np.repeat(np.arange(len(start)), length)
+    return group, np.arange(len(group)) - np.repeat(np.cumsum(length) - length - start, length)
 
 
 def position_order(design: Design) -> Integers:
@@ -269,33 +288,32 @@ def _slips(at: _Place) -> Iterator[Block]:
     d = at.design.dimension
     for k in at.has_plate:
         rows = np.flatnonzero(at.readings.position == k)
-        for start in _slip_starts(at, rows):
-            moved = rows[start:]
-            if not 0 < start < len(rows):
-                continue
-            arm = at.arm[rows]
-            turns = rotation_sensitivity(at.arm[moved] - arm.mean(axis=0))
-            first = at.chosen[moved[0]]
-            shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
-            yield _block("shift", at.of_readings(moved, shifts), [k] * d, np.arange(d), first)
-            about = np.arange(3) if d == 3 else np.array([2])
-            yield _block("turn", at.of_readings(moved, turns), [k] * len(about), about, first)
+        starts = _slip_starts(at, rows)
+        starts = starts[(starts > 0) & (starts < len(rows))]
+        group, late = _runs(starts, np.full(len(starts), len(rows)))
+        moved = rows[late]
+        first = at.chosen[rows[starts]]
+        shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
+        axes = np.tile(np.arange(d), len(starts))
+        entries = at.of_readings(moved, shifts, group)
+        yield _block("shift", entries, [k] * len(axes), axes, np.repeat(first, d))
+        turns = rotation_sensitivity(at.arm[moved] - at.arm[rows].mean(axis=0))
+        about = np.tile(np.arange(3) if d == 3 else np.array([2]), len(starts))
+        entries = at.of_readings(moved, turns, group)
+        yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
 
 
 def _probes(at: _Place) -> Iterator[Block]:
     """Probes whose offsets are stated too large; of one that is estimated only its prior can be wrong."""
     design, state = at.design, at.state
-    d, offsets = design.dimension, probe_offsets(design, state)
+    d, offsets = design.dimension, probe_offsets(design, state)[design.readings.probe]
     given = design.lengths
+    all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
     for probe in np.unique(design.readings.probe):
         fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
         if not fixed.any():
             continue
-        read = design.readings.probe == probe
-        rate = np.zeros((len(design.readings), d, d))
-        p = np.broadcast_to(offsets[probe], (int(read.sum()), d))
-        rate[read] = offset_sensitivity(design.model, at.x[read], state.a, p)
-        rate = rate[:, :, fixed]
+        rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[:, :, fixed]
         rows = np.flatnonzero(at.readings.probe == probe)
         apart = rate[given.first] - np.where(given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)])
         of_lengths = np.einsum("md,mdk->mk", at.unit, apart)
