@@ -308,9 +308,10 @@ def counts(world: World, kind: str, sets: int) -> Counter[str]:
 
 
 def row(kind: str, found: Counter[str]) -> str:
-    """A row of the table, in per cent."""
+    """A row of the table, in per cent; only a mistake has a cause to be named."""
     total = sum(found.values())
-    return f"| {kind} | " + " | ".join(f"{100 * found[name] / total:.1f}" for name in OUTCOMES) + " |"
+    cells = [f"{100 * found[name] / total:.1f}" for name in OUTCOMES]
+    return f"| {kind} | " + " | ".join(cells if kind in MISTAKES else ["–", *cells[1:]]) + " |"
 
 
 def main(arguments: Iterable[str] | None = None) -> None:
