@@ -18,7 +18,7 @@ def log_chance(square: Array | float, total: float, dimensions: Array | float, f
     >>> log_chance(np.array([3.841459]), 100.0, 1.0, 90.0, True).round(6)
     array([-2.995732])
     >>> log_chance(np.array([4.0]), 94.0, 1.0, 91.0, False).round(4)
-    array([-2.9754])
+    array([-3.0259])
     """
     from scipy.special import betainc, betaln, chdtrc, gammaln
 
