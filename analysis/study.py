@@ -26,7 +26,8 @@ from simulator.threads import single_threaded
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
-from .reliability.suspects import Suspect, suspects
+from .reliability.search import diagnosis
+from .reliability.suspects import Diagnosis
 from .scale import Scale, scale_of
 from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, length_uncertainties, uncertainties
@@ -100,7 +101,7 @@ class Fit:
 
     `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
     freedom, or 1 where the file says that they are given. `adjustments` are those of a three-dimensional metric.
-    `suspects` are biases that the residuals show, which nothing else here heeds; `marks` tell where readings stand.
+    `diagnosis` is what the residuals make suspect, which nothing else here heeds; `marks` tell where readings stand.
     """
 
     label: str
@@ -117,7 +118,7 @@ class Fit:
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
     tasks: tuple[TaskUncertainty, ...] = ()
-    suspects: tuple[Suspect, ...] = ()
+    diagnosis: Diagnosis = Diagnosis()
     marks: tuple[Mark, ...] = ()
 
     @property
@@ -226,7 +227,7 @@ def fit(
         plate_coordinates(experiment, design, solution.state, spread, scale),
         _adjustments(design, layout, solution, spread, scale, freedom if estimated else np.inf),
         task_uncertainties(design, layout, solution.state, spread, scale),
-        tuple(suspects(design, solution, observed.x, freedom, estimated)),
+        diagnosis(design, solution, observed.x, freedom, estimated),
         observed.marks,
     )
 

@@ -309,10 +309,10 @@ def fit_lines(fit: Fit) -> list[str]:
     if not fit.converged:
         return lines
     lines += ["", *residual_table(fit)]
-    if fit.suspects:
-        from .reliability.wording import suspect_lines
+    if fit.diagnosis:
+        from .reliability.wording import diagnosis_lines
 
-        lines += suspect_lines(fit.suspects, fit.marks)
+        lines += diagnosis_lines(fit.diagnosis, fit.marks)
     lines += ["", *uncertainty_table(fit.quantities), ""]
     lines += [*task_table(fit.tasks), ""] if fit.tasks else []
     rows = [["parameter", "value", "standard uncertainty", "unit"]]
@@ -403,10 +403,10 @@ def plan_data(plan: Plan) -> dict[str, Any]:
 def fit_data(fit: Fit) -> dict[str, Any]:
     """A fit as plain data in metres and radians at full precision; what is undetermined is None."""
     suspected: dict[str, Any] = {}
-    if fit.suspects:
-        from .reliability.wording import suspect_data
+    if fit.diagnosis:
+        from .reliability.wording import diagnosis_data
 
-        suspected = {"suspected": suspect_data(fit.suspects, fit.marks)}
+        suspected = {"suspected": diagnosis_data(fit.diagnosis, fit.marks)}
     return {
         "experiment": fit.label,
         "title": fit.title,

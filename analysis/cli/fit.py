@@ -131,11 +131,10 @@ def run(options: Namespace) -> int:
         return 3
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
-        print(
-            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; look at the largest residuals, "
-            "or state larger uncertainties, or a richer error model",
-            file=sys.stderr,
-        )
+        cure = "no single mistake explains that: try a richer error model or larger uncertainties, and think of drifts"
+        if result.diagnosis.suspects or result.diagnosis.scatter:
+            cure = "look at what is suspected"
+        print(f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {cure}", file=sys.stderr)
     if result.doubt:
         print(f"warning: {result.doubt}", file=sys.stderr)
     if not result.verdict.as_expected:

@@ -29,6 +29,10 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
     if kind == "ball":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
         return f"dirt on ball {design.ball_label(int(ball))} in position {design.position_names[position]}, {letter}"
+    if kind == "moved":
+        ball, position = design.readings.ball[subject], design.readings.position[subject]
+        where = f"from position {design.position_names[position]} on"
+        return f"ball {design.ball_label(int(ball))} displaced {where}, along {letter} of the plate"
     if kind in ("shift", "turn"):
         how = f"along {letter}" if kind == "shift" else f"turned about {letter}"
         return f"position {design.position_names[subject]} slipped {slip_place(given, k)}, {how}"
@@ -49,7 +53,8 @@ def slip_place(given: Patterns, k: int) -> str:
     at = int(np.searchsorted(rows, start))
     if probe[at - 1] != probe[at] and probe[at - 1] not in probe[at:]:
         return f"before probe {design.probe_names[probe[at]]}"
-    return f"half-way, before ball {design.ball_label(int(design.readings.ball[start]))}"
+    half = "half-way, " if at == len(rows) // 2 else ""
+    return f"{half}before ball {design.ball_label(int(design.readings.ball[start]))}"
 
 
 def reading_name(design: Design, reading: int, with_position: bool = True) -> str:

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from simulator.whitening import Whitening
 
 Kind = Literal[
-    "reading", "length", "prior", "coordinate", "distance", "end", "ball", "shift", "turn", "probe", "length value",
+    "reading", "length", "prior", "coordinate", "distance", "end", "ball", "moved", "shift", "turn", "probe",
+    "length value",
     "scale", "expansion",
 ]  # fmt: skip
 SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
@@ -41,15 +42,19 @@ SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distanc
 SLIGHT = 1e-3
 UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
 
+# A slip leaves at least so many readings of the position on either side, and is looked for before at most so many.
+LEAST_PART, MOST_STARTS = 3, 60
+
 
 @dataclass(frozen=True)
 class Block:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
     `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe or artefact;
-    of a certified length, the first that has it, and of a ball, its first reading in that position. An `end` is a
-    reading of a standard whose lengths are read together, with which several of them are wrong. `axis` (count,)
-    is along or about which, -1 without one; `start` (count,) the first reading after a slip, -1 without one.
+    of a certified length, the first that has it, and of a ball, its first reading in that position, or from that
+    position on. An `end` is a reading of a standard whose lengths are read together, with which several of them are
+    wrong. `axis` (count,) is along or about which, -1 without one, the plate's own axis of a ball that moved; `start`
+    (count,) the first reading after a slip, -1 without one.
     """
 
     kind: Kind
@@ -82,7 +87,7 @@ class Patterns:
     @cached_property
     def is_local(self) -> np.ndarray:
         """Which patterns (k,) are of rows that come together: of one ball at the most, or one kind."""
-        return np.isin(self.kind, [*SINGLE, "end", "ball", "length value"])
+        return np.isin(self.kind, [*SINGLE, "end", "ball", "moved", "length value"])
 
     def of_kind(self, *kinds: Kind) -> Integers:
         """Indices of the patterns of some kinds."""
@@ -96,11 +101,14 @@ class Patterns:
         return UNITS.get(kind, "m")
 
 
-def patterns(design: Design, state: State, x: Array | None) -> Patterns:
-    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones."""
+def patterns(design: Design, state: State, x: Array | None, every_start: bool = False) -> Patterns:
+    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones.
+
+    Slips are half-way and between probes, or with `every_start` at every reading, up to `MOST_STARTS` of a position.
+    """
     from scipy.sparse import coo_array
 
-    at = _Place(design, state, x, row_places(design))
+    at = _Place(design, state, x, row_places(design), every_start)
     blocks = [block for build in BUILDERS for block in build(at)]
     start = np.cumsum([0, *(block.count for block in blocks)])
     column = np.concatenate([block.column + first for block, first in zip(blocks, start, strict=False)])
@@ -132,8 +140,8 @@ def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
 class _Place:
     """A design where it is linearised, with what several kinds of patterns need."""
 
-    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces) -> None:
-        self.design, self.state, self.places = design, state, places
+    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool) -> None:
+        self.design, self.state, self.places, self.every_start = design, state, places, every_start
         self.chosen = design.plate_readings
         self.readings = design.readings.select(self.chosen)
         self.weight = reading_weights(design, self.readings)
@@ -143,12 +151,18 @@ class _Place:
         self.arm = turned
         self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
 
-    def of_readings(self, rows: Integers, by_axis: Array) -> tuple[Integers, Integers, Array]:
-        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns."""
+    def of_readings(
+        self, rows: Integers, by_axis: Array, group: Integers | None = None
+    ) -> tuple[Integers, Integers, Array]:
+        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns.
+
+        With `group` (m,) each group has k columns of its own.
+        """
         m, d, k = by_axis.shape
         value = self.weight[rows][:, :, None] * by_axis
         row = d * rows[:, None, None] + np.arange(d)[:, None] + np.zeros(k, np.int64)
-        column = np.broadcast_to(np.arange(k), value.shape)
+        number = np.zeros(m, np.int64) if group is None else group
+        column = np.broadcast_to(k * number[:, None, None] + np.arange(k), value.shape)
         used = value != 0.0
         return row[used], column[used], value[used]
 
@@ -249,42 +263,86 @@ def _dirty_balls(at: _Place) -> Iterator[Block]:
     yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
 
 
+def _moved_balls(at: _Place) -> Iterator[Block]:
+    """Balls that have been displaced on their plate, along its axes, from one position on."""
+    d, readings = at.design.dimension, at.readings
+    place = position_order(at.design)[readings.position]
+    order = np.lexsort((np.arange(len(place)), place, readings.ball))
+    ball, place = readings.ball[order], place[order]
+    same_ball = np.diff(ball) == 0
+    starts = 1 + np.flatnonzero(same_ball & (np.diff(place) > 0))
+    end = np.searchsorted(ball, ball[starts], side="right")
+    group, rows = _runs(starts, end)
+    rows = order[rows]
+    turn = at.state.rotations[readings.position[rows]]
+    first = np.repeat(at.chosen[order[starts]], d)
+    yield _block("moved", at.of_readings(rows, turn, group), first, np.tile(np.arange(d), len(starts)))
+
+
+def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
+    """All of several ranges (g,) one after the other: the number of each one's range, and what stands in it.
+
+    >>> _runs(np.array([3, 7]), np.array([5, 8]))
+    (array([0, 0, 1]), array([3, 4, 7]))
+    """
+    length = end - start
+    group = np.repeat(np.arange(len(start)), length)
+    return group, np.arange(len(group)) - np.repeat(np.cumsum(length) - length - start, length)
+
+
+def position_order(design: Design) -> Integers:
+    """Place (positions,) of each position in the order in which the readings were taken."""
+    order = np.full(len(design.position_names), len(design.position_names))
+    found, first = np.unique(design.readings.position, return_index=True)
+    order[found[np.argsort(first)]] = np.arange(len(found))
+    return order
+
+
+def _slip_starts(at: _Place, rows: Integers) -> Integers:
+    """Places among a position's `rows` that a slip may come before."""
+    if at.every_start:
+        count = len(rows) - 2 * LEAST_PART + 1
+        if count < 1:
+            return np.zeros(0, np.int64)
+        return np.unique(np.linspace(LEAST_PART, len(rows) - LEAST_PART, min(count, MOST_STARTS)).astype(np.int64))
+    probe = at.readings.probe[rows]
+    changes = np.flatnonzero(np.diff(probe)) + 1
+    # Between probes only where each has its readings together.
+    between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
+    return np.unique(np.append(between, len(rows) // 2))
+
+
 def _slips(at: _Place) -> Iterator[Block]:
-    """Plates that slipped after half of a position's readings, or between two probes."""
+    """Plates that slipped within a position."""
     d = at.design.dimension
     for k in at.has_plate:
         rows = np.flatnonzero(at.readings.position == k)
-        probe = at.readings.probe[rows]
-        changes = np.flatnonzero(np.diff(probe)) + 1
-        # Between probes only where each has its readings together.
-        between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
-        for start in np.unique(np.append(between, len(rows) // 2)):
-            moved = rows[start:]
-            if not 0 < start < len(rows):
-                continue
-            arm = at.arm[rows]
-            turns = rotation_sensitivity(at.arm[moved] - arm.mean(axis=0))
-            first = at.chosen[moved[0]]
-            shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
-            yield _block("shift", at.of_readings(moved, shifts), [k] * d, np.arange(d), first)
-            about = np.arange(3) if d == 3 else np.array([2])
-            yield _block("turn", at.of_readings(moved, turns), [k] * len(about), about, first)
+        starts = _slip_starts(at, rows)
+        starts = starts[(starts > 0) & (starts < len(rows))]
+        group, late = _runs(starts, np.full(len(starts), len(rows)))
+        moved = rows[late]
+        first = at.chosen[rows[starts]]
+        shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
+        axes = np.tile(np.arange(d), len(starts))
+        entries = at.of_readings(moved, shifts, group)
+        yield _block("shift", entries, [k] * len(axes), axes, np.repeat(first, d))
+        turns = rotation_sensitivity(at.arm[moved] - at.arm[rows].mean(axis=0))
+        about = np.tile(np.arange(3) if d == 3 else np.array([2]), len(starts))
+        entries = at.of_readings(moved, turns, group)
+        yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
 
 
 def _probes(at: _Place) -> Iterator[Block]:
     """Probes whose offsets are stated too large; of one that is estimated only its prior can be wrong."""
     design, state = at.design, at.state
-    d, offsets = design.dimension, probe_offsets(design, state)
+    d, offsets = design.dimension, probe_offsets(design, state)[design.readings.probe]
     given = design.lengths
+    all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
     for probe in np.unique(design.readings.probe):
         fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
         if not fixed.any():
             continue
-        read = design.readings.probe == probe
-        rate = np.zeros((len(design.readings), d, d))
-        p = np.broadcast_to(offsets[probe], (int(read.sum()), d))
-        rate[read] = offset_sensitivity(design.model, at.x[read], state.a, p)
-        rate = rate[:, :, fixed]
+        rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[:, :, fixed]
         rows = np.flatnonzero(at.readings.probe == probe)
         apart = rate[given.first] - np.where(given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)])
         of_lengths = np.einsum("md,mdk->mk", at.unit, apart)
@@ -344,6 +402,7 @@ BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (
     _single_items,
     _ends,
     _dirty_balls,
+    _moved_balls,
     _slips,
     _probes,
     _length_values,

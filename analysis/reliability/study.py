@@ -19,9 +19,12 @@ from simulator.machines.protocol import Array
 from simulator.threads import single_threaded
 
 from .effects import SYMBOLS, Functions, Largest, ball_distances, error_functions, point_distances
+from .events import event_groups
+from .leftover import Columns, leftover
 from .patterns import Patterns, patterns
 from .power import noncentrality
 from .response import responses
+from .search import FAMILY
 
 FALSE_ALARM, POWER = 0.001, 0.8
 
@@ -52,7 +55,8 @@ class Reliability:
     of a single observation its redundancy number, otherwise the share of its square that is left in the residuals.
     `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is
     nil. `effects` are by symbol, U4 to U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
-    being known or estimated from the observations, less the one suspected.
+    being known or estimated from the observations, less the one suspected, and `fit_noncentrality` to each of all those
+    tests that a fit makes.
     """
 
     label: str
@@ -70,12 +74,21 @@ class Reliability:
     false_alarm: float
     power: float
     noncentrality: float
+    fit_noncentrality: float
+
+    @property
+    def found_by_fit(self) -> Array:
+        """The same of the tests that `fit` makes, which are many together."""
+        return self._biases(self.fit_noncentrality)
 
     @property
     def detectable(self) -> Array:
         """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can be detected."""
+        return self._biases(self.noncentrality)
+
+    def _biases(self, noncentrality: float) -> Array:
         with np.errstate(divide="ignore"):
-            return np.asarray(np.where(self.information > 0.0, self.noncentrality / np.sqrt(self.information), np.inf))
+            return np.asarray(np.where(self.information > 0.0, noncentrality / np.sqrt(self.information), np.inf))
 
     def is_harmless(self, k: int) -> bool:
         """Whether a bias changes no distance, between balls or between corrected points."""
@@ -139,6 +152,9 @@ def reliability_of(
         own = np.flatnonzero(given.kind == kind)
         left[own] = redundancy[rows][: len(own)]
     repeats = design.readings.repeats[design.plate_readings]
+    every = patterns(design, state, None, every_start=True)
+    tests = Columns(every.matrix, event_groups(every), leftover(design, state, None, 1, spread)).tests()
+    limit = 0.5 * FAMILY / max(tests, 1)
     freedom = design.observations - design.parameter_count + found_rank.deficiency
     return Reliability(
         experiment.label if experiment else "",
@@ -156,6 +172,7 @@ def reliability_of(
         false_alarm,
         power,
         noncentrality(false_alarm, power, freedom - 1 if sigma_is_estimated else math.inf),
+        noncentrality(limit, power, freedom - 1 if sigma_is_estimated else math.inf),
     )
 
 

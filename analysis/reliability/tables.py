@@ -24,6 +24,7 @@ MOST = 5
 
 EVENTS: tuple[tuple[Kind, ...], ...] = (
     ("ball",),
+    ("moved",),
     ("shift",),
     ("turn",),
     ("probe",),
@@ -62,6 +63,8 @@ def _heading(result: Reliability) -> list[str]:
         f"{number(total / count, 3)} of an observation on average",
         f"detectable: found with a power of {_percent(result.power)} by a test with a false alarm of "
         f"{_percent(result.false_alarm)}, sigma {sigma}: {number(result.noncentrality)} standard deviations",
+        f"by fit: found with that power by `fit`, which makes all its tests together: "
+        f"{number(result.fit_noncentrality)} standard deviations",
         "effects: the most that a bias just detectable changes in U4 (error function), U5 (distances between "
         "balls) and U6 (distances between corrected points), with the standard uncertainty there in brackets",
     ]
@@ -76,7 +79,7 @@ def _positions(result: Reliability) -> list[str]:
     """A summary of the readings of plates by position."""
     design, given = result.design, result.patterns
     readings = given.of_kind("reading")
-    head = ["position", "readings", "redundancy: smallest", "average", "detectable, um", "largest at"]
+    head = ["position", "readings", "redundancy: smallest", "average", "detectable, um", "by fit, um", "largest at"]
     rows = [[*head, "effect on U6, um", "largest at"]]
     position = design.readings.position[given.subject[readings]]
     of_u6 = _effect(result, "U6")
@@ -93,6 +96,7 @@ def _positions(result: Reliability) -> list[str]:
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
                 _shown(result.detectable[by_bias], "m"),
+                _shown(result.found_by_fit[by_bias], "m"),
                 name(given, int(by_bias), with_position=False),
                 u if known else "-",
                 name(given, int(by_effect), with_position=False) if known else "",
@@ -100,25 +104,34 @@ def _positions(result: Reliability) -> list[str]:
         )
     if len(rows) == 1:
         return ["no readings of plates"]
-    return aligned(rows, [False, True, True, True, True, False, True, False])
+    return aligned(rows, [False, True, True, True, True, True, False, True, False])
 
 
 def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundancy: bool) -> list[str]:
-    rows = [[title, *(["redundancy"] if with_redundancy else []), "detectable", "unit", *(f"{s}, um" for s in SYMBOLS)]]
+    rows = [
+        [
+            title,
+            *(["redundancy"] if with_redundancy else []),
+            "detectable",
+            "by fit",
+            "unit",
+            *(f"{s}, um" for s in SYMBOLS),
+        ]
+    ]
     rows[0].append("U6 at")
     for k in chosen:
         unit = result.patterns.unit(k)
         cells = [name(result.patterns, k)]
         if with_redundancy:
             cells.append(number(result.left[k], 3))
-        cells += [_shown(result.detectable[k], unit), SHOWN[unit]]
+        cells += [_shown(result.detectable[k], unit), _shown(result.found_by_fit[k], unit), SHOWN[unit]]
         for symbol in SYMBOLS:
             effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
             told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
             cells.append("-" if math.isnan(effect) else told)
         cells.append("" if math.isinf(result.detectable[k]) else _where(result, "U6", k))
         rows.append(cells)
-    right = [False, *([True] if with_redundancy else []), True, False, True, True, True, False]
+    right = [False, *([True] if with_redundancy else []), True, True, False, True, True, True, False]
     return aligned(rows, right)
 
 
@@ -156,7 +169,7 @@ def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
     """The worst pattern of each subject, or of each position for balls, in the order of the design."""
     if not len(chosen):
         return []
-    of_balls = result.patterns.kind[chosen[0]] == "ball"
+    of_balls = result.patterns.kind[chosen[0]] in ("ball", "moved")
     worst: dict[int, int] = {}
     for k in _worst_first(result, chosen):
         subject = int(result.patterns.subject[k])
@@ -236,6 +249,7 @@ def reliability_data(result: Reliability) -> dict[str, Any]:
         "false_alarm": result.false_alarm,
         "power": result.power,
         "noncentrality": finite(result.noncentrality),
+        "fit_noncentrality": finite(result.fit_noncentrality),
         "redundancy": float(result.redundancy.sum()) + result.among_repeats,
         "redundancy_among_repeats": result.among_repeats,
         "observations_by_name": [
@@ -253,6 +267,7 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
         "kind": str(result.patterns.kind[k]),
         "unit": result.patterns.unit(k),
         "minimal_detectable": finite(float(result.detectable[k])),
+        "found_by_fit": finite(float(result.found_by_fit[k])),
         **({"harmless": result.is_harmless(k)} if result.information[k] <= 0.0 else {}),
         "effects": {
             symbol: {
@@ -272,7 +287,18 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
     """Write a row for every observation: each co-ordinate of each reading, and each item."""
     writer = CsvWriter(stream)
     writer.writerow(
-        ["kind", "position", "ball", "probe", "axis", "name", "redundancy", "unit", "minimal_detectable"]
+        [
+            "kind",
+            "position",
+            "ball",
+            "probe",
+            "axis",
+            "name",
+            "redundancy",
+            "unit",
+            "minimal_detectable",
+            "found_by_fit",
+        ]
         + [f"{symbol}_{what}" for symbol in SYMBOLS for what in ("effect_um", "standard_uncertainty_um", "at")]
     )
     design, given = result.design, result.patterns
@@ -286,7 +312,7 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             names = [position, design.ball_label(int(readings.ball[i])), probe, AXIS_NAMES[given.axis[k]]]
         unit = given.unit(k)
         cells: list[Any] = [given.kind[k], *names, name(given, k), repr(float(result.left[k])), SHOWN[unit]]
-        cells.append(_cell(result.detectable[k]))
+        cells += [_cell(result.detectable[k]), _cell(result.found_by_fit[k])]
         for symbol in SYMBOLS:
             cells += [
                 _cell(effects[symbol][k]),

@@ -16,23 +16,68 @@ from simulator.settings import listing
 
 from ..tables import SHOWN, number
 from .names import length_name, name, reading_name
-from .suspects import MOST, Suspect
+from .patterns import Patterns, position_order
+from .search import MOST
+from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
+
+# A direction of a cause is told from so many standard uncertainties on.
+CLEAR = 3.0
 
 
-def suspect_lines(found: Sequence[Suspect], marks: Sequence[Mark] = ()) -> list[str]:
-    """A line for each suspect, the most significant first; `marks` tell where the readings stand."""
-    lines = [f"suspected: {suspect_words(one, marks)}" for one in found]
-    if len(found) == MOST:
+def diagnosis_lines(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
+    """A line for each thing suspected, mistakes first; `marks` tell where the readings stand."""
+    lines = [f"suspected: {words}" for words in _all_words(found, marks)]
+    if len(found.suspects) == MOST:
         what = "look for what these have in common, or state larger uncertainties, or a richer error model"
         lines.append(f"suspected: there may be more than these {MOST}; {what}")
     return lines
 
 
+def _all_words(found: Diagnosis, marks: Sequence[Mark]) -> list[str]:
+    words = [suspect_words(one, marks) for one in found.suspects]
+    words += [scatter_words(found.scatter)] if found.scatter else []
+    return words + ([unexplained_words(found.unexplained)] if found.unexplained else [])
+
+
 def suspect_words(one: Suspect, marks: Sequence[Mark] = ()) -> str:
     """What is suspected, how significant it is, and what to do."""
     what, cure = _what(one, marks)
-    others = f"; it cannot be told from {listing(list(one.alternatives))}" if one.alternatives else ""
-    return f"{what} (statistic {number(one.statistic, 3)}, limit {number(one.limit, 3)}){others}; {cure}"
+    others = [*(_cause_name(one.patterns, columns) for columns in one.alternatives), *one.of_model]
+    told = f"; it cannot be told from {listing(others)}" if others else ""
+    return f"{what} {_significance(one)}{told}; {cure}"
+
+
+def scatter_words(one: MoreScatter) -> str:
+    """Which readings scatter more than the others."""
+    return (
+        f"readings {_scatter_place(one)} scatter {number(one.times, 2)} times as much as stated for the others "
+        f"{_significance(one)}; look for what was different there, or state their uncertainty in a column u"
+    )
+
+
+def unexplained_words(one: Unexplained) -> str:
+    """That no single mistake explains the residuals, and what may."""
+    best = f"what explains most is {one.words} {_significance(one)}" if one.words else f"{_significance(one)[1:-1]}"
+    return (
+        "the error model, a drift or the noise, for no single mistake explains the residuals, which are "
+        f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model, or larger uncertainties"
+    )
+
+
+def _scatter_place(one: MoreScatter) -> str:
+    if one.of.position >= 0:
+        return f"in position {one.design.position_names[one.of.position]}"
+    return f"with probe {one.design.probe_names[one.of.probe]}"
+
+
+def _significance(one: Suspect | MoreScatter | Unexplained) -> str:
+    return f"(statistic {number(one.statistic, 3)}, limit {number(one.limit, 3)})"
+
+
+def _cause_name(given: Patterns, columns: Sequence[int]) -> str:
+    """A cause by name, without the axis if it is about several."""
+    told = name(given, columns[0])
+    return told if len(columns) == 1 else told.rpartition(", ")[0]
 
 
 def with_uncertainty(value: float, uncertainty: float) -> str:
@@ -53,11 +98,10 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
     high = "high" if one.value > 0 else "low"
     long = "long" if one.value > 0 else "short"
-    touched = _touched(one)
-    lines = _lines(touched, marks)
+    lines = _lines(_touched(one), marks)
     leave = f"check or leave out {lines}" if lines else "check or leave out the readings"
     if kind in ("reading", "end"):
-        return f"{reading_name(design, subject)} read {size} too {high} in {letter}", leave
+        return f"{reading_name(design, subject)} read {_sizes(one, 'too high')}", leave
     if kind == "length":
         return f"{name(given, k)} read {size} too {long}", leave
     if kind == "prior":
@@ -73,24 +117,59 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         return told, "check the certificate, and the temperature of the artefact and of the scales"
     if kind == "probe":
         told = f"offset {letter} of probe {design.probe_names[subject]} stated {size} too {high}"
+        if len(one.columns) > 1:
+            told = f"offset of probe {design.probe_names[subject]} stated {_sizes(one, 'too high')}"
         return told, "qualify the probe again, or let its offset be estimated"
-    if kind == "ball":
+    place = design.position_names[subject] if kind in ("shift", "turn", "expansion") else ""
+    if kind in ("ball", "moved"):
         ball = design.ball_label(int(design.readings.ball[subject]))
         place = design.position_names[design.readings.position[subject]]
-        told = f"ball {ball} in position {place} read {size} too {high} in {letter} each time"
-        return told, f"clean the ball, and {leave}"
-    place = design.position_names[subject]
+        if kind == "ball":
+            told = f"ball {ball} in position {place} read {_sizes(one, 'too high')} each time"
+            return told, f"clean the ball, and {leave}"
+        told = f"ball {ball} displaced on its plate from position {place} on, by {_sizes(one, 'along')}"
+        return told, "look whether it is loose, dirty or another one; from there on it is a ball of its own"
     artefact = design.artefact_names[design.position_artefact[subject]]
     if kind in ("shift", "turn"):
-        how = f"by {'' if one.value > 0 else '-'}{size} {'along' if kind == 'shift' else 'about'} {letter}"
-        start = [i for i in touched if i == int(given.start[k])]
-        before = _lines(start, marks) or reading_name(design, int(given.start[k]))
         return (
-            f"{artefact} slipped in position {place}, {how}, about before {before}",
+            f"{artefact} slipped in position {place}, by {_sizes(one, 'along')}, {_moment(one, marks)}",
             "read the position again, or state two positions, one for each part",
         )
-    larger = "larger" if one.value > 0 else "smaller"
-    return f"{artefact} {size} {larger} in position {place}", "check the temperature there"
+    parts = []
+    for column, value, uncertainty in zip(one.columns, one.values, one.standard_uncertainties, strict=True):
+        larger = "larger" if value > 0 else "smaller"
+        told = f"{with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)} {SHOWN[one.unit]} {larger}"
+        parts.append(f"{told} in position {design.position_names[given.subject[column]]}")
+    return f"{artefact} {' and '.join(parts)}", "check the temperature there"
+
+
+def _sizes(one: Suspect, how: str) -> str:
+    """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "… along x"."""
+    given = one.patterns
+    ratio = np.abs(one.values) / one.standard_uncertainties
+    parts = []
+    for place in np.flatnonzero((ratio >= CLEAR) | (ratio == ratio.max())):
+        column, value = one.columns[place], float(one.values[place])
+        size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
+        letter, unit = AXIS_NAMES[given.axis[column]], SHOWN[given.unit(int(column))]
+        if how == "too high":
+            parts.append(f"{size} {unit} too {'high' if value > 0 else 'low'} in {letter}")
+        else:
+            preposition = "about" if given.kind[column] == "turn" else "along"
+            parts.append(f"{'' if value > 0 else '-'}{size} {unit} {preposition} {letter}")
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
+
+
+def _moment(one: Suspect, marks: Sequence[Mark]) -> str:
+    """When a plate slipped, by the lines of the readings next to it."""
+    design, start = one.patterns.design, int(one.patterns.start[one.pattern])
+    rows = np.flatnonzero(design.readings.position == int(one.patterns.subject[one.pattern]))
+    before = int(rows[np.searchsorted(rows, one.first) - 1])
+    if marks:
+        lines, file = (marks[before].line, marks[one.last].line), Path(marks[start].file).name
+        probably = f", probably before line {marks[start].line}" if one.last > one.first else ""
+        return f"between lines {lines[0]} and {lines[1]} of {file}{probably}"
+    return f"between {reading_name(design, before)} and {reading_name(design, one.last)}"
 
 
 def _touched(one: Suspect) -> list[int]:
@@ -103,9 +182,10 @@ def _touched(one: Suspect) -> list[int]:
     if kind == "length":
         ends = (int(design.lengths.first[subject]), int(design.lengths.second[subject]))
         return [i for i in ends if i >= 0]
-    if kind == "ball":
-        same = (readings.ball == readings.ball[subject]) & (readings.position == readings.position[subject])
-        return _indices(np.flatnonzero(same))
+    if kind in ("ball", "moved"):
+        order = position_order(design)[readings.position]
+        here = order == order[subject] if kind == "ball" else order >= order[subject]
+        return _indices(np.flatnonzero((readings.ball == readings.ball[subject]) & here))
     if kind in ("shift", "turn"):
         return [int(given.start[k])]
     return []
@@ -126,20 +206,51 @@ def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
     return f"lines {', '.join(numbers[:-1])} and {numbers[-1]} of {file}"
 
 
-def suspect_data(found: Sequence[Suspect], marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
-    """Suspects as plain data in metres, radians and ratios."""
-    return [
-        {
-            "name": name(one.patterns, one.pattern),
-            "kind": str(one.patterns.kind[one.pattern]),
-            "value": one.value,
-            "standard_uncertainty": one.standard_uncertainty,
-            "unit": one.unit,
-            "statistic": one.statistic,
-            "limit": one.limit,
-            "lines": [marks[i].line for i in _touched(one)] if marks else [],
-            "alternatives": list(one.alternatives),
-            "words": suspect_words(one, marks),
-        }
-        for one in found
-    ]
+def diagnosis_data(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
+    """What is suspected as plain data in metres, radians and ratios."""
+    told = [_suspect_data(one, marks) for one in found.suspects]
+    if found.scatter:
+        what = f"scatter of the readings {_scatter_place(found.scatter)}"
+        told.append(_other_data(what, "scatter", found.scatter, scatter_words(found.scatter)))
+    if found.unexplained:
+        what = found.unexplained.words or "error model, drift or noise"
+        told.append(_other_data(what, "model", found.unexplained, unexplained_words(found.unexplained)))
+    return told
+
+
+def _suspect_data(one: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
+    given = one.patterns
+    return {
+        "name": name(given, one.pattern),
+        "kind": str(given.kind[one.pattern]),
+        "value": one.value,
+        "standard_uncertainty": one.standard_uncertainty,
+        "unit": one.unit,
+        "statistic": one.statistic,
+        "limit": one.limit,
+        "lines": [marks[i].line for i in _touched(one)] if marks else [],
+        "directions": [
+            {"name": name(given, k), "value": value, "standard_uncertainty": u, "unit": given.unit(k)}
+            for k, value, u in zip(
+                one.columns.tolist(), one.values.tolist(), one.standard_uncertainties.tolist(), strict=True
+            )
+        ],
+        "alternatives": [*(_cause_name(given, columns) for columns in one.alternatives), *one.of_model],
+        "words": suspect_words(one, marks),
+    }
+
+
+def _other_data(what: str, kind: str, one: MoreScatter | Unexplained, words: str) -> dict[str, Any]:
+    return {
+        "name": what,
+        "kind": kind,
+        "value": one.times,
+        "standard_uncertainty": None,
+        "unit": "1",
+        "statistic": one.statistic,
+        "limit": one.limit,
+        "lines": [],
+        "directions": [],
+        "alternatives": [],
+        "words": words,
+    }

@@ -177,6 +177,13 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         x[subject] += step
     elif kind == "ball":
         x[(readings.ball == readings.ball[subject]) & (readings.position == readings.position[subject])] += step
+    elif kind == "moved":
+        # Positions are read one after the other in these designs.
+        later = (readings.ball == readings.ball[subject]) & (readings.position >= readings.position[subject])
+        balls = design.balls.copy()
+        balls[readings.ball[subject]] += step
+        displaced = expected_readings(design, replace(state, balls=balls), readings)
+        x[later] = displaced[later]
     elif kind == "shift":
         x[here & (np.arange(len(x)) >= given.start[k])] += step
     elif kind == "turn":
@@ -232,7 +239,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
             sides.append(whitened_residuals(biased, layout, state, x))
         expected = (sides[0] - sides[1]) / 2e-6
         np.testing.assert_allclose(matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k])
-    wanted = {"reading", "distance", "shift", "turn", "probe", "expansion", "scale"}
+    wanted = {"reading", "distance", "moved", "shift", "turn", "probe", "expansion", "scale"}
     assert wanted <= seen and (text is not MIXED or {"ball", "length value", "coordinate", "prior"} <= seen)
 
 

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from scipy.special import nctdtr
 from scipy.stats import binom
 
+from analysis.reliability.leftover import Columns, leftover
+from analysis.reliability.patterns import Patterns, patterns
 from analysis.reliability.power import alarm_limit, chance_of_alarm, noncentrality
+from analysis.reliability.search import diagnosis
 from analysis.reliability.study import Reliability, reliability_of
-from analysis.reliability.suspects import Search, studentised, suspects
 from simulator.design import Design, nominal_state
 from simulator.estimation.covariance import covariance, spectrum
 from simulator.estimation.elimination import eliminate
@@ -197,19 +199,24 @@ def freedom_of(design: Design) -> int:
     return design.observations - design.parameter_count
 
 
-def matching(found: Search, planned: Reliability, k: int) -> int:
+def studentised(statistic: Real, sum_of_squares: Real | float, freedom: int) -> Real:
+    """Statistics in terms of the sigma that the other observations show."""
+    return statistic / np.sqrt((sum_of_squares - statistic**2) / (freedom - 1))
+
+
+def matching(found: Patterns, planned: Reliability, k: int) -> int:
     """The pattern of a fit that is the planned one, whose readings are rows of their own for each repeat."""
     names = planned.patterns
     kind, subject = names.kind[k], names.subject[k]
-    same = found.patterns.of_kind(kind)
+    same = found.of_kind(kind)
     place = int(np.flatnonzero(names.of_kind(kind) == k)[0])
     if kind in ("reading", "ball"):
         was, now = planned.design.readings, found.design.readings
         row = int(subject)
         for other in same.tolist():
-            i = int(found.patterns.subject[other])
+            i = int(found.subject[other])
             at = (now.ball[i], now.position[i], now.probe[i])
-            if at == (was.ball[row], was.position[row], was.probe[row]) and found.patterns.axis[other] == names.axis[k]:
+            if at == (was.ball[row], was.position[row], was.probe[row]) and found.axis[other] == names.axis[k]:
                 return other
         raise AssertionError(kind)
     assert len(same) == len(names.of_kind(kind))
@@ -235,8 +242,10 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
                 k = int(every[r % len(every)])
                 seed = 100_000 * number + 1000 * int(estimated) + r
                 observed, solution = world.fitted(seed, planned, k, float(planned.detectable[k]))
-                found = Search(observed.design, shared_layout(observed.design), solution, observed.x)
-                statistic, freedom = found.statistics()[matching(found, planned, k)], freedom_of(observed.design)
+                freedom = freedom_of(observed.design)
+                found = patterns(observed.design, solution.state, observed.x)
+                left = leftover(observed.design, solution.state, observed.x, freedom)
+                statistic = Columns(found.matrix, [], left).statistics()[matching(found, planned, k)]
                 limit = alarm_limit(FALSE_ALARM)
                 if estimated:
                     statistic = studentised(statistic, solution.factor.sum_of_squares, freedom)
@@ -267,7 +276,7 @@ def alarms(folder: Path, text: str, fits: int) -> dict[bool, int]:
     for r in range(fits):
         observed, solution = world.fitted(r)
         for estimated in found:
-            told = suspects(observed.design, solution, observed.x, freedom_of(observed.design), estimated)
+            told = diagnosis(observed.design, solution, observed.x, freedom_of(observed.design), estimated)
             found[estimated] += bool(told)
     return found
 
