@@ -32,6 +32,9 @@ HIDDEN = 1e-8
 # Residuals of this many standard uncertainties are rounding, of readings without noise.
 ROUNDING = 1e-6
 
+# Share of a sum of squares that rounding leaves.
+LEFT = 1e-12
+
 # Two patterns whose estimates are correlated more than this cannot be told apart.
 ALIKE = 0.9999
 
@@ -80,7 +83,9 @@ def suspects(design: Design, solution: Solution, x: Array, freedom: int, sigma_i
         if ratio[k] <= limit:
             break
         chosen.append((k, float(ratio[k]), limit))
-        sum_of_squares -= statistic[k] ** 2
+        # What one bias explains wholly leaves rounding, of either sign.
+        least = LEFT * solution.factor.sum_of_squares
+        sum_of_squares = max(sum_of_squares - float(statistic[k]) ** 2, least)
         freedom -= 1
         found.take_out(k)
     scale = math.sqrt(sum_of_squares / freedom) if sigma_is_estimated else 1.0
