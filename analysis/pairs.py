@@ -12,7 +12,7 @@ from simulator.design import Integers
 from simulator.geometry.motions import without_rigid_motion
 from simulator.machines.protocol import Array
 from simulator.quantities import LengthFunction
-from simulator.rounding import above, comparable
+from simulator.rounding import comparable
 
 # Places on a side of the tiles in which pairs are worked through: their products stay in cache.
 TILE = 256
@@ -33,7 +33,9 @@ class PairSummary:
     within: int = 0
 
     def __add__(self, other: PairSummary) -> PairSummary:
-        top = other if above(other.maximum, self.maximum) else self
+        one, two = comparable([self.maximum, other.maximum])
+        # Of equal ones the first by its places, so that tiles do not matter.
+        top = other if two > one or (two == one and other.where < self.where) else self
         return PairSummary(
             self.count + other.count,
             self.undetermined + other.undetermined,

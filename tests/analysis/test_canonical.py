@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from analysis.canonical import elementary_mixture, principal_directions
-from analysis.rank import null_directions, weak_directions
+from analysis.rank import null_directions, verdict
 from simulator.design import Design, nominal_state
 from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from simulator.estimation.elimination import eliminate
 from simulator.estimation.parameters import SharedLayout, shared_layout
 from simulator.experiment.load import load
 from simulator.layout import lay_out
-from simulator.quantities import LengthFunction
+from simulator.quantities import LengthFunction, Target
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 NOISE = 1e-12
@@ -71,7 +71,7 @@ def test_any_basis_of_what_is_open_gives_the_same_words(file: str, variant: str,
 @given(seed=st.integers(0, 2**32 - 1), target=st.sampled_from([2e-8, 4e-8]))
 @settings(max_examples=4, deadline=None)
 def test_any_basis_of_equally_weak_directions_gives_the_same_words(seed: int, target: float) -> None:
-    design, layout, found, _ = judged("npl/6.1.1.yaml", "A")
+    design, layout, found, spread = judged("npl/6.1.1.yaml", "A")
     # Neighbours in threes are made equal, and then mixed.
     values = found.values.copy()
     mixed = found.directions / found.scale[:, None]
@@ -87,7 +87,7 @@ def test_any_basis_of_equally_weak_directions_gives_the_same_words(seed: int, ta
         directions=mixed * found.scale[:, None],
     )
     told, same = (
-        [str(one) for one in weak_directions(design, layout, one, LengthFunction(target, 0.0))]
+        [str(one) for one in verdict(design, layout, one, spread, target=Target(LengthFunction(target, 0.0))).weak]
         for one in (equal, other)
     )
     assert len(told) > 3

@@ -110,7 +110,7 @@ def test_the_size_is_the_smallest_that_does(tmp_path: Path) -> None:
     for size, does in ((edge, True), (edge - 1, False)):
         value = average(tmp_path, ("[750 mm, 750 mm]", f"[{size} mm, {size} mm]"))
         assert (value <= 1.2 * present) is does
-    assert found.remarks[0].startswith("from 751 mm x 751 mm on the file is wrong: positions[1]: reading ball")
+    assert found.remarks[0].startswith("from 752 mm x 752 mm on the file is wrong: positions[1]: reading ball")
 
 
 @pytest.mark.parametrize("drawn", [(4, 4), (4, 3), (3, 5)])

@@ -24,6 +24,8 @@ FOLDER = Path("designs", "certified")
 # Digits after the point of readings and certified values in metres, and digits of what is certified.
 DECIMALS = 15
 CERTIFIED_DIGITS = 25
+# What readings may still change by, in metres, when their noise is made orthogonal once more.
+MOST_ROUNDS, SETTLED = 10, mpf("1e-16")
 # Goes before the digits of a number while `json` takes it for text.
 MARK = "number "
 
@@ -55,7 +57,8 @@ def built(problem: Problem, seed: int) -> tuple[Problem, exact.State]:
     p = problem
     target = [exact.place(p, state, int(r["position"]), int(r["ball"])) for r in p["readings"]]
     x = exact.without_error(p, state, target)
-    for _ in range(2):
+    for _ in range(MOST_ROUNDS):
+        before = x
         every = exact.rows(p, x)
         linear = exact.linearised(p, state, every)
         if noise is None:
@@ -72,6 +75,9 @@ def built(problem: Problem, seed: int) -> tuple[Problem, exact.State]:
             for value, derivative in zip(noise, linear.derivatives, strict=True)
         ]
         p, x = with_residuals(p, state, target, noise)
+        # The derivatives are those at readings that the noise has moved.
+        if max(abs(a - b) for new, old in zip(x, before, strict=True) for a, b in zip(new, old, strict=True)) < SETTLED:
+            break
     rounded = [[mpf(nstr_fixed(c)) for c in values] for values in x]
     for key in ("distances", "coordinates", "lengths", "priors"):
         p = {**p, key: [{**item, "value": mpf(nstr_fixed(item["value"]))} for item in p[key]]}

@@ -358,7 +358,7 @@ def test_length_equations_of_shared_balls(pairs: str, lengths: int, independent:
     np.testing.assert_allclose(found.factors, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
-MACHINE = {"volume": ["600 mm", "500 mm", "400 mm"], "repeatability": "1 um"}
+MACHINE = {"volume": ["600 mm", "500 mm", "500 mm"], "repeatability": "1 um"}
 
 
 def test_a_ball_a_little_off_the_line_counts_as_in_line(tmp_path: Path) -> None:

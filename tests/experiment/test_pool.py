@@ -348,9 +348,9 @@ MISTAKES = [
     ("levels: [0 mm, 600 mm]", "levels: {z: 0 mm}", ['19:15: pool.candidates[0].levels.x: missing; add "x"']),
     ("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 1 m}", [
         '19:15: pool.candidates[0].levels.count: missing; add "count" (how many)']),
-    ("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 1 m, count: 1000}\n      quarter_turns: [0, 1, 2, 3, 4, 5, 6]",
-     [
-        "16:7: pool.candidates[0]: there are 28001 candidates up to here; at most 20000 are possible"]),
+    ("levels: [0 mm, 600 mm]",
+     "levels: {from: 0 mm, to: 1 m, count: 1000}\n      quarter_turns: [0, 1, 2, 3]\n      balls: [all, corners]", [
+        "16:7: pool.candidates[0]: there are 32001 candidates up to here; at most 20000 are possible"]),
     (SOME_CORNERS, "corners: {y: 400 mm}", [
         '20:16: pool.candidates[0].corners.x: missing; add "x"',
         '20:16: pool.candidates[0].corners.z: missing; add "z"']),

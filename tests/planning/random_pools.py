@@ -41,6 +41,8 @@ FREE: dict[str, Any] = {
 }
 BAR: dict[str, Any] = {"kind": "two_spheres", "length": "230 mm", "role": "length_standard"}
 SIDES = {"x": 600, "y": 500, "z": 450}
+# What the longest offset of a probe takes the scales beyond a ball.
+MARGIN = 50
 PROBES = {"down": [0, 0, -40], "right": [40, 0, 0], "back": [0, 40, 0]}
 
 
@@ -97,9 +99,13 @@ def _said(generator: np.random.Generator) -> dict[str, Any]:
     kinematic = d == 3 and generator.random() < 0.4
     artefacts = _artefacts(generator, d)
     probes = {name: [f"{x} mm" for x in PROBES[name][:d]] for name in PROBES}
+    volume = {axis: [f"-{MARGIN} mm", f"{SIDES[axis] + MARGIN} mm"] for axis in axes}
     said: dict[str, Any] = {
         "title": "a pool at random",
-        "machine": {"volume": [f"{SIDES[axis]} mm" for axis in axes], "repeatability": "1 um"},
+        "machine": {
+            "volume": {axis: [f"-{MARGIN} mm", f"{SIDES[axis] + MARGIN} mm"] for axis in axes},
+            "repeatability": "1 um",
+        },
         "error_model": {"kind": "metric"},
         "probes": probes,
         "artefacts": artefacts,

@@ -26,7 +26,7 @@ from .random_pools import write_some
 
 TEXT = """
 title: a day on a small machine
-machine: {volume: [600 mm, 500 mm, 400 mm], repeatability: 1 um}
+machine: {volume: [600 mm, 500 mm, 450 mm], repeatability: 1 um}
 error_model: {kind: metric}
 probes: {down: [0 mm, 0 mm, -40 mm], right: [40 mm, 0 mm, 0 mm]}
 artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 200 mm]}}

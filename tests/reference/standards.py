@@ -12,7 +12,7 @@ from simulator.experiment.model import Experiment
 
 PLATE: dict[str, Any] = {
     "title": "a plate and a length standard",
-    "machine": {"volume": ["600 mm", "500 mm", "400 mm"], "repeatability": ["1 um", "0.7 um", "1.3 um"]},
+    "machine": {"volume": ["600 mm", "500 mm", "500 mm"], "repeatability": ["1 um", "0.7 um", "1.3 um"]},
     "error_model": {
         "kind": "kinematic",
         "arrangement": "MB2",

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.reliability.names import name
+from analysis.reliability.search import diagnosis
 from analysis.reliability.study import reliability_of
-from analysis.reliability.suspects import suspects
 from analysis.reliability.tables import reliability_data, write_observations
 from simulator.design import Design, nominal_state
 from simulator.estimation.gauss_newton import gauss_newton
@@ -108,10 +108,11 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)
     freedom = design.observations - design.parameter_count
-    first = suspects(design, solution, x, freedom, sigma_is_estimated=False)[0]
+    (first,) = diagnosis(design, solution, x, freedom, sigma_is_estimated=False).suspects
     given, k = first.patterns, first.pattern
-    assert (given.kind[k], int(given.subject[k]), int(given.axis[k])) == ("end", wrong, 0)
-    assert first.value == pytest.approx(3e-5, abs=4 * first.standard_uncertainty)
+    assert (given.kind[k], int(given.subject[k])) == ("end", wrong)
+    along_x = next(i for i, column in enumerate(first.columns) if given.axis[column] == 0)
+    assert first.values[along_x] == pytest.approx(3e-5, abs=4 * first.standard_uncertainties[along_x])
 
 
 def test_tables_hold_the_readings_of_standards(tmp_path: Path) -> None:
