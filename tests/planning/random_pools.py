@@ -102,10 +102,7 @@ def _said(generator: np.random.Generator) -> dict[str, Any]:
     volume = {axis: [f"-{MARGIN} mm", f"{SIDES[axis] + MARGIN} mm"] for axis in axes}
     said: dict[str, Any] = {
         "title": "a pool at random",
-        "machine": {
-            "volume": {axis: [f"-{MARGIN} mm", f"{SIDES[axis] + MARGIN} mm"] for axis in axes},
-            "repeatability": "1 um",
-        },
+        "machine": {"volume": volume, "repeatability": "1 um"},
         "error_model": {"kind": "metric"},
         "probes": probes,
         "artefacts": artefacts,
