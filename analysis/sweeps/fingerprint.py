@@ -20,8 +20,8 @@ from simulator.settings import Settings
 # begins whenever any experiment comes to other figures or another verdict; its number is part of every cell's key.
 METHODS = {
     1: "",
-    2: "lengths of standards that share a ball, priors and readings far tighter than others, the ratio of actual errors "
-    "to those predicted, and the order and number of weakly determined directions",
+    2: "lengths of standards that share a ball, priors and readings far tighter than others, the ratio of actual "
+    "errors to those predicted, and the order and number of weakly determined directions",
 }
 METHOD = max(METHODS)
 
