@@ -319,6 +319,8 @@ def _slips(at: _Place) -> Iterator[Block]:
         rows = np.flatnonzero(at.readings.position == k)
         starts = _slip_starts(at, rows)
         starts = starts[(starts > 0) & (starts < len(rows))]
+        if not len(starts):
+            continue
         group, late = _runs(starts, np.full(len(starts), len(rows)))
         moved = rows[late]
         first = at.chosen[rows[starts]]
