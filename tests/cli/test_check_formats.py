@@ -280,6 +280,7 @@ def test_the_action_checks(tmp_path: Path) -> None:
         "FILES": "${{ inputs.files }}",
         "GOALS": "${{ inputs.goals }}",
         "FAIL_WEAK": "${{ inputs.fail-weak }}",
+        "MODULES": "${{ inputs.modules }}",
     }
     a_repository(tmp_path)
     found = shell(check["run"], tmp_path, FILES=action["inputs"]["files"]["default"])
