@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from simulator.experiment.messages import in_one_line
+
 from .checking import CheckedDesign, CheckedFile
 from .planning.repair.tables import certificate_lines, repair_lines
 from .tables import scale_lines, target_lines, verdict_lines
@@ -37,7 +39,7 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
         # What stands before the name keeps it from being read as a command, and so does the space after a hash.
         first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
         start = f"as expected: {file}: {design.plan.label}: "
-        return [f"{start}{line}".replace("##[", "# #[").replace("\n", " ") for line in (first, *suggested)]
+        return [in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)]
     place = design.place
     # The log of a run shows only the message, so that it names the place again.
     text = "\n".join([f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}", *told[1:], *suggested])
@@ -75,7 +77,8 @@ def in_message(text: str) -> str:
     >>> in_message("5 %\nnext")
     '5 %25%0Anext'
     """
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    lines = (in_one_line(line) for line in text.split("\n"))
+    return "\n".join(lines).replace("%", "%25").replace("\n", "%0A")
 
 
 def in_property(text: str) -> str:

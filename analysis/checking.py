@@ -47,12 +47,14 @@ class CheckedDesign:
 class Wanted:
     """What designs are checked for besides their rank: `goals`, and whether a weak direction fails.
 
-    With `repairs` changes are looked for that would determine the rest.
+    With `repairs` changes are looked for that would determine the rest. Without `with_modules` no error model in Python
+    is run, and files that have one are refused.
     """
 
     goals: tuple[Goal, ...] = ()
     nothing_weak: bool = False
     repairs: bool = False
+    with_modules: bool = True
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def check_files(
     complete = True
     for path in files:
         try:
-            experiments = load(path)
+            experiments = load(path, with_modules=wanted.with_modules)
             found |= {experiment.name for experiment in experiments}
             chosen = [one for one in experiments if not variants or one.name in variants]
             # What a plan may choose from is loaded where it is asked for only.

@@ -27,6 +27,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "if a file cannot be used, and the others are then checked nevertheless.",
     )
     add_file(parser, several=True)
+    parser.epilog = (
+        "FILE may be a pattern such as designs/**/*.yaml, in which ** stands for any folders; files in folders named "
+        "sweeps or machines are then left out."
+    )
     parser.add_argument(
         "--format",
         choices=FORMATS,
@@ -54,6 +58,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--fail-weak", action="store_true", help="let a design with a weakly determined direction fail, too"
     )
+    parser.add_argument(
+        "--no-modules",
+        action="store_true",
+        help="refuse files with an error model in Python, which is code that loading them runs",
+    )
     parser.set_defaults(run=run)
 
 
@@ -61,6 +70,7 @@ def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
     from ..annotations import advice_lines, annotation_lines
     from ..checking import Wanted, check_files
+    from ..file_patterns import matching_files
     from ..goals import GoalError, parse_goal
     from ..junit import junit_report
     from ..tables import plan_data, plan_lines
@@ -77,7 +87,8 @@ def run(options: Namespace) -> int:
         print("ballplate check: --share goes with --goal lengths; add it", file=sys.stderr)
         return WRONG_USAGE
     files = []
-    for checked in check_files(options.files, options.variant, Wanted(goals, options.fail_weak, options.suggest)):
+    wanted = Wanted(goals, options.fail_weak, options.suggest, not options.no_modules)
+    for checked in check_files(matching_files(options.files), options.variant, wanted):
         files.append(checked)
         for doubt in checked.doubts:
             print(f"warning: {doubt}", file=sys.stderr)

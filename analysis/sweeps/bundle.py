@@ -11,7 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.yamltree import Node, Scalar, read_tree, to_python, walk
+from simulator.experiment.modules import python_models
+from simulator.experiment.yamltree import Node, read_tree, to_python
 
 from .model import Sweep
 from .named_files import named_files
@@ -92,7 +93,7 @@ def unpack(bundle: Bundle, folder: Path) -> Path:
 
 def has_code(tree: Node) -> bool:
     """Whether an experiment may have an error model written in Python."""
-    return any(isinstance(node, Scalar) and node.value == "python" for _, node in walk(tree))
+    return any(True for _ in python_models(tree))
 
 
 def code_digest(bundle: Bundle) -> str:

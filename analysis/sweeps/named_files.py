@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
 from simulator.experiment.messages import ExperimentError
+from simulator.experiment.modules import python_models
 from simulator.experiment.yamltree import Mapping, Node, Scalar, read_tree
 from simulator.experiment.yamltree import Sequence as Entries
 
@@ -105,25 +106,13 @@ def _of_machine_file(path: Path) -> Iterator[Path]:
 def _modules(nodes: Sequence[tuple[str, Node]], folder: Path) -> Iterator[tuple[Path, Scalar]]:
     """Objects of error models in Python, each with the folder of its module."""
     for path, node in nodes:
-        for mapping in _python_models(node):
+        for _, mapping in python_models(node):
             name, own = mapping.items.get("object"), mapping.items.get("folder")
             if isinstance(name, Scalar):
                 inner = str(own.value) if isinstance(own, Scalar) and own.value is not None else "."
                 yield Path(os.path.abspath(folder / inner)), name
         if isinstance(node, Scalar) and _last(path) == "object":
             yield folder, node
-
-
-def _python_models(node: Node) -> Iterator[Mapping]:
-    if isinstance(node, Mapping):
-        kind = node.items.get("kind")
-        if isinstance(kind, Scalar) and kind.value == "python":
-            yield node
-        for item in node.items.values():
-            yield from _python_models(item)
-    elif isinstance(node, Entries):
-        for item in node.items:
-            yield from _python_models(item)
 
 
 def _imported(folder: Path, module: str) -> set[Path]:

@@ -20,6 +20,7 @@ from .checks import (
 from .machine import resolve_evaluation, resolve_machine, target_of
 from .messages import ExperimentError, Message, Steps, format_path
 from .model import Calibration, Experiment
+from .modules import refused_modules
 from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
@@ -31,12 +32,13 @@ from .variants import in_variants, variant_trees
 from .yamltree import Mapping, Mark, Node, mark_of, read_tree
 
 
-def load(path: str | os.PathLike[str], planning: bool = False) -> tuple[Experiment, ...]:
+def load(path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True) -> tuple[Experiment, ...]:
     """Load an experiment file.
 
     Returns the experiment, or one per variant in the order of the file. Tables that the file names are read
     from the folder it is in. For ``planning`` an experiment has its pool, and positions may be missing where there is
-    one; otherwise what only the pool places is left out.
+    one; otherwise what only the pool places is left out. Error models in Python are code that loading runs; without
+    ``with_modules`` files that have any are refused, and nothing is run.
 
     :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
     """
@@ -45,6 +47,10 @@ def load(path: str | os.PathLike[str], planning: bool = False) -> tuple[Experime
     root = read_tree(source, refused)
     base_problems = Problems(root)
     trees = variant_trees(root, base_problems)
+    if not with_modules:
+        forbidden = {message for tree in (root, *trees.values()) for message in refused_modules(tree)}
+        if forbidden:
+            raise ExperimentError(sorted(forbidden))
     if not trees:
         experiment, messages = build(_without_variants(root), source, None, planning)
         _raise_if_any([*base_problems.messages, *messages], refused, source)

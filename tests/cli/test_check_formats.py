@@ -119,7 +119,7 @@ def test_files_are_named_from_the_top_of_the_repository(
 
 
 def test_escapes_of_workflow_commands() -> None:
-    assert in_message("50 %\r\n%0A: a, b") == "50 %25%0D%0A%250A: a, b"
+    assert in_message("50 %\r\n%0A: a, b") == "50 %25\\x0d%0A%250A: a, b"
     assert in_property("a:b,c%\n") == "a%3Ab%2Cc%25%0A"
     message = Message("odd, name: 5 %.yaml", 3, 4, "title", "two\nlines, 5 %")
     (line,) = annotation_lines(CheckedFile("odd, name: 5 %.yaml", (), (message,)))
@@ -280,6 +280,7 @@ def test_the_action_checks(tmp_path: Path) -> None:
         "FILES": "${{ inputs.files }}",
         "GOALS": "${{ inputs.goals }}",
         "FAIL_WEAK": "${{ inputs.fail-weak }}",
+        "MODULES": "${{ inputs.modules }}",
     }
     a_repository(tmp_path)
     found = shell(check["run"], tmp_path, FILES=action["inputs"]["files"]["default"])

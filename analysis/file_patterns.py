@@ -1,0 +1,28 @@
+"""Files that patterns stand for, on systems whose shell does not expand them as well."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from pathlib import Path
+
+# Folders whose YAML files are no experiments.
+OTHERS = ("sweeps", "machines")
+
+
+def matching_files(given: Sequence[Path]) -> list[Path]:
+    """Files and patterns as files, each once; those in folders of sweeps and machines are left out of patterns.
+
+    A pattern that matches nothing stays as it is, and is told as a file that is not there.
+    """
+    found: dict[Path, None] = {}
+    for path in given:
+        matches = [Path(name) for name in sorted(glob.glob(str(path), recursive=True))] if is_pattern(path) else []
+        chosen = [one for one in matches if one.is_file() and not set(one.parts[:-1]) & set(OTHERS)]
+        found |= dict.fromkeys(chosen or [path])
+    return list(found)
+
+
+def is_pattern(path: Path) -> bool:
+    """Whether a path is a pattern, and not the name of a file."""
+    return glob.has_magic(str(path)) and not path.exists()
