@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
 
 # Folders whose YAML files are no experiments.
@@ -18,7 +19,9 @@ def matching_files(given: Sequence[Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for path in given:
         matches = [Path(name) for name in sorted(glob.glob(str(path), recursive=True))] if is_pattern(path) else []
-        chosen = [one for one in matches if one.is_file() and not set(one.parts[:-1]) & set(OTHERS)]
+        # Folders that the pattern names itself are meant.
+        named = sum(1 for _ in takewhile(lambda part: not glob.has_magic(part), path.parts))
+        chosen = [one for one in matches if one.is_file() and not set(one.parts[named:-1]) & set(OTHERS)]
         found |= dict.fromkeys(chosen or [path])
     return list(found)
 

@@ -122,6 +122,8 @@ def judge(goal: Goal, plan: Plan | Worth) -> Judgement:
         value = getattr(found, goal.statistic)
         is_met = not found.undetermined and value <= goal.limit
         words = f"{goal.statistic} {goal.symbol} {number(1e6 * value)} {shown_unit(found.unit)}"
+        # A file whose targets are of expanded uncertainties may make one think that this is one.
+        words += "" if found.coverage_factor == 1.0 else " (standard uncertainty)"
         distance = math.inf if math.isnan(value) else value / goal.limit
         return Judgement(is_met, distance + found.undetermined, words + _open(found), found.undetermined)
     found = plan.quantities["U6"]

@@ -51,17 +51,19 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
         lines.append("what is undetermined changes none of these lengths; those of another --grid it may change")
     if found.worst is not None:
         i, j = found.worst
-        told = f"largest ratio of u to the target: {number(float(whole.maximum_ratio[0]))}"
+        ratio = settings.target_factor * float(whole.maximum_ratio[0])
+        told = f"largest ratio of {_compared(found)} to the target: {number(ratio)}"
         lines.append(f"{told}, from {_place(found.points[i])} to {_place(found.points[j])}")
     return [
         *lines,
         "",
-        *_table("length", _class_names(found.edges), found.by_length, k, _class_targets(found)),
+        *_table("length", _class_names(found.edges), found.by_length, found, _class_targets(found)),
         "",
-        *_table("direction", list(found.directions), found.by_direction, k, None),
+        *_table("direction", list(found.directions), found.by_direction, found, None),
         "",
-        *_table("point, mm", *_extremes(found), k, None),
-        "(points in the order of their largest ratio of u to the target; lengths are those that start or end there)",
+        *_table("point, mm", *_extremes(found), found, None),
+        f"(points in the order of their largest ratio of {_compared(found)} to the target; lengths are those that "
+        "start or end there)",
     ]
 
 
@@ -97,17 +99,24 @@ def _extremes(found: LengthMap) -> tuple[list[str], Groups]:
     return names, Groups(**{name: values[chosen] for name, values in vars(found.by_point).items()})
 
 
-def _table(head: str, names: list[str], groups: Groups, k: str, targets: list[str] | None) -> list[str]:
+def _compared(found: LengthMap) -> str:
+    """The uncertainty that the target is meant for, as a symbol."""
+    factor = found.settings.target_factor
+    return "u" if factor == 1.0 else f"{factor:g} u"
+
+
+def _table(head: str, names: list[str], groups: Groups, found: LengthMap, targets: list[str] | None) -> list[str]:
+    factor = found.settings.coverage_factor
+    k = f"{factor:g}"
     heads = [head, "lengths", "undetermined", "u average, um", "maximum", f"{k} u maximum", "target"]
-    heads += ["u / target, maximum", "u within", f"{k} u within"]
+    heads += [f"{_compared(found)} / target, maximum", "u within", f"{k} u within"]
     rows = [heads]
-    factor = float(k)
     for i, name in enumerate(names):
         if not groups.count[i]:
             continue
         row = [name, str(groups.count[i]), str(groups.undetermined[i])]
         row += [number(1e6 * float(v[i])) for v in (groups.average, groups.maximum, factor * groups.maximum)]
-        row += [targets[i] if targets else "", number(float(groups.maximum_ratio[i]))]
+        row += [targets[i] if targets else "", number(found.settings.target_factor * float(groups.maximum_ratio[i]))]
         row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
         rows.append(row)
     unused = {6} if not targets else set[int]()

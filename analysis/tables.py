@@ -209,7 +209,9 @@ def verdict_lines(judged: Verdict, with_values: bool = False, lengths: Quantity 
 def _lengths_words(lengths: Quantity) -> str:
     if math.isnan(lengths.average):
         return "all are undetermined"
-    words = f"U6 {number(1e6 * lengths.average)} um on the average, {number(1e6 * lengths.maximum)} um at most"
+    # Beside a share that is of an expanded uncertainty, it has to be said what this is.
+    symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
+    words = f"{symbol} {number(1e6 * lengths.average)} um on the average, {number(1e6 * lengths.maximum)} um at most"
     open_ = f", {lengths.undetermined} of {lengths.count} distances undetermined" if lengths.undetermined else ""
     return words + open_
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from simulator.experiment.messages import ExperimentError, Message
-from simulator.settings import hint
+from simulator.settings import hint, shorten
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,23 @@ def _problem(path: Path) -> CertifiedProblem:
     return CertifiedProblem(str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"])
 
 
-def read_results(path: Path) -> dict[str, Any]:
+def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, Any]:
     """Answers of a program by the names of problems: the mapping under `problems` of a JSON file.
 
-    :raises ExperimentError: it is no such file.
+    :raises ExperimentError: it is no such file, or names a problem that is none.
     """
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("problems"), dict):
         text = 'expected {"problems": {NAME: {"as_drawn": …, "estimate": …}}} as in docs/documents/certified.md'
         raise ExperimentError([Message(str(path), 0, 0, "", text)])
+    known = {path.stem for one in problems for path in one.path.parent.glob("*.json")}
+    messages = [
+        Message(str(path), 0, 0, "problems", f'no problem "{shorten(name)}"; {hint(name, sorted(known))}')
+        for name in data["problems"]
+        if name not in known
+    ]
+    if messages:
+        raise ExperimentError(messages)
     return data["problems"]
 
 

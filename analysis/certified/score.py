@@ -13,10 +13,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from simulator.settings import listing
+
 MOST_DIGITS = 15.0
 
 # What each group of estimates is measured by.
 MEASURES = {"machine": "U3", "balls": "U1", "origins": "U2"}
+WORDS = {"count": "values", "undetermined": "undetermined"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ def all_right(found: Sequence[Score]) -> bool:
 def _part(certified: Mapping[str, Any], found: Mapping[str, Any]) -> Iterator[tuple[str, float, str]]:
     if "rank_deficiency" in certified:
         right = found.get("rank_deficiency") == certified["rank_deficiency"]
-        note = "" if right else f"{found.get('rank_deficiency')} instead of {certified['rank_deficiency']}"
+        note = "" if right else f"{found.get('rank_deficiency')!r} instead of {certified['rank_deficiency']}"
         yield "rank deficiency", MOST_DIGITS if right else 0.0, note
     if "sum_of_squares" in certified:
         yield _judged("sum of squares", relative_digits(found.get("sum_of_squares"), certified["sum_of_squares"]))
@@ -63,22 +66,36 @@ def _part(certified: Mapping[str, Any], found: Mapping[str, Any]) -> Iterator[tu
     for group, symbol in MEASURES.items():
         if symbol in uncertainties and certified.get(group):
             unit = uncertainties[symbol]["average"]
-            yield _judged(group, absolute_digits(found.get(group), certified[group], unit))
+            yield _group(group, found.get(group), certified[group], unit)
     given = found.get("uncertainties")
     for symbol, own in uncertainties.items():
         other = given.get(symbol) if isinstance(given, Mapping) else None
         yield _uncertainty(symbol, own, other)
 
 
+def _group(group: str, found: Any, certified: Any, unit: float) -> tuple[str, float, str]:
+    """Estimates of one kind; parameters of the machine that the program does not tell, or that are none, are named."""
+    if isinstance(found, Mapping) and isinstance(certified, Mapping):
+        for words, names in (("no", set(certified) - set(found)), ("unknown", set(found) - set(certified))):
+            if names:
+                return group, math.nan, f"{words} {listing(sorted(names))}"
+    return _judged(group, absolute_digits(found, certified, unit))
+
+
 def _judged(quantity: str, digits: float) -> tuple[str, float, str]:
-    return quantity, digits, "no answer, or not of this form" if math.isnan(digits) else ""
+    if math.isnan(digits):
+        return quantity, digits, "no answer, or not of this form"
+    return quantity, digits, "" if digits > 0.0 else "no digit agrees"
 
 
 def _uncertainty(symbol: str, certified: Mapping[str, Any], found: Any) -> tuple[str, float, str]:
     if not isinstance(found, Mapping):
         return symbol, math.nan, "no answer"
-    if found.get("undetermined") != certified["undetermined"]:
-        return symbol, 0.0, f"{found.get('undetermined')} undetermined instead of {certified['undetermined']}"
+    for key in ("count", "undetermined"):
+        if key not in found:
+            return symbol, math.nan, f'no "{key}"'
+        if found[key] != certified[key]:
+            return symbol, 0.0, f"{found[key]!r} {WORDS[key]} instead of {certified[key]}"
     if certified["maximum"] is None:
         return symbol, MOST_DIGITS, "all undetermined"
     return _judged(symbol, _least([relative_digits(found.get(k), certified[k]) for k in ("maximum", "average")]))

@@ -124,7 +124,7 @@ def _certified(options: Namespace) -> int:
         return WRONG_USAGE
     problems = certified_problems(options.designs or Path("designs", "certified"), options.experiment)
     if options.results:
-        results = read_results(options.results)
+        results = read_results(options.results, problems)
     else:
         results = {}
         bar = ProgressBar("problems")

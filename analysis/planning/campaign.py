@@ -22,7 +22,7 @@ from .constraints import Budget, Constraints, Spent, constraints
 from .criteria import CriterionName, criterion, is_about_balls
 from .information import pool_information
 from .offer import Offer, offer, open_directions
-from .schedule import Completion
+from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
@@ -223,6 +223,10 @@ def _campaign(
     left_open = open_directions(offered, information, best.chosen)
     _refuse_unusable(experiment, chosen, budget)
     unlimited = replace(problem, constraints=free)
+    done = tuple(candidates[k] for k in offered.done)
+    interrupted = tuple(candidates[one.part] for one in offered.interrupted)
+    # In the order in which they will be read, as the first of a plate may hold its frame, on which U1 and U2 depend.
+    in_order = run_sheet(chosen, pool.changes, done, completed, interrupted).chosen
     report("gains")
     return Campaign(
         experiment,
@@ -232,7 +236,7 @@ def _campaign(
         wanted.excluded,
         budget,
         tuple(chosen),
-        tuple(candidates[k] for k in offered.done),
+        done,
         limits.spent(best.chosen),
         best.value,
         np.nan if relaxed is None else relaxed.value,
@@ -242,10 +246,10 @@ def _campaign(
         wanted.target,
         _gains(problem, best, candidates),
         _left_out(unlimited, best, candidates),
-        plan(replace(with_chosen(experiment, chosen), expected_rank_deficiency=left_open or None)),
+        plan(replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
-        tuple(candidates[one.part] for one in offered.interrupted),
+        interrupted,
         left_open,
     )
 

@@ -60,7 +60,8 @@ def unexplained_words(one: Unexplained) -> str:
     best = f"what explains most is {one.words} {_significance(one)}" if one.words else f"{_significance(one)[1:-1]}"
     return (
         "the error model, a drift or the noise, for no single mistake explains the residuals, which are "
-        f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model, or larger uncertainties"
+        f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model"
+        f"{', or larger uncertainties' if one.times > 1.0 else ''}"
     )
 
 

@@ -226,6 +226,9 @@ def resolve_offset_uncertainties(sections: Sections, references: References) -> 
         if settings.reference and (settings.unknown or stated is not None):
             key = "unknown" if settings.unknown else "standard_uncertainty"
             problems.add((*steps, key), "the offset of the reference is held as stated; remove it", True)
+        if name == reference and not named and (settings.unknown or stated is not None):
+            text = "its offset is held as stated, as the first probe is the reference where none has reference: true"
+            problems.doubt(steps, f"{text}; what is said of its uncertainty counts for nothing")
         uncertainty, is_right = lengths_per_axis(stated, (*steps, "standard_uncertainty"), references)
         if settings.unknown and dimension is not None:
             uncertainty = frozen([np.inf] * dimension)

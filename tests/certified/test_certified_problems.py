@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -124,3 +125,37 @@ def test_unknown_problem_and_empty_folder(tmp_path: Path, capsys: pytest.Capture
     assert main(["reproduce", "certified", "--designs", str(tmp_path)]) == 3
     assert "no certified problems here" in capsys.readouterr().err
     assert main(["reproduce", "npl", "--results", "x.json"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "note"),
+    [
+        ({"as_drawn": {"uncertainties": {"U5": {"count": 3}}}}, "3 values instead of 28"),
+        ({"as_drawn": {"uncertainties": {"U5": {"undetermined": None}}}}, "None undetermined instead of 0"),
+        ({"as_drawn": {"rank_deficiency": "0"}}, "'0' instead of 0"),
+        ({"estimate": {"machine": {"beta": 1.0}}}, "unknown beta"),
+        ({"estimate": {"sum_of_squares": 1e9}}, "no digit agrees"),
+    ],
+)
+def test_what_is_amiss_is_told(
+    change: dict[str, Any], note: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+        return {
+            key: merged(value, other[key]) if isinstance(other.get(key), dict) else other.get(key, value)
+            for key, value in one.items()
+        } | {key: value for key, value in other.items() if key not in one}
+
+    (problem,) = certified_problems(FOLDER, ["two-dimensions"])
+    results = tmp_path / "results.json"
+    results.write_text(json.dumps({"problems": {"two-dimensions": merged(problem.answers, change)}}))
+    chosen = ["reproduce", "certified", "--designs", str(FOLDER), "--experiment", "two-dimensions"]
+    assert main([*chosen, "--results", str(results)]) == 1
+    assert note in capsys.readouterr().out
+
+
+def test_a_problem_that_is_none_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results = tmp_path / "results.json"
+    results.write_text('{"problems": {"three planes": {}}}')
+    assert main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
+    assert 'no problem "three planes"; did you mean "three-planes"?' in capsys.readouterr().err

@@ -154,6 +154,11 @@ def test_what_is_written_is_worth_what_was_told(drawn: Path, capsys: pytest.Capt
     assert max(task["standard_uncertainty"] for task in worth["tasks"].values()) == pytest.approx(
         found["value"], rel=1e-9
     )
+    # All of it, also where positions are read in another order than that of the pool.
+    assert list(found["plan"]["quantities"]) == list(worth["quantities"])
+    for symbol, quantity in worth["quantities"].items():
+        for key in ("maximum", "average", "count", "undetermined"):
+            assert found["plan"]["quantities"][symbol][key] == pytest.approx(quantity[key], rel=1e-9), symbol
     # No other file is overwritten.
     assert main(["plan", str(drawn), "-o", str(chosen), "--workers", "1"]) == 3
     assert "--force" in capsys.readouterr().err
