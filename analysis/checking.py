@@ -119,8 +119,10 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
     design = CheckedDesign(plan, None, found, goals, missed, certificate)
     if not design.complaints:
         return design
-    key = "expected_rank_deficiency" if plan.verdict.complaint else "target_accuracy"
-    return replace(design, place=place_in(experiment.source, experiment.name, (key,)))
+    steps: tuple[str, ...] = ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_accuracy",)
+    if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
+        steps = ("evaluation", "tasks")
+    return replace(design, place=place_in(experiment.source, experiment.name, steps))
 
 
 def _goals(experiment: Experiment, goals: Sequence[Goal]) -> tuple[tuple[str, ...], tuple[str, ...]]:

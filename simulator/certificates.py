@@ -11,7 +11,6 @@ A row for each value has the columns item (a path in the experiment file), first
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from typing import TextIO
 import numpy as np
 
 from .design import Design, State
-from .experiment.calibrations import FAR_FROM_DRAWING, far_from_drawing
+from .experiment.calibrations import FAR_FROM_DRAWING, far_from_drawing, far_spread
 from .experiment.messages import MOST_MESSAGES, ExperimentError, Message, format_path
 from .experiment.model import (
     Calibration,
@@ -34,6 +33,7 @@ from .generate import true_priors
 from .machines.protocol import Array, ErrorModel, Unit
 from .quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
 from .settings import hint, listing
+from .spreadsheets import CsvWriter
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"
@@ -160,7 +160,7 @@ def drawn_values(
 def write_certificate(stream: TextIO, experiment: Experiment, comment: str) -> None:
     """Write all values that an experiment states, with all digits, below a line of comment."""
     stream.write(f"# {comment}\n")
-    writer = csv.writer(stream, lineterminator="\n")
+    writer = CsvWriter(stream)
     writer.writerow(COLUMNS)
     for one in certified_values(experiment):
         text = length_text(one.value) if one.unit == "m" else f"{one.value!r} {UNIT_NAMES[one.unit]}"
@@ -208,7 +208,15 @@ def read_certificate(path: Path, experiment: Experiment) -> Experiment:
         problems.append(Message(str(path), 1, 1, "", f"no value of {listing(missing)}; add it"))
     if problems:
         raise ExperimentError(sorted(problems)[:MOST_MESSAGES])
-    return with_values(experiment, values)
+    found = with_values(experiment, values)
+    for one in found.calibration:
+        if isinstance(one, CoordinateCalibration):
+            as_drawn = found.layouts[one.artefact].coordinates[one.balls][:, list(one.axes)]
+            if text := far_spread(one.values, as_drawn):
+                problems.append(Message(str(path), 1, 1, "", text))
+    if problems:
+        raise ExperimentError(problems)
+    return found
 
 
 def _unknown(row: Row, known: list[CertifiedValue]) -> str:

@@ -30,6 +30,9 @@ MOST_TIED_BALLS = 3000
 # A certified distance that differs from the drawing by more than this fraction is a slip of the pen.
 FAR_FROM_DRAWING = 0.1
 
+# What balls may be off a plane that they are drawn in, in metres.
+HARDLY_FLAT = 1e-3
+
 
 def resolve_calibration(
     settings: DistancesSettings | CoordinatesSettings | RadiusSettings, steps: Steps, references: References
@@ -207,6 +210,19 @@ def _certified_distances(
     return np.array([by_pair[frozenset(pair)] for pair in wanted])
 
 
+def far_spread(values: Floats, drawn: Floats) -> str:
+    """What is wrong with certified co-ordinates (m, axes) whose spread is not that of the drawing; empty if nothing is.
+
+    Where their axes begin may be another place than in the drawing.
+    """
+    # Root mean squares. A plate that is flat as drawn is not quite so as certified.
+    found, expected = (float(np.sqrt(((one - one.mean(axis=0)) ** 2).sum(axis=1).mean())) for one in (values, drawn))
+    if abs(found - expected) <= FAR_FROM_DRAWING * expected + HARDLY_FLAT:
+        return ""
+    times = f"{found / expected:.3g} times as far apart as in the artefact's drawing"
+    return f"the balls of these co-ordinates are {times}; correct the one or the other"
+
+
 def _coordinates(
     settings: CoordinatesSettings, artefact: str, steps: Steps, references: References
 ) -> CoordinateCalibration | None:
@@ -279,4 +295,8 @@ def _certified_coordinates(
         problems.add(steps, f"no co-ordinates for {listing(missing)}; add them, or leave them out of balls")
     if len(problems.messages) > before:
         return None
-    return np.array([by_ball[layout.names[i]] for i in balls])
+    found = np.array([by_ball[layout.names[i]] for i in balls])
+    if text := far_spread(found, layout.coordinates[balls][:, [AXES.index(axis) for axis in axes]]):
+        problems.add(steps, text)
+        return None
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -195,3 +196,26 @@ def test_values_missing_or_given_twice_are_told(tmp_path: Path) -> None:
     certificate.write_text("\n".join([*lines, lines[-1]]))
     with pytest.raises(ExperimentError, match="in line 6 already"):
         read_certificate(certificate, experiment)
+
+
+def test_coordinates_in_another_unit_are_far_from_the_drawing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    start, end = text.index("calibration:"), text.index("# Where U4")
+    path, readings, table = tmp_path / "e.yaml", tmp_path / "r.csv", tmp_path / "c.csv"
+    known = "calibration: [{kind: coordinates, standard_uncertainty: 0.2 um}]\n"
+    path.write_text(text[:start] + known + text[end:], encoding="utf-8")
+    assert main(["simulate", str(path), "-o", str(readings), "--certificate", str(table)]) == 0
+    assert main(["fit", str(path), str(readings), "--certificate", str(table)]) == 0
+    capsys.readouterr()
+    told = "the balls of these co-ordinates are 0.001 times as far apart as in the artefact's drawing"
+    table.write_text(re.sub(" mm| nm", " um", table.read_text(encoding="utf-8")), encoding="utf-8")
+    assert main(["fit", str(path), str(readings), "--certificate", str(table)]) == 3
+    assert told in capsys.readouterr().err
+    # The same of a table of the experiment itself.
+    rows = [f"r{i}c{j},{0.1875 * (j - 1)},{0.1875 * (i - 1)},0" for i in range(1, 6) for j in range(1, 6)]
+    table.write_text("\n".join(["ball,x_mm,y_mm,z_mm", *rows]), encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("0.2 um}]", "0.2 um, values: c.csv}]"), encoding="utf-8")
+    assert main(["check", str(path)]) == 3
+    assert told in capsys.readouterr().err
