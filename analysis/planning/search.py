@@ -90,7 +90,8 @@ def full_root(information: Array) -> Array | None:
         return None
     if (np.diagonal(factor) ** 2).min() < UNDETERMINED:
         return None
-    return _inverse(factor).T
+    inverse = _inverse(factor)
+    return None if _is_deficient(inverse) else inverse.T
 
 
 def counted_root(problem: Problem, root: Array) -> Array:
@@ -115,17 +116,18 @@ def square_root(weight: Array) -> Array:
     return np.asarray(directions * np.sqrt(np.maximum(scale, 0.0)))
 
 
-def _counted(problem: Problem, factor: Array) -> Array:
-    """The part of Cholesky factors (..., z, z) that the criterion is about."""
-    if problem.criterion.about_balls:
-        return factor
-    own = problem.information.shared
-    return factor[..., own, own]
-
-
 def _inverse(triangle: Array) -> Array:
     found: Array = scipy_linalg().lapack.dtrtri(triangle, lower=1)[0]
     return found
+
+
+def _is_deficient(inverse: Array) -> bool:
+    """Whether something is undetermined, by the inverse (z, z) of a Cholesky factor: by the sum of all variances.
+
+    A small pivot is a sure sign as well, but often there is none: of a null vector whose last components are small,
+    rounding or the ridge is divided by their squares, and spread over several pivots.
+    """
+    return bool(np.vdot(inverse, inverse) > 1.0 / UNDETERMINED)
 
 
 class Losses:
@@ -139,24 +141,27 @@ class Losses:
         found = self._known.get(members)
         if found is None:
             information = self._problem.information.of(members)
-            factor = np.asarray(np.linalg.cholesky(information + RIDGE * np.eye(len(information))), float)
-            found = float(_deficient(factor)) + LARGE * 2 * len(self._problem.lacking(members))
-            if found == 0.0:
-                found = self._problem.criterion.value(_inverse(_counted(self._problem, factor)).T)
+            lacking = LARGE * 2 * len(self._problem.lacking(members))
+            # By the same root as the value, so that no selection counts here that has none.
+            root = full_root(information)
+            if root is None:
+                found = lacking + _in_place(information)
+            else:
+                found = lacking or self._problem.criterion.value(counted_root(self._problem, root))
             found = float(comparable(found, COMPARED))
             self._known[members] = found
         return found
 
 
-def _deficient(factor: Array) -> Array:
-    """What is made small in place of a criterion that Cholesky factors (..., z, z) leave undetermined; otherwise 0.
+def _in_place(information: Array) -> float:
+    """What is made small in place of the criterion, of information (z, z) that leaves something undetermined.
 
     It falls with the determinant, so that what determines most directions, and those best, is chosen first.
     """
-    pivots = np.diagonal(factor, axis1=-2, axis2=-1) ** 2
-    # What is undetermined is rounding beside the ridge.
-    missing = -np.log(np.where(pivots < UNDETERMINED, RIDGE, pivots)).mean(axis=-1) / -np.log(RIDGE)
-    return np.where(pivots.min(axis=-1) < UNDETERMINED, LARGE * (1.0 + missing), 0.0)
+    sizes = np.linalg.eigvalsh(information)
+    # What is undetermined is rounding.
+    missing = -np.log(np.where(sizes < UNDETERMINED, RIDGE, sizes)).mean() / -np.log(RIDGE)
+    return float(LARGE * (1.0 + missing))
 
 
 def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integers, Array]:
@@ -179,11 +184,13 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integ
     found = np.zeros(len(added))
     for start in range(0, len(added), AT_ONCE):
         some = added[start : start + AT_ONCE]
-        factor = np.asarray(np.linalg.cholesky(information + ridge + matrices[some]), float)
-        # With one more dimension, as NumPy 1 takes a matrix for a batch of vectors.
-        solved = np.asarray(np.linalg.solve(_counted(problem, factor), half[None]))
-        deficient = _deficient(factor)
-        found[start : start + len(some)] = np.where(deficient > 0.0, deficient, (solved**2).sum(axis=(1, 2)))
+        factors = np.asarray(np.linalg.cholesky(information + ridge + matrices[some]), float)
+        for k, factor in enumerate(factors):
+            inverse = _inverse(factor)
+            if _is_deficient(inverse):
+                found[start + k] = _in_place(information + matrices[some[k]])
+            else:
+                found[start + k] = ((inverse[own, own] @ half) ** 2).sum()
     return added, found
 
 
