@@ -88,7 +88,9 @@ class Search:
 
     def __init__(self, design: Design, state: State, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
         self.design, self.state, self.x, self.estimated = design, state, x, sigma_is_estimated
-        self._begin(leftover(design, state, x, freedom))
+        left = leftover(design, state, x, freedom)
+        self.sum_of_squares, self.freedom = left.sum_of_squares, freedom
+        self._begin(left)
 
     def _begin(self, left: Leftover) -> None:
         self.left = self.start = left
@@ -125,7 +127,7 @@ class Search:
             rival = min(of_smooth, of_scatter)
             significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
             if significant and event.log_p < rival - CLEARLY:
-                columns = self._with_other_directions(self._together(event.columns))
+                columns = self._testable(self._with_other_directions(self._together(event.columns)))
                 chosen.append(_Chosen(columns, event.log_p, self._range(columns)))
                 self._take_out(columns)
             elif scatter is None and of_scatter < min(self.other_limit, of_smooth - CLEARLY):
@@ -227,6 +229,23 @@ class Search:
             return columns
         return every if self._conditional(columns, self._dense(every)) < DIRECTIONS else columns
 
+    def _testable(self, columns: Integers) -> Integers:
+        """Of a cause's directions those that show beside each other, the one of which most is left first."""
+        if len(columns) == 1:
+            return columns
+        dense = self._dense(columns)
+        size = np.sqrt((dense**2).sum(axis=0))
+        size[size == 0.0] = 1.0
+        rest, kept = self.left.of(dense / size), np.zeros(len(columns), bool)
+        while True:
+            share = np.where(kept, 0.0, (rest**2).sum(axis=0))
+            most = int(np.flatnonzero(share >= share.max() * (1.0 - 1e-6))[0])
+            if share[most] <= HIDDEN:
+                return columns[kept]
+            kept[most] = True
+            unit = rest[:, most] / np.sqrt(share[most])
+            rest = rest - unit[:, None] * (unit @ rest)
+
     def _range(self, columns: Integers) -> tuple[int, int]:
         """First and last reading that a slip may have come before, -1 for what is no slip.
 
@@ -252,7 +271,7 @@ class Search:
         sigma = math.sqrt(self.left.sum_of_squares / self.left.freedom) if self.estimated else 1.0
         matrix = self._dense(np.concatenate([one.columns for one in chosen]))
         size = np.sqrt((matrix**2).sum(axis=0))
-        inverse = np.linalg.pinv(self.start.of(matrix / size), rcond=math.sqrt(HIDDEN))
+        inverse = np.linalg.pinv(self.start.of(matrix / size), rcond=HIDDEN)
         values = inverse @ self.start.residual / size
         uncertainties = sigma * np.sqrt((inverse**2).sum(axis=1)) / size
         at = 0
