@@ -45,6 +45,9 @@ CONTAINED = math.log(1e-2)
 # Stated uncertainties are believed where what a suspect leaves has at least this chance.
 BELIEVED = math.log(1e-2)
 
+# Residuals that are less than this of the stated uncertainties are not laid to the model, a drift or noise.
+HARMLESS = 0.1
+
 # Squared standard deviations within which the moments of a slip are told.
 RANGE = 9.0
 
@@ -59,7 +62,8 @@ def diagnosis(design: Design, solution: Solution, x: Array, freedom: int, sigma_
     Causes are spaces of biases, tested to first order by what they explain of the residuals: by chi-squared where sigma
     is given and what they leave is as stated, otherwise by Fisher's F. The limits are Bonferroni's for `FAMILY`. A
     mistake is taken out if it is clearly less by chance than each smooth error and each scatter, and what it leaves is
-    searched anew; if what is left at the end shows smooth errors, no mistake is named at all.
+    searched anew; if what is left at the end shows smooth errors, no mistake is named at all, unless all that is left
+    is less than `HARMLESS` of what is stated.
     """
     if freedom < 3 or solution.factor.sum_of_squares <= ROUNDING**2 * freedom:
         return Diagnosis()
@@ -122,7 +126,7 @@ class Search:
         while True:
             event = self._best_event()
             smooth = self._smooth_chances(event)
-            scattered = log_chances(self.scatters, self.left)
+            scattered = log_chances(self.scatters, self.left, self.estimated)
             of_smooth, of_scatter = float(smooth.min(initial=0.0)), float(scattered.min(initial=0.0))
             rival = min(of_smooth, of_scatter)
             significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
@@ -130,6 +134,8 @@ class Search:
                 columns = self._testable(self._with_other_directions(self._together(event.columns)))
                 chosen.append(_Chosen(columns, event.log_p, self._range(columns)))
                 self._take_out(columns)
+            elif self.left.sum_of_squares < HARMLESS**2 * self.left.freedom:
+                return Diagnosis(tuple(self._told(chosen)), scatter)
             elif scatter is None and of_scatter < min(self.other_limit, of_smooth - CLEARLY):
                 one, limit = self.scatters[int(scattered.argmin())], self.other_limit
                 times = self._weigh(one)
@@ -138,15 +144,18 @@ class Search:
                     self._take_out(earlier.columns)
             elif rival < self.other_limit:
                 words = self.smooth[int(smooth.argmin())].words if of_smooth < self.other_limit else ""
-                return self._unexplained(words, rival, self.other_limit)
+                return Diagnosis((), scatter, self._unexplained(words, rival, self.other_limit))
             elif significant:
-                return self._unexplained("", event.log_p, self.limit)
+                return Diagnosis((), scatter, self._unexplained("", event.log_p, self.limit))
             else:
                 return Diagnosis(tuple(self._told(chosen)), scatter)
 
-    def _unexplained(self, words: str, log_p: float, limit: float) -> Diagnosis:
-        times = math.sqrt(self.start.sum_of_squares / self.start.freedom)
-        return Diagnosis(unexplained=Unexplained(words, times, normal_equivalent(log_p), normal_equivalent(limit)))
+    def _unexplained(self, words: str, log_p: float, limit: float) -> Unexplained:
+        """What is told of residuals that no mistake explains, as they were before anything was weighed."""
+        total, freedom = self.sum_of_squares, self.freedom
+        too_large = float(log_chance(total, total, freedom, freedom, True)) < BELIEVED
+        statistics = normal_equivalent(log_p), normal_equivalent(limit)
+        return Unexplained(words, math.sqrt(total / freedom), too_large, *statistics)
 
     def _log_p(self, square: float, dimensions: float, left: Leftover) -> float:
         """Logarithm of the chance of a sum of squares, of what is `left`."""

@@ -61,7 +61,7 @@ def unexplained_words(one: Unexplained) -> str:
     return (
         "the error model, a drift or the noise, for no single mistake explains the residuals, which are "
         f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model"
-        f"{', or larger uncertainties' if one.times > 1.0 else ''}"
+        f"{', or larger uncertainties' if one.too_large else ''}"
     )
 
 
