@@ -80,11 +80,14 @@ class _Event:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """A cause as it was found: its patterns, the logarithm of its chance, and a slip's moments."""
+    """A cause as it was found: its patterns, the logarithm of its chance, a slip's moments, and causes of the kind
+    that explain as much.
+    """
 
     columns: Integers
     log_p: float
     range: tuple[int, int]
+    others: tuple[tuple[int, ...], ...]
 
 
 class Search:
@@ -132,7 +135,7 @@ class Search:
             significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
             if significant and event.log_p < rival - CLEARLY:
                 columns = self._testable(self._with_other_directions(self._together(event.columns)))
-                chosen.append(_Chosen(columns, event.log_p, self._range(columns)))
+                chosen.append(_Chosen(columns, event.log_p, self._range(columns), self._as_good(columns)))
                 self._take_out(columns)
             elif self.left.sum_of_squares < HARMLESS**2 * self.left.freedom:
                 return Diagnosis(tuple(self._told(chosen)), scatter)
@@ -273,6 +276,19 @@ class Search:
         starts = given.start[group[here[square >= square.max() - RANGE * variance], 0]]
         return min(int(starts.min()), mine.start), max(int(starts.max()), mine.start)
 
+    def _as_good(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
+        """Of several certified distances, those of other balls that leave nothing significant of the residuals that
+        these explain, though they are other directions.
+        """
+        if len(columns) == 1 or self.patterns.kind[columns[0]] != "distance":
+            return ()
+        found, dense = [], self._dense(columns)
+        for group in self.groups:
+            if group.shape[1] > 1 and self.patterns.kind[group[0, 0]] == "distance":
+                others = (row for row in group if not np.array_equal(row, columns))
+                found += [tuple(row.tolist()) for row in others if self._conditional(row, dense) > CONTAINED]
+        return tuple(found)
+
     def _told(self, chosen: list[_Chosen]) -> Iterator[Suspect]:
         """The suspects with their sizes, estimated together."""
         if not chosen:
@@ -294,7 +310,7 @@ class Search:
                 uncertainties[mine],
                 normal_equivalent(one.log_p),
                 normal_equivalent(self.limit),
-                self._alternatives(one.columns),
+                tuple(dict.fromkeys([*self._alternatives(one.columns), *one.others])),
                 tuple(dict.fromkeys(other.words for other in self.smooth if self._is_part(other, one.columns))),
                 *one.range,
             )

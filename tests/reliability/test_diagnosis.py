@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,11 +87,11 @@ def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(readin
         )
 
 
-def drawn(folder: Path, share: float, waves: float = 0.0, loud: float = 1.0) -> tuple[Design, Real]:
+def drawn(folder: Path, share: float, waves: float = 0.0, loud: float = 1.0, text: str = PLATE) -> tuple[Design, Real]:
     """A small design with readings of a true machine: noise of a share of what is stated, more `loud` in one position,
     and an error of the x scale of `waves` standard uncertainties, of that share too.
     """
-    given = experiment(folder, PLATE)
+    given = experiment(folder, text)
     design = lay_out(given)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     on_truth, truth = on_true_machine(design, true_machine(given.true_machine, design.model, *corners))
@@ -100,6 +101,38 @@ def drawn(folder: Path, share: float, waves: float = 0.0, loud: float = 1.0) -> 
     noise[:, 0] += waves * np.sin(x[:, 0] / 0.04)
     observed = observe(design, readings, x + share * design.repeatability * noise)
     return observed.design, observed.x
+
+
+def certified_wrongly(design: Design, ball: int, share: float) -> tuple[Design, list[int]]:
+    """The design with all certified distances of a ball too long by a share, and which these are."""
+    given = design.distances
+    mine = (given.first == ball) | (given.second == ball)
+    value = given.value * np.where(mine, 1.0 + share, 1.0)
+    return replace(design, distances=replace(given, value=value)), np.flatnonzero(mine).tolist()
+
+
+@pytest.mark.parametrize("ball", [0, 2, 6, 8])
+def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) -> None:
+    right, x = drawn(tmp_path, 1.0)
+    design, mine = certified_wrongly(right, ball, 5e-6)
+    (one,) = diagnosed(design, x, True)[1].suspects
+    assert (one.patterns.kind[one.columns] == "distance").all()
+    assert sorted(one.patterns.subject[one.columns].tolist()) == mine and len(mine) == 2
+    true = 5e-6 / (1.0 + 5e-6) * design.distances.value[one.patterns.subject[one.columns]]
+    assert (abs(one.values - true) < 4.0 * one.standard_uncertainties).all()
+    words = f"certified distances of ball {design.ball_label(ball)}: to "
+    assert words in diagnosis_lines(Diagnosis((one,)))[0]
+
+
+@pytest.mark.parametrize("ball", [0, 2, 6, 8])
+def test_wrong_distances_of_the_opposite_ball_are_named_where_only_these_tell_the_scale(
+    ball: int, tmp_path: Path
+) -> None:
+    """Two sides too long, or the other two too short by the same ratio, and the scale another."""
+    right, x = drawn(tmp_path, 1.0, text=PLATE.replace("[right, left]", "[right]"))
+    (line,) = diagnosis_lines(diagnosed(certified_wrongly(right, ball, 5e-6)[0], x, True)[1])
+    for either in (ball, 8 - ball):
+        assert f"distances of ball {right.ball_label(either)}" in line, line
 
 
 def is_explained(design: Design, solution: Solution) -> bool:
