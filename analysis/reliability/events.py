@@ -14,6 +14,9 @@ from .patterns import Kind, Patterns
 
 # Kinds whose patterns come one for each axis, of one subject together.
 BY_AXIS: tuple[Kind, ...] = ("reading", "end", "ball", "moved", "probe")
+# Certified distances of one ball that are looked at together, at the most.
+MOST_DISTANCES = 12
+
 SLIP: tuple[Kind, ...] = ("shift", "turn")
 
 
@@ -22,6 +25,7 @@ def event_groups(given: Patterns) -> list[Integers]:
     found = [np.flatnonzero(given.kind != "moved")[:, None]]
     for kind in BY_AXIS:
         found += _by_subject(given, kind)
+    found += _by_ball(given)
     shift, turn = (_by_start(given, kind) for kind in SLIP)
     if len(shift):
         found += [shift, np.concatenate([shift, turn], axis=1)]
@@ -31,6 +35,19 @@ def event_groups(given: Patterns) -> list[Integers]:
     if pairs:
         found.append(np.array(pairs))
     return found
+
+
+def _by_ball(given: Patterns) -> list[Integers]:
+    """Groups of all certified distances of one ball, of balls with as many together."""
+    columns = given.of_kind("distance")
+    ends = given.design.distances.first, given.design.distances.second
+    first, second = (end[given.subject[columns]] for end in ends)
+    by_width: dict[int, list[Integers]] = {}
+    for ball in np.unique([first, second]).tolist():
+        mine = columns[(first == ball) | (second == ball)]
+        if 1 < len(mine) <= MOST_DISTANCES:
+            by_width.setdefault(len(mine), []).append(mine)
+    return [np.array(by_width[width]) for width in sorted(by_width)]
 
 
 def _by_subject(given: Patterns, kind: Kind) -> Iterator[Integers]:

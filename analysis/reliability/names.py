@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulator.design import Design
+from simulator.design import Design, Integers
 from simulator.estimation.parameters import AXIS_NAMES
 
 from .patterns import Patterns
@@ -43,6 +43,12 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
     if kind == "scale":
         return f"scale of the certificate of {design.artefact_names[subject]}"
     return f"expansion in position {design.position_names[subject]}"
+
+
+def common_ball(design: Design, distances: Integers) -> int:
+    """The ball that several distances have in common; of two between the same balls, the first."""
+    ends = np.stack([design.distances.first[distances], design.distances.second[distances]], axis=1)
+    return next(int(ball) for ball in ends[0] if (ends == ball).any(axis=1).all())
 
 
 def slip_place(given: Patterns, k: int) -> str:

@@ -37,13 +37,14 @@ def scatters(design: Design) -> list[Scatter]:
     return [one for one in found if len(one.readings) < len(chosen)]
 
 
-def log_chances(every: list[Scatter], left: Leftover) -> Array:
+def log_chances(every: list[Scatter], left: Leftover, sigma_is_estimated: bool) -> Array:
     """Logarithms (s,) of the chance that some readings scatter so much more than all other observations.
 
     By Fisher's F with the redundancies as degrees of freedom, which errs on the safe side, as residuals of redundancy
-    below 1 scatter less than so many independent ones.
+    below 1 scatter less than so many independent ones. Where sigma is given they must scatter more than stated as
+    well: the larger of that chance and that of chi-squared.
     """
-    from scipy.special import fdtrc
+    from scipy.special import chdtrc, fdtrc
 
     total = left.sum_of_squares
     found = np.zeros(len(every))
@@ -54,6 +55,8 @@ def log_chances(every: list[Scatter], left: Leftover) -> Array:
         if freedom < 2.0 or others < 2.0:
             continue
         chance = float(fdtrc(freedom, others, mine / freedom / max((total - mine) / others, 1e-30)))
+        if not sigma_is_estimated:
+            chance = max(chance, float(chdtrc(freedom, mine)))
         found[place] = np.log(max(chance, 1e-300))
     return found
 

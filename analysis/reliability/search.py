@@ -45,6 +45,9 @@ CONTAINED = math.log(1e-2)
 # Stated uncertainties are believed where what a suspect leaves has at least this chance.
 BELIEVED = math.log(1e-2)
 
+# Residuals that are less than this of the stated uncertainties are not laid to the model, a drift or noise.
+HARMLESS = 0.1
+
 # Squared standard deviations within which the moments of a slip are told.
 RANGE = 9.0
 
@@ -59,7 +62,8 @@ def diagnosis(design: Design, solution: Solution, x: Array, freedom: int, sigma_
     Causes are spaces of biases, tested to first order by what they explain of the residuals: by chi-squared where sigma
     is given and what they leave is as stated, otherwise by Fisher's F. The limits are Bonferroni's for `FAMILY`. A
     mistake is taken out if it is clearly less by chance than each smooth error and each scatter, and what it leaves is
-    searched anew; if what is left at the end shows smooth errors, no mistake is named at all.
+    searched anew; if what is left at the end shows smooth errors, no mistake is named at all, unless all that is left
+    is less than `HARMLESS` of what is stated.
     """
     if freedom < 3 or solution.factor.sum_of_squares <= ROUNDING**2 * freedom:
         return Diagnosis()
@@ -76,11 +80,14 @@ class _Event:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """A cause as it was found: its patterns, the logarithm of its chance, and a slip's moments."""
+    """A cause as it was found: its patterns, the logarithm of its chance, a slip's moments, and causes of the kind
+    that explain as much.
+    """
 
     columns: Integers
     log_p: float
     range: tuple[int, int]
+    others: tuple[tuple[int, ...], ...]
 
 
 class Search:
@@ -88,7 +95,9 @@ class Search:
 
     def __init__(self, design: Design, state: State, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
         self.design, self.state, self.x, self.estimated = design, state, x, sigma_is_estimated
-        self._begin(leftover(design, state, x, freedom))
+        left = leftover(design, state, x, freedom)
+        self.sum_of_squares, self.freedom = left.sum_of_squares, freedom
+        self._begin(left)
 
     def _begin(self, left: Leftover) -> None:
         self.left = self.start = left
@@ -120,14 +129,16 @@ class Search:
         while True:
             event = self._best_event()
             smooth = self._smooth_chances(event)
-            scattered = log_chances(self.scatters, self.left)
+            scattered = log_chances(self.scatters, self.left, self.estimated)
             of_smooth, of_scatter = float(smooth.min(initial=0.0)), float(scattered.min(initial=0.0))
             rival = min(of_smooth, of_scatter)
             significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
             if significant and event.log_p < rival - CLEARLY:
-                columns = self._with_other_directions(self._together(event.columns))
-                chosen.append(_Chosen(columns, event.log_p, self._range(columns)))
+                columns = self._testable(self._with_other_directions(self._together(event.columns)))
+                chosen.append(_Chosen(columns, event.log_p, self._range(columns), self._as_good(columns)))
                 self._take_out(columns)
+            elif self.left.sum_of_squares < HARMLESS**2 * self.left.freedom:
+                return Diagnosis(tuple(self._told(chosen)), scatter)
             elif scatter is None and of_scatter < min(self.other_limit, of_smooth - CLEARLY):
                 one, limit = self.scatters[int(scattered.argmin())], self.other_limit
                 times = self._weigh(one)
@@ -136,15 +147,18 @@ class Search:
                     self._take_out(earlier.columns)
             elif rival < self.other_limit:
                 words = self.smooth[int(smooth.argmin())].words if of_smooth < self.other_limit else ""
-                return self._unexplained(words, rival, self.other_limit)
+                return Diagnosis((), scatter, self._unexplained(words, rival, self.other_limit))
             elif significant:
-                return self._unexplained("", event.log_p, self.limit)
+                return Diagnosis((), scatter, self._unexplained("", event.log_p, self.limit))
             else:
                 return Diagnosis(tuple(self._told(chosen)), scatter)
 
-    def _unexplained(self, words: str, log_p: float, limit: float) -> Diagnosis:
-        times = math.sqrt(self.start.sum_of_squares / self.start.freedom)
-        return Diagnosis(unexplained=Unexplained(words, times, normal_equivalent(log_p), normal_equivalent(limit)))
+    def _unexplained(self, words: str, log_p: float, limit: float) -> Unexplained:
+        """What is told of residuals that no mistake explains, as they were before anything was weighed."""
+        total, freedom = self.sum_of_squares, self.freedom
+        too_large = float(log_chance(total, total, freedom, freedom, True)) < BELIEVED
+        statistics = normal_equivalent(log_p), normal_equivalent(limit)
+        return Unexplained(words, math.sqrt(total / freedom), too_large, *statistics)
 
     def _log_p(self, square: float, dimensions: float, left: Leftover) -> float:
         """Logarithm of the chance of a sum of squares, of what is `left`."""
@@ -227,6 +241,23 @@ class Search:
             return columns
         return every if self._conditional(columns, self._dense(every)) < DIRECTIONS else columns
 
+    def _testable(self, columns: Integers) -> Integers:
+        """Of a cause's directions those that show beside each other, the one of which most is left first."""
+        if len(columns) == 1:
+            return columns
+        dense = self._dense(columns)
+        size = np.sqrt((dense**2).sum(axis=0))
+        size[size == 0.0] = 1.0
+        rest, kept = self.left.of(dense / size), np.zeros(len(columns), bool)
+        while True:
+            share = np.where(kept, 0.0, (rest**2).sum(axis=0))
+            most = int(np.flatnonzero(share >= share.max() * (1.0 - 1e-6))[0])
+            if share[most] <= HIDDEN:
+                return columns[kept]
+            kept[most] = True
+            unit = rest[:, most] / np.sqrt(share[most])
+            rest = rest - unit[:, None] * (unit @ rest)
+
     def _range(self, columns: Integers) -> tuple[int, int]:
         """First and last reading that a slip may have come before, -1 for what is no slip.
 
@@ -245,6 +276,19 @@ class Search:
         starts = given.start[group[here[square >= square.max() - RANGE * variance], 0]]
         return min(int(starts.min()), mine.start), max(int(starts.max()), mine.start)
 
+    def _as_good(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
+        """Of several certified distances, those of other balls that leave nothing significant of the residuals that
+        these explain, though they are other directions.
+        """
+        if len(columns) == 1 or self.patterns.kind[columns[0]] != "distance":
+            return ()
+        found, dense = [], self._dense(columns)
+        for group in self.groups:
+            if group.shape[1] > 1 and self.patterns.kind[group[0, 0]] == "distance":
+                others = (row for row in group if not np.array_equal(row, columns))
+                found += [tuple(row.tolist()) for row in others if self._conditional(row, dense) > CONTAINED]
+        return tuple(found)
+
     def _told(self, chosen: list[_Chosen]) -> Iterator[Suspect]:
         """The suspects with their sizes, estimated together."""
         if not chosen:
@@ -252,7 +296,7 @@ class Search:
         sigma = math.sqrt(self.left.sum_of_squares / self.left.freedom) if self.estimated else 1.0
         matrix = self._dense(np.concatenate([one.columns for one in chosen]))
         size = np.sqrt((matrix**2).sum(axis=0))
-        inverse = np.linalg.pinv(self.start.of(matrix / size), rcond=math.sqrt(HIDDEN))
+        inverse = np.linalg.pinv(self.start.of(matrix / size), rcond=HIDDEN)
         values = inverse @ self.start.residual / size
         uncertainties = sigma * np.sqrt((inverse**2).sum(axis=1)) / size
         at = 0
@@ -266,7 +310,7 @@ class Search:
                 uncertainties[mine],
                 normal_equivalent(one.log_p),
                 normal_equivalent(self.limit),
-                self._alternatives(one.columns),
+                tuple(dict.fromkeys([*self._alternatives(one.columns), *one.others])),
                 tuple(dict.fromkeys(other.words for other in self.smooth if self._is_part(other, one.columns))),
                 *one.range,
             )

@@ -72,18 +72,22 @@ class MoreScatter:
 class Unexplained:
     """Residuals that no single mistake explains; `words` tell the smooth error that does best, empty without one.
 
-    They are `times` as large as the stated uncertainties make them.
+    They are `times` as large as the stated uncertainties make them, which is `too_large` if these do not explain it.
     """
 
     words: str
     times: float
+    too_large: bool
     statistic: float
     limit: float
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the residuals show: mistakes, readings that scatter more, or that no single mistake explains them."""
+    """What the residuals show: mistakes, readings that scatter more, or that no single mistake explains them.
+
+    Readings may scatter more beside mistakes, or beside what no single mistake explains.
+    """
 
     suspects: tuple[Suspect, ...] = ()
     scatter: MoreScatter | None = None

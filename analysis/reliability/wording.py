@@ -15,7 +15,7 @@ from simulator.experiment.yamltree import Mark
 from simulator.settings import listing
 
 from ..tables import SHOWN, number
-from .names import length_name, name, reading_name
+from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
 from .search import MOST
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
@@ -61,7 +61,7 @@ def unexplained_words(one: Unexplained) -> str:
     return (
         "the error model, a drift or the noise, for no single mistake explains the residuals, which are "
         f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model"
-        f"{', or larger uncertainties' if one.times > 1.0 else ''}"
+        f"{', or larger uncertainties' if one.too_large else ''}"
     )
 
 
@@ -78,6 +78,9 @@ def _significance(one: Suspect | MoreScatter | Unexplained) -> str:
 def _cause_name(given: Patterns, columns: Sequence[int]) -> str:
     """A cause by name, without the axis if it is about several."""
     told = name(given, columns[0])
+    if given.kind[columns[0]] == "distance" and len(columns) > 1:
+        ball = common_ball(given.design, given.subject[list(columns)])
+        return f"all certified distances of ball {given.design.ball_label(ball)}"
     return told if len(columns) == 1 else told.rpartition(", ")[0]
 
 
@@ -109,6 +112,9 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         return f"{name(given, k)} stated {size} too {high}", "check it in the experiment file"
     if kind == "coordinate":
         return f"{name(given, k)} certified {size} too {high}", "check the certificate"
+    if kind == "distance" and len(_significant(one)) > 1:
+        ball = common_ball(design, given.subject[one.columns])
+        return f"certified distances of ball {design.ball_label(ball)}: {_from(ball, one)}", "check the certificate"
     if kind in ("distance", "length value"):
         what = length_name(design, subject, False) if kind == "length value" else name(given, k)
         return f"{what} certified {size} too {long}", "check the certificate"
@@ -144,12 +150,30 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     return f"{artefact} {' and '.join(parts)}", "check the temperature there"
 
 
+def _from(ball: int, one: Suspect) -> str:
+    """Sizes by which the distances of a ball are wrong, those that are significant."""
+    given, ends = one.patterns.design.distances, one.patterns.design.ball_names
+    parts = []
+    for place in _significant(one):
+        distance, value = int(one.patterns.subject[one.columns[place]]), float(one.values[place])
+        first, second = int(given.first[distance]), int(given.second[distance])
+        size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
+        other = ends[second if first == ball else first]
+        parts.append(f"to {other} {size} um too {'long' if value > 0 else 'short'}")
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _significant(one: Suspect) -> Integers:
+    """Places of the directions that are significant, at least of the most significant one."""
+    ratio = np.abs(one.values) / one.standard_uncertainties
+    return np.flatnonzero((ratio >= CLEAR) | (ratio == ratio.max()))
+
+
 def _sizes(one: Suspect, how: str) -> str:
     """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "… along x"."""
     given = one.patterns
-    ratio = np.abs(one.values) / one.standard_uncertainties
     parts = []
-    for place in np.flatnonzero((ratio >= CLEAR) | (ratio == ratio.max())):
+    for place in _significant(one):
         column, value = one.columns[place], float(one.values[place])
         size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
         letter, unit = AXIS_NAMES[given.axis[column]], SHOWN[given.unit(int(column))]

@@ -127,7 +127,7 @@ def test_scatter_is_hardly_ever_suspected_of_noise(tmp_path: Path) -> None:
     alarms = np.zeros(len(every))
     for _ in range(draws):
         drawn = left.of(generator.standard_normal((len(left.residual), 1)))[:, 0]
-        alarms += log_chances(every, replace(left, residual=drawn)) < np.log(level)
+        alarms += log_chances(every, replace(left, residual=drawn), True) < np.log(level)
     assert {one.position >= 0 for one in every} == {True, False}
     assert (alarms <= draws * level + 4.0 * np.sqrt(draws * level)).all() and alarms.sum() > 0
 
