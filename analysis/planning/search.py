@@ -26,7 +26,8 @@ from .information import Information
 # Below this fraction of the whole pool's information a direction counts as undetermined.
 UNDETERMINED = 1e-10
 
-# What is added to the information of selections while they are compared, so that deficient ones compare as well.
+# What is added to the information of selections while they are compared, so that deficient ones compare as well, and
+# what counts in place of the information of undetermined directions.
 RIDGE = 1e-13
 
 # Above every criterion.
@@ -158,10 +159,22 @@ def _in_place(information: Array) -> float:
 
     It falls with the determinant, so that what determines most directions, and those best, is chosen first.
     """
-    sizes = np.linalg.eigvalsh(information)
+    scale = _scale(information)
+    root = np.sqrt(scale)
+    sizes = np.linalg.eigvalsh(information / (root[:, None] * root))
     # What is undetermined is rounding.
-    missing = -np.log(np.where(sizes < UNDETERMINED, RIDGE, sizes)).mean() / -np.log(RIDGE)
-    return float(LARGE * (1.0 + missing))
+    known = np.log(np.where(sizes < UNDETERMINED, RIDGE, sizes)) + np.log(scale)
+    return float(LARGE * (1.0 + known.mean() / np.log(RIDGE)))
+
+
+def _scale(information: Array) -> Array:
+    """What rounding is relative to in each of the z of information (..., z, z): 1, or more beside what is exact."""
+    return np.maximum(np.diagonal(information, axis1=-2, axis2=-1), 1.0)
+
+
+def _ridged(information: Array) -> Array:
+    """Information (..., z, z) with the ridge, which makes it positive definite whatever is undetermined."""
+    return information + RIDGE * _scale(information)[..., None] * np.eye(information.shape[-1])
 
 
 def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integers, Array]:
@@ -170,11 +183,10 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integ
     The first sieve is the slope of the criterion where something of every candidate is added, the second its tangent
     there with each candidate added by itself.
     """
-    whole = np.eye(len(information))
-    ridge, matrices = RIDGE * whole, problem.information.matrices
+    whole, matrices = np.eye(len(information)), problem.information.matrices
     # All candidates together have the identity, up to what the base has.
     mean = (whole - problem.information.base) / len(matrices)
-    root = _inverse(np.asarray(np.linalg.cholesky(information + ridge + mean), float)).T
+    root = _inverse(np.asarray(np.linalg.cholesky(_ridged(information + mean)), float)).T
     half = square_root(problem.criterion.tangent(counted_root(problem, root))[2])
     own = slice(None) if problem.criterion.about_balls else problem.information.shared
     if len(added) > SLOPED:
@@ -184,7 +196,7 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integ
     found = np.zeros(len(added))
     for start in range(0, len(added), AT_ONCE):
         some = added[start : start + AT_ONCE]
-        factors = np.asarray(np.linalg.cholesky(information + ridge + matrices[some]), float)
+        factors = np.asarray(np.linalg.cholesky(_ridged(information + matrices[some])), float)
         for k, factor in enumerate(factors):
             inverse = _inverse(factor)
             if _is_deficient(inverse):
