@@ -113,8 +113,9 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     if kind == "coordinate":
         return f"{name(given, k)} certified {size} too {high}", "check the certificate"
     if kind == "distance" and len(_significant(one)) > 1:
-        ball = common_ball(design, given.subject[one.columns])
-        return f"certified distances of ball {design.ball_label(ball)}: {_from(ball, one)}", "check the certificate"
+        common = common_ball(design, given.subject[one.columns])
+        told = f"certified distances of ball {design.ball_label(common)}: {_from(common, one)}"
+        return told, "check the certificate"
     if kind in ("distance", "length value"):
         what = length_name(design, subject, False) if kind == "length value" else name(given, k)
         return f"{what} certified {size} too {long}", "check the certificate"
