@@ -227,12 +227,16 @@ class Search:
         return self._log_p(*_explained(rest, _basis(rest, more)), rest)
 
     def _together(self, columns: Integers) -> Integers:
-        """Of positions that expand together, those without which the residuals are significantly larger."""
-        if len(columns) == 1 or self.patterns.kind[columns[0]] != "expansion":
-            return columns
-        chances = [self._conditional(np.delete(columns, k), self._dense(columns[[k]])) for k in range(len(columns))]
-        worst = int(np.argmax(chances))
-        return columns if chances[worst] < TOGETHER else np.delete(columns, worst)
+        """Of positions that expand, or distances that are wrong, together, those without each of which the residuals
+        are significantly larger.
+        """
+        while len(columns) > 1 and self.patterns.kind[columns[0]] in ("expansion", "distance"):
+            chances = [self._conditional(np.delete(columns, k), self._dense(columns[[k]])) for k in range(len(columns))]
+            worst = int(np.argmax(chances))
+            if chances[worst] < TOGETHER:
+                break
+            columns = np.delete(columns, worst)
+        return columns
 
     def _with_other_directions(self, columns: Integers) -> Integers:
         """A cause in all its directions, where the others explain more."""

@@ -87,7 +87,9 @@ def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(readin
         )
 
 
-def drawn(folder: Path, share: float, waves: float = 0.0, loud: float = 1.0, text: str = PLATE) -> tuple[Design, Real]:
+def drawn(
+    folder: Path, share: float, waves: float = 0.0, loud: float = 1.0, text: str = PLATE, seed: int = 8
+) -> tuple[Design, Real]:
     """A small design with readings of a true machine: noise of a share of what is stated, more `loud` in one position,
     and an error of the x scale of `waves` standard uncertainties, of that share too.
     """
@@ -96,7 +98,7 @@ def drawn(folder: Path, share: float, waves: float = 0.0, loud: float = 1.0, tex
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     on_truth, truth = on_true_machine(design, true_machine(given.true_machine, design.model, *corners))
     readings, x = exact_readings(on_truth, truth)
-    noise = np.random.default_rng(8).standard_normal(x.shape)
+    noise = np.random.default_rng(seed).standard_normal(x.shape)
     noise[readings.position == LOUD] *= loud
     noise[:, 0] += waves * np.sin(x[:, 0] / 0.04)
     observed = observe(design, readings, x + share * design.repeatability * noise)
@@ -122,6 +124,18 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
     assert (abs(one.values - true) < 4.0 * one.standard_uncertainties).all()
     words = f"certified distances of ball {design.ball_label(ball)}: to "
     assert words in diagnosis_lines(Diagnosis((one,)))[0]
+
+
+@pytest.mark.parametrize("wrong", range(4))
+def test_one_wrong_distance_is_not_laid_to_all_of_a_ball(wrong: int, tmp_path: Path) -> None:
+    for seed in range(4):
+        right, x = drawn(tmp_path, 1.0, seed=seed)
+        value = right.distances.value.copy()
+        value[wrong] += 10e-6
+        design = replace(right, distances=replace(right.distances, value=value))
+        (one,) = diagnosed(design, x, True)[1].suspects
+        assert one.patterns.kind[one.pattern] == "distance" and len(one.columns) == 1
+        assert one.patterns.subject[one.pattern] == wrong
 
 
 @pytest.mark.parametrize("ball", [0, 2, 6, 8])
