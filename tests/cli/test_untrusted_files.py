@@ -91,7 +91,9 @@ def test_patterns_are_expanded_without_a_shell(
     assert checked("sweeps/s.yaml") == ["sweeps/s.yaml"]
     # What matches nothing is an error, and the others are checked nevertheless.
     assert checked("nothing/*.yaml", "a.yaml", status=3) == ["a.yaml"]
-    assert checked("sweeps/*.yaml", status=3) == []
+    # A folder that a pattern names itself is meant, whatever it is called.
+    assert checked("sweeps/*.yaml") == ["sweeps/s.yaml"]
+    assert checked("*/*.yaml") == ["b/[x].yaml", "b/c.yaml"]
 
 
 def test_names_of_files_are_no_commands(
