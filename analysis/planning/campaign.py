@@ -348,12 +348,20 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     tasks: list[tuple[object, ...]] = [(problem, None, 0), *((problem, share, depth) for share in shares)]
     relaxed, *found = in_processes(_task, tasks, workers)
     selections = [one for some in found if isinstance(some, list) for one in some]
+    # Of a selection that is just enough, most of what an exchange passes through is deficient.
+    ways = (False, True) if _is_just_enough(problem, min(selections, key=lambda one: one.order)) else (False,)
+    for by_pivots in ways[1:]:
+        others = in_processes(_task, [(problem, share, depth, by_pivots) for share in shares], workers)
+        selections += [one for some in others if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
-        selections.append(improve(problem, starts(problem, by_weight, 0, seed)[-1], Losses(problem), depth))
+        start = starts(problem, by_weight, 0, seed)[-1]
+        selections += [improve(problem, start, Losses(problem, by_pivots), depth) for by_pivots in ways]
     selections = sorted(set(selections), key=lambda one: one.order)
     if not is_small:
-        again = in_processes(_task, [(problem, [one.chosen], 2) for one in selections[:BEST_STARTS]], workers)
+        best_starts = [one.chosen for one in selections[:BEST_STARTS]]
+        tasks = [(problem, [start], 2, by_pivots) for start in best_starts for by_pivots in ways]
+        again = in_processes(_task, tasks, workers)
         selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: one.order)
     return best, relaxed if isinstance(relaxed, Bound) else None
@@ -369,11 +377,19 @@ def _best_of_all(problem: Problem) -> Found:
     return Found(tuple(sorted(best)), value(problem, best))
 
 
+def _is_just_enough(problem: Problem, best: Found) -> bool:
+    """Whether a selection leaves something undetermined without one or another of its candidates."""
+    chosen = frozenset(best.chosen)
+    return any(not np.isfinite(value(problem, chosen - {k})) for k in chosen - problem.constraints.must)
+
+
 @single_threaded
-def _task(problem: Problem, from_: Sequence[Collection[int]] | None, at_once: int) -> list[Found] | Bound | None:
+def _task(
+    problem: Problem, from_: Sequence[Collection[int]] | None, at_once: int, by_pivots: bool = False
+) -> list[Found] | Bound | None:
     if from_ is None:
         return bound(problem)
-    losses = Losses(problem)
+    losses = Losses(problem, by_pivots)
     thorough = problem.constraints.count <= VERY_SMALL_POOL
     return [improve(problem, start, losses, at_once, thorough) for start in from_]
 

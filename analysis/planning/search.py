@@ -132,10 +132,16 @@ def _is_deficient(inverse: Array) -> bool:
 
 
 class Losses:
-    """What is made small, of selections, each computed once: the criterion, or for deficient ones something larger."""
+    """What is made small, of selections, each computed once: the criterion, or for deficient ones something larger.
 
-    def __init__(self, problem: Problem) -> None:
+    With `by_pivots` a selection counts as deficient by a small pivot alone. Some that are deficient then count as if
+    they were not, with the criterion that the ridge leaves them: no verdict, but it leads from selections that are
+    just enough to others.
+    """
+
+    def __init__(self, problem: Problem, by_pivots: bool = False) -> None:
         self._problem = problem
+        self.by_pivots = by_pivots
         self._known: dict[frozenset[int], float] = {}
 
     def of(self, members: frozenset[int]) -> float:
@@ -144,7 +150,7 @@ class Losses:
             information = self._problem.information.of(members)
             lacking = LARGE * 2 * len(self._problem.lacking(members))
             # By the same root as the value, so that no selection counts here that has none.
-            root = full_root(information)
+            root = _ridged_root(information) if self.by_pivots else full_root(information)
             if root is None:
                 found = lacking + _in_place(information)
             else:
@@ -152,6 +158,12 @@ class Losses:
             found = float(comparable(found, COMPARED))
             self._known[members] = found
         return found
+
+
+def _ridged_root(information: Array) -> Array | None:
+    """Square root of the inverse of information (z, z) with the ridge; None where a pivot is small."""
+    factor = np.asarray(np.linalg.cholesky(_ridged(information)), float)
+    return None if (np.diagonal(factor) ** 2).min() < UNDETERMINED else _inverse(factor).T
 
 
 def _in_place(information: Array) -> float:
@@ -177,7 +189,7 @@ def _ridged(information: Array) -> Array:
     return information + RIDGE * _scale(information)[..., None] * np.eye(information.shape[-1])
 
 
-def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integers, Array]:
+def _sieve(problem: Problem, information: Array, added: Integers, by_pivots: bool = False) -> tuple[Integers, Array]:
     """Candidates that may be the best to add to `information`, and the criterion's tangent with each of them.
 
     The first sieve is the slope of the criterion where something of every candidate is added, the second its tangent
@@ -199,7 +211,8 @@ def _sieve(problem: Problem, information: Array, added: Integers) -> tuple[Integ
         factors = np.asarray(np.linalg.cholesky(_ridged(information + matrices[some])), float)
         for k, factor in enumerate(factors):
             inverse = _inverse(factor)
-            if _is_deficient(inverse):
+            pivots = np.diagonal(factor) ** 2
+            if (pivots.min() < UNDETERMINED) if by_pivots else _is_deficient(inverse):
                 found[start + k] = _in_place(information + matrices[some[k]])
             else:
                 found[start + k] = ((inverse[own, own] @ half) ** 2).sum()
@@ -224,7 +237,7 @@ def best_addition(
     seconds = np.maximum(problem.constraints.seconds, 1.0)
     framed = np.isin(added, list(problem.information.frames.fixed))
     if len(added) > SMALL_POOL and not framed.any():
-        added, left = _sieve(problem, problem.information.of(members), added)
+        added, left = _sieve(problem, problem.information.of(members), added, losses.by_pivots)
         if per_second:
             left = (left - left.max()) / seconds[added]
         added = added[np.argsort(comparable(left), kind="stable")[:SIEVED]]
