@@ -42,12 +42,14 @@ def trials_lines(done: Trials) -> list[str]:
         return [f"no Monte Carlo: none of {outcome.trials} data sets led to an estimate that converged"]
     rows = [["", "average U", "actual", "unit", "spread / U", "bias / U", "covered, %", "sigma estimated", ""]]
     for symbol, one in outcome.comparisons.items():
+        # Lengths and angles have ratios in common, and no average.
+        averages = ["", "", ""]
+        if ", " not in one.unit:
+            averages = [number(1e6 * one.linear_average), number(1e6 * one.actual_average), shown_unit(one.unit)]
         rows.append(
             [
                 symbol,
-                number(1e6 * one.linear_average),
-                number(1e6 * one.actual_average),
-                shown_unit(one.unit),
+                *averages,
                 with_error(one.spread),
                 with_error(one.bias),
                 with_error(one.known, 100.0),
