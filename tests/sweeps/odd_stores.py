@@ -206,7 +206,7 @@ DAMAGED: dict[str, Damage] = {
     "names a number": by_sql("UPDATE text SET value = '3' WHERE id = 1"),
     "names of numbers": by_sql("UPDATE text SET value = '[1, [2], null]' WHERE id = 1"),
     "names too few": by_sql("UPDATE text SET value = '[\"U4_average_m\"]' WHERE id = 1"),
-    "versions a list": by_sql("UPDATE text SET value = '[]' WHERE id = 2"),
+    "versions a list": by_sql("UPDATE text SET value = '[[]]' WHERE id = 2"),
     "versions no texts": by_sql("UPDATE text SET value = '{\"ballplate\": 3}' WHERE id = 2"),
     "names unknown": by_sql("UPDATE result SET names = 99 WHERE rowid = 1"),
     "versions unknown": by_sql("UPDATE result SET versions = 'x' WHERE rowid = 1"),
