@@ -151,7 +151,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     finally:
         bar.close()
     ensure_in_place(store)
-    _tell(store, f" of sweep {number}" if len({*stored, number}) > 1 else "", number, summary)
+    _tell(store, f" of sweep {number}" if len({*stored, *unreadable, number}) > 1 else "", number, summary)
     return 1 if summary.failed or summary.left else 0
 
 

@@ -12,7 +12,7 @@ import os
 import sqlite3
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import count as numbers_from
 from pathlib import Path
@@ -155,6 +155,9 @@ def ensure_in_place(store: Store) -> None:
     except OSError:
         is_same, what = False, "has been deleted or moved"
     if not is_same:
+        # SQLite leaves to its log what it wrote to a file that has moved.
+        with suppress(sqlite3.Error):
+            store.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         text = "the sweep ends here, and nothing was written to what is there now; if the store was moved, it has the "
         text += "rows computed until then, and --store goes on with it"
         raise StoreError(f"{store.path}: {what} while the sweep ran; {text}")

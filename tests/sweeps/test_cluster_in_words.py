@@ -90,6 +90,7 @@ def ended(path: Path, address: str) -> str:
 @pytest.mark.parametrize(
     ("worker", "words"),
     [(WITHOUT, "no ballplate"), (OTHER, "ballplate 0.0.7"), (OTHER_CODE, "other code of ballplate 0.1.0")],
+    ids=["no ballplate", "another version", "other code"],
 )
 def test_workers_with_other_code_are_refused(
     worker: str, words: str, tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
@@ -102,10 +103,11 @@ def test_workers_with_other_code_are_refused(
     assert stored(tmp_path / "small.sqlite") == 0
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_ends(tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start) -> None:
     address, process = scheduler
     start("-c", SERVE, address)
-    path, store = small_sweep(tmp_path, 100, "trials: 200\n"), tmp_path / "small.sqlite"
+    path, store = small_sweep(tmp_path, 100, "trials: 50\n"), tmp_path / "small.sqlite"
     arguments = command("sweep", path, "--scheduler", address)
     with subprocess.Popen(arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as sweep:
         end = time.monotonic() + 100

@@ -116,7 +116,7 @@ def assert_subset(table: pandas.DataFrame, right: pandas.DataFrame, exact: bool)
         return
     for name in set(table.columns) - set(NO_TIME):
         expected = right.set_index("cell").loc[table["cell"]].reset_index()[name]
-        if table[name].dtype.kind == "f":
+        if expected.dtype.kind == "f":
             np.testing.assert_array_equal(table[name], expected)
         else:
             assert table[name].fillna("").astype(str).tolist() == expected.fillna("").astype(str).tolist(), name
@@ -271,11 +271,6 @@ def test_a_store_that_vanishes_at_the_end_is_not_called_done(
     store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from analysis.sweeps import execute
-
-    def and_then_gone(*arguments: object, **options: object) -> execute.Summary:
-        found = execute.run_sweep(*arguments, **options)  # type: ignore[arg-type]
-        store.unlink()
-        return found
 
     with monkeypatch.context() as patched:
         real = execute.run_sweep
