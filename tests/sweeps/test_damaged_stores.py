@@ -116,10 +116,15 @@ def assert_subset(table: pandas.DataFrame, right: pandas.DataFrame, exact: bool)
         return
     for name in set(table.columns) - set(NO_TIME):
         expected = right.set_index("cell").loc[table["cell"]].reset_index()[name]
-        if expected.dtype.kind == "f":
+        if expected.dtype.kind == table[name].dtype.kind == "f":
             np.testing.assert_array_equal(table[name], expected)
         else:
-            assert table[name].fillna("").astype(str).tolist() == expected.fillna("").astype(str).tolist(), name
+            assert as_texts(table[name]) == as_texts(expected), name
+
+
+def as_texts(column: pandas.Series) -> list[str]:
+    """Values of a column in words, none where there are none."""
+    return ["" if pandas.isna(value) else str(value) for value in column]
 
 
 def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -449,7 +454,7 @@ def assert_survives(made: Path, folder: Path, seed: int, right: pandas.DataFrame
 
 def test_flipped_bits(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     right = rows(made / "small.sqlite")
-    seen = {assert_survives(made, tmp_path, seed, right) for seed in range(60)}
+    seen = {assert_survives(made, tmp_path, seed, right) for seed in range(40)}
     assert {"csv 0", "csv 3", "sweep 1", "sweep 3"} <= seen
     assert "Traceback" not in capsys.readouterr().err
 
