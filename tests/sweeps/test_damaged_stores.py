@@ -7,6 +7,7 @@ import random
 import re
 import shutil
 import sqlite3
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ import pytest
 from analysis.cli import main
 from analysis.sweeps import store_file
 from analysis.sweeps.model import Sweep
-from analysis.sweeps.store import Store, add_rows, add_sweep, open_store, results
+from analysis.sweeps.store import Store, StoreError, add_rows, add_sweep, open_store, results
 from analysis.sweeps.task import Row, Task, compute
 
 from .odd_stores import DAMAGED, NO_STORES, by_sql, of_the_first_format, page_of, settled
@@ -329,6 +330,23 @@ def test_a_log_of_something_else_is_left_out(log: bytes, store: Path) -> None:
     right = rows(store)
     store.with_name("small.sqlite-wal").write_bytes(log)
     assert_same(rows(store), right)
+
+
+def test_a_folder_that_cannot_be_written() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o555)
+        is_root = os.geteuid() == 0
+        if is_root:
+            # Nothing is forbidden to root.
+            os.seteuid(65534)
+        try:
+            with pytest.raises(StoreError, match="its folder cannot be written; name another with --store"):
+                open_store(folder / "s.sqlite", create=True)
+        finally:
+            if is_root:
+                os.seteuid(0)
+        assert not list(folder.iterdir())
 
 
 HOSTILE = "\x1b[31m\x07<script>alert(1)</script>::error::\u202eevil"
