@@ -70,19 +70,19 @@ def test_one_that_was_swallowed_ends_monte_carlo(
 
 
 def test_they_are_remembered() -> None:
-    with interruptions() as answer:
-        answer()
+    with interruptions() as interruption:
+        interruption.answer()
         swallowed()
         with pytest.raises(KeyboardInterrupt):
-            answer()
+            interruption.answer()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_ignored_ones_stay_ignored() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with interruptions() as answer:
+    with interruptions() as interruption:
         signal.raise_signal(signal.SIGINT)
-        answer()
+        interruption.answer()
 
 
 @pytest.mark.parametrize("module", ["analysis.cli.common", "simulator.experiment.messages", "numpy", "joblib"])
