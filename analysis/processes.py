@@ -134,7 +134,7 @@ def _start_trackers() -> None:
 
 @contextmanager
 def _interruptions_blocked() -> Iterator[None]:
-    """Let processes that are started inherit that interruptions are blocked, until they have loaded what ignores them."""
+    """Let processes inherit that interruptions are blocked, until they have loaded what ignores them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -6,9 +6,10 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 
-from .interruption import Interruption, files_named, interruptions, tell, written
+from .interruption import Interruption, files_named, interruptions, leave, tell, written
 
 AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
 
@@ -51,17 +52,28 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status; without arguments, that of the process itself."""
-    with interruptions(is_own_process=arguments is None) as interruption:
-        try:
-            return _main(arguments, interruption)
-        except KeyboardInterrupt:
-            pass
-        except Exception:
-            # What fails after a signal does so because of it.
-            if interruption.came is None:
-                raise
-        tell(interruption)
-        return interruption.status
+    is_own_process = arguments is None
+    with interruptions(is_own_process) as interruption:
+        status = _answering(arguments, interruption)
+        if is_own_process and interruption.came is not None:
+            if sys.stdout is not None:
+                with suppress(OSError):
+                    sys.stdout.flush()
+            leave(status)
+        return status
+
+
+def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> int:
+    try:
+        return _main(arguments, interruption)
+    except KeyboardInterrupt:
+        pass
+    except Exception:
+        # What fails after a signal does so because of it.
+        if interruption.came is None:
+            raise
+    tell(interruption)
+    return interruption.status
 
 
 def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Exit status and what is told, by signal; SIGBREAK is Ctrl-Break on Windows.
 ANSWERS = {"SIGINT": (130, "interrupted"), "SIGBREAK": (130, "interrupted"), "SIGTERM": (143, "terminated")}
 # Seconds that a command has for an orderly end.
-ORDERLY_LIMIT = 0.6
+ORDERLY_LIMIT = 0.5
 # Seconds within which signals count as one: programs in between, such as `timeout`, send what the terminal sends too.
 SAME_SIGNAL_LIMIT = 0.1
 # Seconds that the last words may take, where nobody reads standard error.
@@ -88,9 +88,9 @@ class Interruption:
 def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
     """Raise KeyboardInterrupt at the first signal, and remember it.
 
-    In a process of its own the command has `ORDERLY_LIMIT` to end from then on, the end of the interpreter included;
-    then, or at a second signal, the process is ended from another thread. So it ends also in a long call of linear
-    algebra and where a library has caught the exception. Signals that come after the command's end change nothing.
+    In a process of its own the command has `ORDERLY_LIMIT` to end from then on; then, or at a second signal,
+    another thread ends the process. So it ends also in a long call of linear algebra, and where a library has caught the
+    exception. Signals that come after the command's end change nothing, unless the interpreter's takes too long.
 
     A process that was started with a signal ignored, as shells start those in the background, goes on ignoring it.
     """
@@ -143,14 +143,13 @@ def _watch(interruption: Interruption, numbers: frozenset[int]) -> None:
                     _wait(reader, numbers)
                     if time.monotonic() - first > SAME_SIGNAL_LIMIT:
                         break
-            _stop_workers()
             words = threading.Thread(target=tell, args=(interruption,), daemon=True)
             words.start()
             words.join(WORDS_LIMIT)
         finally:
             # The socket stays open as long as the thread lives.
             writer.detach()
-            os._exit(interruption.status)
+            leave(interruption.status)
 
     threading.Thread(target=watch, name="interruption", daemon=True).start()
 
@@ -163,13 +162,21 @@ def _wait(reader: socket, numbers: frozenset[int]) -> int:
             return number
 
 
-def _stop_workers() -> None:
-    # Not imported: the main thread may be about to, and would be waited for.
-    multiprocessing = sys.modules.get("multiprocessing")
-    # What cannot be stopped here ends by itself, as its parent has ended.
-    with suppress(Exception):
-        for process in multiprocessing.active_children() if multiprocessing else ():
-            process.kill()
+def leave(status: int) -> NoReturn:
+    """End the process and its workers at once.
+
+    The interpreter's own end would wait for what is under way, and may take an interruption that passed through
+    generated code for one that nobody has answered.
+    """
+    try:
+        # Not imported: the main thread may be about to, and would be waited for.
+        multiprocessing = sys.modules.get("multiprocessing")
+        # What cannot be stopped here ends by itself, as its parent has ended.
+        with suppress(Exception):
+            for process in multiprocessing.active_children() if multiprocessing else ():
+                process.kill()
+    finally:
+        os._exit(status)
 
 
 def tell(interruption: Interruption) -> None:
