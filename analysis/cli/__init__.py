@@ -65,7 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     try:
-        return _main(arguments, interruption)
+        with interruption.raising():
+            return _main(arguments, interruption)
     except KeyboardInterrupt:
         pass
     except Exception:

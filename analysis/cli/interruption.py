@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
@@ -61,6 +61,18 @@ class Interruption:
 
     came: int | None = None
     kept: Callable[[], str] = partial(written, {})
+    is_raising: bool = False
+    told: threading.Lock = field(default_factory=threading.Lock)
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """Let signals raise KeyboardInterrupt from now on, and those that have come already, until the end."""
+        self.is_raising = True
+        try:
+            self.answer()
+            yield
+        finally:
+            self.is_raising = False
 
     def answer(self) -> None:
         """Raise KeyboardInterrupt if there was a signal.
@@ -86,10 +98,10 @@ class Interruption:
 
 @contextmanager
 def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
-    """Raise KeyboardInterrupt at the first signal, and remember it.
+    """Remember the first signal, which raises KeyboardInterrupt if it comes within `Interruption.raising`.
 
-    In a process of its own the command has `ORDERLY_LIMIT` to end from then on; then, or at a second signal,
-    another thread ends the process. So it ends also in a long call of linear algebra, and where a library has caught the
+    In a process of its own the command has `ORDERLY_LIMIT` to end from then on; then, or at a second signal, another
+    thread ends the process. So it ends also in a long call of linear algebra, and where a library has caught the
     exception. Signals that come after the command's end change nothing, unless the interpreter's takes too long.
 
     A process that was started with a signal ignored, as shells start those in the background, goes on ignoring it.
@@ -98,13 +110,13 @@ def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
     if threading.current_thread() is not threading.main_thread():
         yield interruption
         return
-    is_over = False
 
     def interrupt(number: int, _: FrameType | None) -> None:
         # A second exception would disturb the end that the first has begun.
-        if interruption.came is None and not is_over:
+        if interruption.came is None:
             interruption.came = number
-            raise KeyboardInterrupt
+            if interruption.is_raising:
+                raise KeyboardInterrupt
 
     before = {}
     for name in ANSWERS:
@@ -116,7 +128,6 @@ def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
             _watch(interruption, frozenset(before))
         yield interruption
     finally:
-        is_over = True
         if not is_own_process:
             for number, handler in before.items():
                 signal.signal(number, handler)
@@ -135,7 +146,6 @@ def _watch(interruption: Interruption, numbers: frozenset[int]) -> None:
     def watch() -> None:
         try:
             number = _wait(reader, numbers)
-            interruption.came = number if interruption.came is None else interruption.came
             first = time.monotonic()
             while (left := first + ORDERLY_LIMIT - time.monotonic()) > 0.0:
                 reader.settimeout(left)
@@ -143,6 +153,8 @@ def _watch(interruption: Interruption, numbers: frozenset[int]) -> None:
                     _wait(reader, numbers)
                     if time.monotonic() - first > SAME_SIGNAL_LIMIT:
                         break
+            # Not earlier, since the exception is raised at what is told as the first signal.
+            interruption.came = number if interruption.came is None else interruption.came
             words = threading.Thread(target=tell, args=(interruption,), daemon=True)
             words.start()
             words.join(WORDS_LIMIT)
@@ -180,7 +192,7 @@ def leave(status: int) -> NoReturn:
 
 
 def tell(interruption: Interruption) -> None:
-    """Say on standard error that the command has ended, and what it keeps."""
-    if sys.stderr is not None:
+    """Say on standard error, once, that the command has ended, and what it keeps."""
+    if sys.stderr is not None and interruption.told.acquire(blocking=False):
         clear = "\r\x1b[K" if sys.stderr.isatty() else ""
         print(f"{clear}{interruption.word}; {interruption.kept()}", file=sys.stderr, flush=True)
