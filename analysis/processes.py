@@ -110,8 +110,8 @@ def _signals_held() -> Iterator[None]:
         for number, handler in before.items():
             signal.signal(number, handler)
         if held:
-            number, frame = held[0]
-            before[signal.Signals(number)](number, frame)
+            first, frame = held[0]
+            before[signal.Signals(first)](first, frame)
 
 
 def _start_trackers() -> None:

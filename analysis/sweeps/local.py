@@ -83,8 +83,7 @@ def _alone(source: _Source, digest: str, task: Task) -> Row | None:
     """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
-        how = {"initializer": begin_worker, "initargs": (os.getpid(),)}
-        with ProcessPoolExecutor(1, context, **how) as pool:
+        with ProcessPoolExecutor(1, context, initializer=begin_worker, initargs=(os.getpid(),)) as pool:
             try:
                 return pool.submit(compute_unchanged, source, digest, task).result()
             except BrokenProcessPool:
