@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
 
-from .interruption import interruptions
+from .interruption import Interruption, files_named, interruptions, leave, tell, written
 
-AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
 
 
 def parser() -> argparse.ArgumentParser:
@@ -49,20 +51,38 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit status."""
+    """Run a command and return its exit status; without arguments, that of the process itself."""
+    is_own_process = arguments is None
+    with interruptions(is_own_process) as interruption:
+        status = _answering(arguments, interruption)
+        if is_own_process and interruption.came is not None:
+            if sys.stdout is not None:
+                with suppress(OSError):
+                    sys.stdout.flush()
+            leave(status)
+        return status
+
+
+def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     try:
-        with interruptions() as answer:
-            return _main(arguments, answer)
+        with interruption.raising():
+            return _main(arguments, interruption)
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
+        pass
+    except Exception:
+        # What fails after a signal does so because of it.
+        if interruption.came is None:
+            raise
+    tell(interruption)
+    return interruption.status
 
 
-def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], None]) -> int:
+def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
     options = parser().parse_args(arguments)
-    options.answer_interruption = answer_interruption
+    interruption.kept = partial(written, files_named(options))
+    options.interruption = interruption
     # Loaded only now, so that --help and wrong usage answer at once.
     from simulator.experiment.messages import ExperimentError
 

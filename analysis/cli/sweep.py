@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..sweeps.model import Sweep
     from ..sweeps.store import Store
 
-WRONG_USAGE, BAD_FILE, INTERRUPTED = 2, 3, 130
+WRONG_USAGE, BAD_FILE = 2, 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -124,10 +124,11 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     found = statuses(store)
     for text in of_other_methods(key for key in keys(store, number).values() if (key, 0) in found):
         print(f"{store.path}: {text}, and computes these cells anew", file=sys.stderr)
+    options.interruption.kept = lambda: f"what is done is in {store.path}, and the same command goes on from there"
     bar = ProgressBar("cells")
 
     def report(summary: Summary) -> None:
-        options.answer_interruption()
+        options.interruption.answer()
         remark = ", ".join(
             ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
             + ([f"{summary.failed} failed"] if summary.failed else [])
@@ -138,16 +139,12 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         with _runner(sweep, bundle, options) as runner:
             summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
         if summary.left:
-            options.answer_interruption()
+            options.interruption.answer()
     except ChangedError:
         bar.close()
         text = "the files of the sweep have been changed while it ran; what is done is stored, start it again"
         print(f"{options.file}: {text}", file=sys.stderr)
         return BAD_FILE
-    except KeyboardInterrupt:
-        bar.close()
-        print(f"interrupted; what is done is in {store.path}, and the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
     finally:
         bar.close()
     ensure_in_place(store)
