@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from .export import add_store, warn_of_other_methods
+from .outputs import PAGE, add_force, add_output, write_outputs
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -22,7 +23,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "best and the worst design. With --format text, markdown, csv or latex the tables alone.",
     )
     add_store(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="page or tables; default, and -: the screen")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        takes_screen=True,
+        help="page or tables; default, and -: the screen",
+    )
+    add_force(parser)
     parser.add_argument(
         "--format",
         choices=("html", "text", "markdown", "csv", "latex"),
@@ -42,9 +51,6 @@ def run(options: Namespace) -> int:
     from ..sweeps.store import StoreError, chosen_sweep, open_store
 
     output: Path | None = options.output
-    if output is not None and output.resolve() == options.store.resolve():
-        print(f"ballplate report: -o {output} is the store itself; name another file", file=sys.stderr)
-        return WRONG_USAGE
     if str(output) == "-":
         output = None
     suffix = "" if output is None else output.suffix.lower()
@@ -53,6 +59,9 @@ def run(options: Namespace) -> int:
         print(f"ballplate report: {output} should end in one of {endings}; or state --format", file=sys.stderr)
         return WRONG_USAGE
     form = options.format or SUFFIXES.get(suffix, "html")
+    if form == "html" and PAGE.is_missing:
+        print(f"ballplate report: {PAGE.told}", file=sys.stderr)
+        return BAD_FILE
     try:
         with closing(open_store(options.store)) as store:
             results = read_results(store, options.sweep)
@@ -69,18 +78,8 @@ def run(options: Namespace) -> int:
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
-    except ImportError as error:
-        if error.name is None or error.name.partition(".")[0] not in ("jinja2", "markupsafe", "matplotlib"):
-            raise
-        told = "a page needs jinja2 and matplotlib; install them with: python -m pip install 'ballplate[report]'"
-        print(f"ballplate report: {told}", file=sys.stderr)
-        return BAD_FILE
     if output is None:
         sys.stdout.write(text)
         return 0
-    try:
-        output.write_bytes(text.encode("utf-8", "replace"))
-    except OSError as error:
-        print(f"{output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
-        return BAD_FILE
-    return 0
+    content = text.encode("utf-8", "replace")
+    return 0 if write_outputs({output: lambda path: path.write_bytes(content)}, options.force) else BAD_FILE
