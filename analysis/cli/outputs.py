@@ -123,7 +123,11 @@ def check_outputs(options: Namespace) -> None:
     """
     from simulator.experiment.messages import ExperimentError
 
-    outputs = [one for one in getattr(options, "outputs", ()) if not one.is_screen]
+    given = getattr(options, "outputs", ())
+    screens = [one.option for one in given if one.is_screen]
+    if len(screens) > 1:
+        raise UsageError(f"{' and '.join(screens)} both go to the screen; name a file for one")
+    outputs = [one for one in given if not one.is_screen]
     _refuse_screen(outputs)
     _refuse_same(outputs)
     _refuse_inputs(outputs, options)
@@ -146,8 +150,6 @@ def _refuse_screen(outputs: list[Output]) -> None:
 def _refuse_same(outputs: list[Output]) -> None:
     places: dict[tuple[str, str], Output] = {}
     for one in outputs:
-        if _is_in_place(one.path):
-            continue
         target = _target(one.path)
         name = target.name.casefold() if _is_case_blind(target.parent) else target.name
         other = places.setdefault((str(target.parent), name), one)
@@ -163,8 +165,7 @@ def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
         status = _status(path)
         for one, found in there:
             if status is not None and found is not None and os.path.samestat(status, found):
-                as_what = "" if path == one.path else f" as {path}"
-                raise UsageError(f"{one.option} {one.path} is read{as_what}, too; name another file")
+                raise UsageError(f"{one.option} {one.path} would overwrite {path}, which is read; name another file")
 
 
 def _inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
