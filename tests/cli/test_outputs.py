@@ -238,12 +238,10 @@ class TestToldBeforeTheWork:
             refused(line(command, files, {option: path}, "--force"), capsys, 3, f"{path}: {told}")
         assert content(tmp_path) == before
 
-    @pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC, errno.EDQUOT])
     def test_folder_that_takes_no_file(
         self,
         command: str,
         option: str,
-        number: int,
         files: Path,
         tmp_path: Path,
         capsys: pytest.CaptureFixture[str],
@@ -252,15 +250,16 @@ class TestToldBeforeTheWork:
         path = tmp_path / WALK[command].writes[option]
         path.write_text("old")
         before, opened = content(tmp_path), os.open
+        for number in (errno.EROFS, errno.EACCES, errno.ENOSPC, errno.EDQUOT):
 
-        def refuse(name: Any, flags: int, *arguments: Any, **others: Any) -> int:
-            if flags & os.O_CREAT and Path(name).parent == tmp_path:
-                raise OSError(number, os.strerror(number), name)
-            return opened(name, flags, *arguments, **others)
+            def refuse(name: Any, flags: int, *arguments: Any, number: int = number, **others: Any) -> int:
+                if flags & os.O_CREAT and Path(name).parent == tmp_path:
+                    raise OSError(number, os.strerror(number), name)
+                return opened(name, flags, *arguments, **others)
 
-        monkeypatch.setattr(os, "open", refuse)
-        told = f"{path}: cannot be written ({os.strerror(number)}); "
-        refused(line(command, files, {option: path}, "--force"), capsys, 3, told)
+            monkeypatch.setattr(os, "open", refuse)
+            told = f"{path}: cannot be written ({os.strerror(number)}); "
+            refused(line(command, files, {option: path}, "--force"), capsys, 3, told)
         assert content(tmp_path) == before
 
     def test_file_that_may_not_be_changed(
@@ -483,11 +482,9 @@ FAULTS = ("limit of size", "full disk at the last", "held open by another progra
 
 
 @pytest.mark.usefixtures("planned_once")
-@pytest.mark.parametrize("kind", FAULTS)
 @pytest.mark.parametrize("command", [command for command, walk in WALK.items() if walk.writes])
 def test_what_was_there_is_whole_when_writing_fails(
     command: str,
-    kind: str,
     files: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -500,21 +497,22 @@ def test_what_was_there_is_whole_when_writing_fails(
     for path in written.values():
         path.write_bytes(b"old")
     before, read = content(folder), content(files)
-    with monkeypatch.context() as patch:
-        status = fault(kind, len(written), patch, small_disk)
-        assert main(line(command, files, written, "--force")) == status
-    small_disk(resource.getrlimit(resource.RLIMIT_FSIZE)[1])
-    assert content(folder) == before
-    # Beside a store its library may leave a log.
-    assert content(files) | read == content(files)
-    out, err = capsys.readouterr()
-    told = [one for one in err.splitlines() if "cannot be written" in one]
-    if status == 3:
-        assert len(told) == 1 and told[0].endswith("the file there is as it was")
-        assert any(told[0].startswith(f"{path}: ") for path in written.values())
-        # What was computed is told nevertheless.
-        assert bool(out) == walk.prints
-    assert "written to" not in err and not any(one.endswith(" written") for one in err.splitlines())
+    for kind in FAULTS:
+        with monkeypatch.context() as patch:
+            status = fault(kind, len(written), patch, small_disk)
+            assert main(line(command, files, written, "--force")) == status, kind
+        small_disk(resource.getrlimit(resource.RLIMIT_FSIZE)[1])
+        assert content(folder) == before
+        # Beside a store its library may leave a log.
+        assert content(files) | read == content(files)
+        out, err = capsys.readouterr()
+        told = [one for one in err.splitlines() if "cannot be written" in one]
+        if status == 3:
+            assert len(told) == 1 and told[0].endswith("the file there is as it was")
+            assert any(told[0].startswith(f"{path}: ") for path in written.values())
+            # What was computed is told nevertheless.
+            assert bool(out) == walk.prints
+        assert "written to" not in err and not any(one.endswith(" written") for one in err.splitlines())
     # And the same command succeeds where nothing fails.
     assert main(line(command, files, written, "--force")) in (0, 1)
     assert content(folder).keys() == before.keys()
