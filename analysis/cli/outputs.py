@@ -15,8 +15,9 @@ import sys
 import tempfile
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -28,6 +29,9 @@ FORCE = "overwrite files that there are already"
 
 # Options that name files which name others, as experiment and machine files do.
 NAMING = ("files", "file", "earlier")
+
+# What belongs to a store besides its file.
+BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
 
 Writer = Callable[[Path], object]
 """Writes a file of the kind that the path's name ends in."""
@@ -148,13 +152,13 @@ def _refuse_screen(outputs: list[Output]) -> None:
 
 
 def _refuse_same(outputs: list[Output]) -> None:
-    places: dict[tuple[str, str], Output] = {}
-    for one in outputs:
-        target = _target(one.path)
-        name = target.name.casefold() if _is_case_blind(target.parent) else target.name
-        other = places.setdefault((str(target.parent), name), one)
-        if other is not one:
-            raise UsageError(f"{other.option} {other.path} and {one.option} {one.path} are the same file; name another")
+    for one, other in combinations(outputs, 2):
+        first, second = _target(one.path), _target(other.path)
+        is_same = first == second
+        if first.parent == second.parent and first.name.casefold() == second.name.casefold():
+            is_same |= _is_case_blind(first.parent)
+        if is_same:
+            raise UsageError(f"{one.option} {one.path} and {other.option} {other.path} are the same file; name another")
 
 
 def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
@@ -177,6 +181,8 @@ def _inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
         for path in paths:
             if name not in outputs and isinstance(path, Path):
                 yield path
+                if name == "store":
+                    yield from (path.with_name(path.name + ending) for ending in BESIDE_STORE)
                 if name in NAMING and path.suffix.lower() != ".csv":
                     yield from named_by(path)
 
@@ -198,15 +204,15 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
             elif found is not None:
                 # Without writing anything; tells of permissions, and of other programs that hold it on Windows.
                 path.open("r+b").close()
-            target = _target(path)
-            os.unlink(_temporary(target))
+            with _tried(_target(path)):
+                pass
     except (OSError, ValueError) as error:
         reasons.append(_cannot(error))
     return [Message(str(path), 0, 0, "", reason) for reason in reasons]
 
 
 def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
-    """Let each writer write its file, all of them or none; False after saying why not on standard error.
+    """Let each writer write its file, all of them or, as far as the system allows, none; False after saying why not.
 
     Each is written beside its place under another name and put there only when all have been written to the disk, with
     the permissions of the file that was there before. A link stays one: what it leads to is replaced. Devices and pipes
@@ -220,7 +226,8 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     try:
         for path, writer in writers.items():
             if not _is_in_place(path):
-                temporaries[path] = temporary = _temporary(_target(path))
+                temporaries[path] = temporary = _beside(_target(path))
+                _make(temporary)
                 writer(temporary)
                 _settle(temporary, _target(path))
         for path, writer in writers.items():
@@ -323,22 +330,32 @@ def _is_standard_output(found: os.stat_result) -> bool:
 def _is_case_blind(folder: Path) -> bool:
     """Whether names in a folder that differ in capitals alone mean the same file; False where nothing can be tried."""
     try:
-        temporary = _temporary(folder / "a")
+        with _tried(folder / "a") as temporary:
+            return temporary.with_name(temporary.name.upper()).exists()
     except OSError:
         return False
+
+
+@contextmanager
+def _tried(target: Path) -> Iterator[Path]:
+    """An empty file beside another one, for as long as it takes to see what the folder makes of it."""
+    path = _beside(target)
     try:
-        return temporary.with_name(temporary.name.upper()).exists()
+        _make(path)
+        yield path
     finally:
-        temporary.unlink()
+        with suppress(OSError):
+            path.unlink()
 
 
-def _temporary(target: Path) -> Path:
-    """A new file beside another one, for a content of the same kind."""
-    while True:
-        path = target.with_name(f".ballplate-{os.urandom(5).hex()}{target.suffix.lower()}")
-        with suppress(FileExistsError):
-            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-            return path
+def _beside(target: Path) -> Path:
+    """A name that no other file has, beside one, for a content of the same kind."""
+    return target.with_name(f".ballplate-{os.urandom(8).hex()}{target.suffix.lower()}")
+
+
+def _make(path: Path) -> None:
+    """Make a new file with the permissions that new files have."""
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
 
 
 def _settle(temporary: Path, target: Path) -> None:

@@ -386,6 +386,14 @@ def test_a_module_that_the_experiment_runs_is_an_input(files: Path, capsys: pyte
 
 
 @pytest.mark.usefixtures("idle")
+def test_the_log_of_a_store_is_an_input(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = files / "store.sqlite-wal"
+    log.write_bytes(b"rows that are not in the store yet")
+    arguments = ["report", str(files / "store.sqlite"), "--format", "text", "-o", str(log), "--force"]
+    refused(arguments, capsys, 2, f"-o {log} would overwrite {log}, which is read")
+
+
+@pytest.mark.usefixtures("idle")
 def test_two_outputs_on_the_screen(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = line("simulate", files, {"-o": Path("-"), "--certificate": Path("-")})
     refused(arguments, capsys, 2, "-o and --certificate both go to the screen; name a file for one")
