@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 
 from .interruption import Interruption, files_named, interruptions, leave, tell, written
+from .outputs import UsageError, check_outputs
+from .streams import lasting_streams
 
 AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
 
@@ -43,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used.",
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     experiments = (check, run, plan, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
@@ -78,34 +79,53 @@ def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> i
 
 
 def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-    options = parser().parse_args(arguments)
-    interruption.kept = partial(written, files_named(options))
-    options.interruption = interruption
+    with lasting_streams():
+        try:
+            options = parser().parse_args(arguments)
+        except SystemExit:
+            # Help is data, too.
+            if _ended(AS_EXPECTED) == BAD_FILE:
+                return BAD_FILE
+            raise
+        interruption.kept = partial(written, files_named(options))
+        options.interruption = interruption
+        return _run(options)
+
+
+def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
-    from simulator.experiment.messages import ExperimentError
+    from simulator.experiment.messages import ExperimentError, in_one_line
 
     from ..internal_error import InternalError
 
     try:
-        status = int(options.run(options))
-        sys.stdout.flush()
-        return status
+        check_outputs(options)
+        return _ended(int(options.run(options)))
+    except UsageError as error:
+        print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
+        return USAGE
     except ExperimentError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
     except InternalError as error:
         print(f"internal error: {error}. Please report it with the file and the command.", file=sys.stderr)
         return INTERNAL
-    except BrokenPipeError:
-        # The reader has gone; say nothing, and keep the interpreter from flushing into the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return AS_EXPECTED
     except OSError as error:
-        print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return BAD_FILE
+        return _without_room(error)
+
+
+def _ended(status: int) -> int:
+    """The status of a command that has printed everything, once that has left."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        return _without_room(error)
+    return status
+
+
+def _without_room(error: OSError) -> int:
+    print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
+    return BAD_FILE
 
 
 class _Version(argparse.Action):
