@@ -83,8 +83,21 @@ def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], Non
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return AS_EXPECTED
     except OSError as error:
+        from .memory import no_memory
+
+        if told := no_memory(error, options):
+            print(told, file=sys.stderr)
+            return BAD_FILE
         print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BAD_FILE
+    except Exception as error:
+        from .memory import no_memory
+
+        told = no_memory(error, options)
+        if told is None:
+            raise
+        print(told, file=sys.stderr)
         return BAD_FILE
 
 
