@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import re
 from argparse import Namespace
+from pathlib import Path
 
 # What makes a command's work smaller.
 SMALLER = {
@@ -29,8 +30,8 @@ WITH_SIZE = re.compile(r"Unable to allocate ([0-9.]+ [KMGTPE]?i?B|[0-9]+ bytes)"
 def no_memory(error: BaseException, options: Namespace) -> str | None:
     """What to tell the user where an error comes of a want of memory, here or in a worker; None of any other error."""
     name = options.run.__module__.rpartition(".")[2]
-    files = getattr(options, "files", None) or [f"ballplate {name}"]
-    place = ", ".join(map(str, files))
+    named = [value for key in ("files", "file", "store") for value in _paths(getattr(options, key, None))]
+    place = ", ".join(map(str, named)) or f"ballplate {name}"
     smaller = SMALLER.get(name, "close other programs")
     # Worker processes that the system has ended; loading the class for it would take memory.
     if any(kind.__name__ == "BrokenProcessPool" for kind in type(error).__mro__):
@@ -40,5 +41,10 @@ def no_memory(error: BaseException, options: Namespace) -> str | None:
     if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
         return None
     found = WITH_SIZE.search(str(error))
-    size = f": there is no room for another {found[1].replace('iB', 'B')}" if found else ""
+    size = f": there is no room for another {found[1]}" if found else ""
     return f"{place}: {name} needs more memory than there is{size}; {smaller}"
+
+
+def _paths(value: object) -> list[Path]:
+    values = value if isinstance(value, list) else [value]
+    return [one for one in values if isinstance(one, Path)]

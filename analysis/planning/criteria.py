@@ -53,6 +53,9 @@ OPEN = 1e-7
 BLOCK = 256
 MOST_PLACES_KEPT = 1024
 
+# Evaluation points between all of which a plan can make distances small: thousands of times in a search.
+MOST_POINTS = 5000
+
 # Functions whose uncertainties are kept, rather than computed twice, for the tangent of a largest value.
 KEPT = 4_000_000
 
@@ -354,6 +357,20 @@ class Several:
 def is_about_balls(name: CriterionName) -> bool:
     """Whether a criterion needs all balls, and not only what they tell of the machine."""
     return name.startswith("U5")
+
+
+def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
+    """Refuse more evaluation points than a search can go through.
+
+    :raises ExperimentError: there are more than 5000 and the criterion concerns them.
+    """
+    count = len(experiment.evaluation.points)
+    if name.startswith("U6") and count > MOST_POINTS:
+        text = (
+            f"{count} points make {count * (count - 1) // 2} distances, which a search for {name} computes some "
+            f"thousand times, and takes days; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
+        )
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
 
 
 def criterion(information: Information, experiment: Experiment, name: CriterionName) -> Criterion:
