@@ -110,8 +110,16 @@ def _run(options: argparse.Namespace) -> int:
     except InternalError as error:
         print(f"internal error: {error}. Please report it with the file and the command.", file=sys.stderr)
         return INTERNAL
-    except OSError as error:
-        return _without_room(error)
+    except Exception as error:
+        from .memory import no_memory
+
+        told = no_memory(error, options)
+        if told is not None:
+            print(told, file=sys.stderr)
+            return BAD_FILE
+        if isinstance(error, OSError):
+            return _without_room(error)
+        raise
 
 
 def _ended(status: int) -> int:

@@ -33,6 +33,8 @@ TOLERANCE = 1e-9
 MOST_SHARED = 3500
 # Lengths that the standards contribute, each a row over the machine's errors.
 MOST_LENGTHS = 20_000
+# Lengths of a standard of which some have a ball in common, whose uncertainties are therefore treated together.
+MOST_JOINT_LENGTHS = 3000
 AXES = ("x", "y", "z")
 
 
@@ -387,6 +389,26 @@ def check_lengths(
                     f"{MOST_LENGTHS} lengths are possible"
                 )
                 problems.add((*steps, "pairs"), text)
+    _check_joint_lengths(calibrations, references)
+
+
+def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: References) -> None:
+    """Report length standards of which too many lengths have balls in common."""
+    of_standards: dict[str, list[tuple[Steps, DistanceCalibration]]] = {}
+    for steps, one in calibrations.items():
+        is_standard = references.artefacts[one.artefact].role == "length_standard"
+        if is_standard and isinstance(one, DistanceCalibration) and one.repeatability == "included":
+            of_standards.setdefault(one.artefact, []).append((steps, one))
+    for name, own in of_standards.items():
+        ends = np.concatenate([one.pairs.ravel() for _, one in own])
+        place = (*own[-1][0], "pairs")
+        is_joint = len(ends) > 2 * MOST_JOINT_LENGTHS and np.bincount(ends).max() > 1
+        if is_joint and not references.problems.has_below(place):
+            text = (
+                f'{len(ends) // 2} distances of "{name}" have balls in common; at most {MOST_JOINT_LENGTHS} such are '
+                "possible: calibrate fewer of them"
+            )
+            references.problems.add(place, text)
 
 
 def check_points(

@@ -51,7 +51,7 @@ REMEDIES = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Mark:
     """A place in a file; line and column count from 1."""
 
