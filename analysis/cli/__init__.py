@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
+from .encoding import write_data_in_utf8, write_readably
 from .interruption import interruptions
 
 AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
@@ -61,7 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], None]) -> int:
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    write_readably(sys.stdout, sys.stderr)
     options = parser().parse_args(arguments)
+    write_data_in_utf8(options)
     options.answer_interruption = answer_interruption
     # Loaded only now, so that --help and wrong usage answer at once.
     from simulator.experiment.messages import ExperimentError
