@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], None]) -> int:
     if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     write_readably(sys.stdout, sys.stderr)
     options = parser().parse_args(arguments)
     write_data_in_utf8(options)

@@ -15,7 +15,7 @@ HANDLER = "ballplate.readable"
 SUBSTITUTES = {
     "µ": "u",
     "μ": "u",
-    "°": " deg",
+    "°": "deg",
     "×": "x",
     "·": "*",
     "±": "+/-",
@@ -59,7 +59,7 @@ codecs.register_error(HANDLER, readable)
 def write_readably(*streams: Any) -> None:
     """Let streams write what their encoding lacks in other characters, rather than fail or print question marks."""
     for stream in streams:
-        if getattr(stream, "errors", None) in ("strict", "replace", "backslashreplace"):
+        if getattr(stream, "errors", None) in ("strict", "replace", "backslashreplace", "surrogateescape"):
             stream.reconfigure(errors=HANDLER)
 
 
