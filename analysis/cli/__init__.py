@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 
+from .encoding import write_data_in_utf8, write_readably
 from .interruption import Interruption, files_named, interruptions, leave, tell, written
 from .outputs import UsageError, check_outputs
 from .streams import lasting_streams
@@ -80,6 +81,7 @@ def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> i
 
 def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     with lasting_streams():
+        write_readably(sys.stdout, sys.stderr)
         try:
             options = parser().parse_args(arguments)
         except SystemExit:
@@ -87,6 +89,7 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
             if _ended(AS_EXPECTED) == BAD_FILE:
                 return BAD_FILE
             raise
+        write_data_in_utf8(options)
         interruption.kept = partial(written, files_named(options))
         options.interruption = interruption
         return _run(options)

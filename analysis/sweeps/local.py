@@ -131,7 +131,7 @@ def told(row: Row, source: Path) -> Row:
     """The row with files told from the sweep file's folder, wherever that is."""
     if not row.reason or source.parent == Path("."):
         return row
-    return replace(row, reason=row.reason.replace(f"{source.parent}/", ""))
+    return replace(row, reason=row.reason.replace(f"{source.parent}{os.sep}", ""))
 
 
 @cache

@@ -293,7 +293,7 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
     for name in ("t.csv", "t.parquet"):
         assert main(["export", str(store), "-o", str(tmp_path / name)]) == 0
-    csv = pandas.read_csv(tmp_path / "t.csv")
+    csv = pandas.read_csv(tmp_path / "t.csv", float_precision="round_trip")
     parquet = pandas.read_parquet(tmp_path / "t.parquet")
     for name in table.select_dtypes("float"):
         np.testing.assert_array_equal(csv[name], table[name])
