@@ -126,7 +126,9 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ExperimentError([Message(str(path), 0, 0, "", f"cannot be read ({error.strerror}); name a JSON file")]) from None
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "", f"cannot be read ({error.strerror}); name a JSON file")]
+        ) from None
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
         raise ExperimentError([Message(str(path), line, column, "", f"is not JSON ({error}); write it anew")]) from None

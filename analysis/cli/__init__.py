@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from .interruption import interruptions
 
@@ -35,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
         sweep,
     )
 
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
         epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used.",
@@ -86,6 +87,15 @@ def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], Non
         print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BAD_FILE
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells wrong usage in one line, whatever stands in the arguments; those of commands are of this class as well."""
+
+    def error(self, message: str) -> NoReturn:
+        from simulator.experiment.messages import in_one_line
+
+        super().error(in_one_line(message))
 
 
 class _Version(argparse.Action):

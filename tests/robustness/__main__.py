@@ -25,7 +25,9 @@ def main(numbers: list[str]) -> int:
         # The same again in another folder, to be shown.
         lay_out(root / "kit", one, root / f"shown-{number}")
         status, out, err = outcome(one.arguments, root / f"shown-{number}" / "in")
-        print(f"status {status}\n--- standard output\n{out[:3000]}\n--- standard error\n{err[:3000]}\n--- fault\n{fault}")
+        print(
+            f"status {status}\n--- standard output\n{out[:3000]}\n--- standard error\n{err[:3000]}\n--- fault\n{fault}"
+        )
         worst |= fault is not None
     return worst
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 from collections.abc import Sequence
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -17,15 +17,51 @@ PLAUSIBLE = (
     *("1", "2", "3", "0", "0.5", "7", "2,2,2", "3,2", "50%", "100%", "5 mm", "1 um", "0.5 um + L/1000000", "2 um/mm"),
     *("U6", "U6 average 1 um", "tasks", "lengths", "A", "EXX", "EAX", "y = 300 mm, z = 200 mm", "start", "end", "none"),
     *("10 mm, 20 mm", "0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm", "1-9", "position", "error", "finish_error"),
-    *("down", "right", "plate", "bar", "plain", "with scale", "radius known", "length known", "5.2", "weak", "deficient"),
+    *(
+        "down",
+        "right",
+        "plate",
+        "bar",
+        "plain",
+        "with scale",
+        "radius known",
+        "length known",
+        "5.2",
+        "weak",
+        "deficient",
+    ),
     *("value", "slope", "out.csv", "out.svg", "out.html", "out.yaml", "out.md", "out.parquet", "out.txt", "new.sqlite"),
 )
 ODD = (
     *("", " ", "nan", "NaN", "inf", "-inf", "-1", "-0", "-5 mm", "1e300", "1e-300", "1e999", "9" * 400, "0x10", "1_0"),
-    *("１", "٣", "½", "é" * 50, "x" * 300, "x" * 5000, "a\nb", "\x1b[31mred", "\u2028", "\udcff.csv", "=1+1", "%s%n", "{}"),
+    *(
+        "１",
+        "٣",
+        "½",
+        "é" * 50,
+        "x" * 300,
+        "x" * 5000,
+        "a\nb",
+        "\x1b[31mred",
+        "\u2028",
+        "\udcff.csv",
+        "=1+1",
+        "%s%n",
+        "{}",
+    ),
     *("--", "-", "---", "-h", "@small.yaml", "a,b", ",", "1,", "0 mm", "1e300 m", "1e300 mm", "NaN mm", "5 parsec"),
     *("1,5 mm", "5 deg", "U9", "U6 average", "U6 average 0 um", "100.1%", "0%", "%", "1 um\x00"[:-1], "all", "*", "["),
-    *(".", "..", "folder", "folder/out.csv", "no/such/out.csv", "small.yaml/out.csv", "loop.csv", "pipe.csv", "missing"),
+    *(
+        ".",
+        "..",
+        "folder",
+        "folder/out.csv",
+        "no/such/out.csv",
+        "small.yaml/out.csv",
+        "loop.csv",
+        "pipe.csv",
+        "missing",
+    ),
     *("old.csv", "old.yaml", "old.svg", "old.html", "empty.txt", "junk.bin", "foreign.sqlite", "CON", "a:b.csv", "~"),
     *("é.csv", "a\nb.svg", "\x1b.yaml", "x" * 300 + ".csv", ".csv", ".svg", "OUT.SVG", "missing.yaml", "missing.csv"),
 )
@@ -35,16 +71,32 @@ FILES = (
     *("curve.csv", "balls.csv", "sweep.sqlite", "trials.sqlite", "results.json", "planned.yaml"),
 )
 # Options whose values may be large without much work; of others a large one is meant to take long, and may.
-LARGE = ("seed", "calibration", "sweep", "straight", "magnification", "order", "every", "positions", "readings", "hours")
+LARGE = (
+    "seed",
+    "calibration",
+    "sweep",
+    "straight",
+    "magnification",
+    "order",
+    "every",
+    "positions",
+    "readings",
+    "hours",
+)
 MOST = 50
 
 Grammar = dict[str, tuple[argparse.Action, ...]]
 
 
 @cache
+def _parser() -> argparse.ArgumentParser:
+    return parser()
+
+
+@cache
 def grammar() -> Grammar:
     """Options and arguments of every command."""
-    commands = next(one for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
+    commands = next(one for one in _parser()._actions if isinstance(one, argparse._SubParsersAction))
     return {
         name: tuple(action for action in command._actions if not isinstance(action, argparse._HelpAction))
         for name, command in commands.choices.items()
@@ -156,7 +208,20 @@ def _files_swapped(random: Random, line: list[str], _: Sequence[argparse.Action]
         line[random.choice(places)] = random.choice(FILES if random.random() < 0.6 else ODD)
 
 
+def _written_over(random: Random, line: list[str], actions: Sequence[argparse.Action]) -> None:
+    """An output that is an input, with and without leave to overwrite."""
+    inputs = [text for text in line[1:] if Path(text).suffix in (".yaml", ".csv", ".sqlite")]
+    outputs = [action for action in actions if action.option_strings and action.type is not None]
+    outputs = [action for action in outputs if any("out.svg" == text or "out.csv" == text for text in fitting(action))]
+    if inputs and outputs:
+        name = random.choice(inputs) if random.random() < 0.7 else f"folder/../{random.choice(inputs)}"
+        line += [random.choice(outputs).option_strings[-1], name]
+    if any("--force" in action.option_strings for action in actions) and random.random() < 0.7:
+        line.append("--force")
+
+
 CHANGES = {
+    "written over": _written_over,
     "option added": _option_added,
     "and another": _option_added,
     "value replaced": _value_replaced,
@@ -186,8 +251,8 @@ def quick(line: Sequence[str]) -> list[str]:
 
 def parsed(line: Sequence[str]) -> argparse.Namespace | None:
     """What the parser makes of a line, None where it takes it for wrong usage."""
-    with redirect_stderr(io.StringIO()):
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
         try:
-            return parser().parse_args(list(line))
+            return _parser().parse_args(list(line))
         except SystemExit:
             return None

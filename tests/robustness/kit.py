@@ -91,7 +91,13 @@ CURVE = "position_mm,error_um,u_um\n" + "".join(
     f"{20 * k},{error},0.2\n" for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
 )
 
-VARIANTS = {"splines": "plain", "bar-bell": "length known", "bryan-gauge": "radius known", "dummy": "with scale", "angles": "any angles"}
+VARIANTS = {
+    "splines": "plain",
+    "bar-bell": "length known",
+    "bryan-gauge": "radius known",
+    "dummy": "with scale",
+    "angles": "any angles",
+}
 WITHOUT_CERTIFICATE = ("angles", "dummy")
 READINGS_OF = ("small", "tables", "splines", "bar-bell", "bryan-gauge", "dummy", "angles")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 RECIPES = (
     "check small.yaml",
-    "check --suggest --fail-weak bar-bell.yaml",
+    "check --fail-weak bar-bell.yaml",
     "check --suggest deficient.yaml",
     "check --format github --no-modules tables.yaml small.yaml",
     "check --format junit splines.yaml",
