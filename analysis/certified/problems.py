@@ -11,7 +11,6 @@ from typing import Any
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.settings import hint, shorten
 
-
 # Above any number that means something here, and below where a float ends.
 LARGE = 1e150
 

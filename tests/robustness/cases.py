@@ -17,10 +17,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from random import Random
-from typing import Any
 from unicodedata import category
 
-from analysis.sweeps.schema import schema as sweep_schema
 from simulator.experiment.machine_sections import machine_schema
 from tests.robustness.command_lines import changed_line, drawn, grammar, parsed, quick
 from tests.robustness.experiments import SEED, SWEEP_WORDS, WORDS

@@ -212,7 +212,7 @@ def _written_over(random: Random, line: list[str], actions: Sequence[argparse.Ac
     """An output that is an input, with and without leave to overwrite."""
     inputs = [text for text in line[1:] if Path(text).suffix in (".yaml", ".csv", ".sqlite")]
     outputs = [action for action in actions if action.option_strings and action.type is not None]
-    outputs = [action for action in outputs if any("out.svg" == text or "out.csv" == text for text in fitting(action))]
+    outputs = [action for action in outputs if any(text == "out.svg" or text == "out.csv" for text in fitting(action))]
     if inputs and outputs:
         name = random.choice(inputs) if random.random() < 0.7 else f"folder/../{random.choice(inputs)}"
         line += [random.choice(outputs).option_strings[-1], name]

@@ -71,7 +71,12 @@ pool:
   times: {set_up: 10 min, reading: 20 s, probe_change: 3 min, plane_change: 20 min}
   candidates:
     - {name: flat, artefact: plate, planes: [z], levels: [50 mm, 350 mm], corners: {x: 50 mm, y: 50 mm}, probes: [down]}
-    - {name: upright, artefact: plate, planes: [x, y], levels: [250 mm], corners: {x: 50 mm, y: 50 mm, z: 50 mm}, probes: [[down, right]]}
+    - name: upright
+      artefact: plate
+      planes: [x, y]
+      levels: [250 mm]
+      corners: {x: 50 mm, y: 50 mm, z: 50 mm}
+      probes: [[down, right]]
   calibration:
     - {name: sides, artefact: plate, kind: distances, pairs: corner sides, standard_uncertainty: 0.1 um, price: 40 min}
 """

@@ -1,4 +1,4 @@
-"""Whatever a command line, a file or a store says, there is a result or what is wrong with it, soon and in bounded memory.
+"""Whatever command lines, files and stores say, there is a result or what is wrong, soon and in bounded memory.
 
 `cases` says what is tried, and how to try one case alone.
 """
