@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from contextlib import closing
 from pathlib import Path
 
-from .export import add_store, warn_of_other_methods
+from .export import add_store, warn_of_damage, warn_of_other_methods
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -19,7 +19,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "report",
         help="write a sweep's results as an HTML page, or its tables",
         description="Write what a sweep has found as one HTML page that needs no network: tables, plots, rank, the "
-        "best and the worst design. With --format text, markdown, csv or latex the tables alone.",
+        "best and the worst design. With --format text, markdown, csv or latex the tables alone. Of a damaged store it "
+        "tells of the cells that can be read; the exit status then is 3.",
     )
     add_store(parser)
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="page or tables; default, and -: the screen")
@@ -39,10 +40,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 def run(options: Namespace) -> int:
     """Write the report."""
     from ..report.results import read_results
-    from ..sweeps.store import StoreError, chosen_sweep, open_store
+    from ..sweeps.store import StoreError, open_store
+    from ..sweeps.store_file import is_same_file
 
     output: Path | None = options.output
-    if output is not None and output.resolve() == options.store.resolve():
+    if output is not None and is_same_file(output, options.store):
         print(f"ballplate report: -o {output} is the store itself; name another file", file=sys.stderr)
         return WRONG_USAGE
     if str(output) == "-":
@@ -56,7 +58,8 @@ def run(options: Namespace) -> int:
     try:
         with closing(open_store(options.store)) as store:
             results = read_results(store, options.sweep)
-            warn_of_other_methods(store, chosen_sweep(store, options.sweep))
+            is_damaged = warn_of_damage(store.path, results.found, len(results.cells))
+            warn_of_other_methods(store.path, results.found.keys)
             if form == "html":
                 from ..report.page import page
 
@@ -77,10 +80,10 @@ def run(options: Namespace) -> int:
         return BAD_FILE
     if output is None:
         sys.stdout.write(text)
-        return 0
+        return BAD_FILE if is_damaged else 0
     try:
         output.write_bytes(text.encode("utf-8", "replace"))
     except OSError as error:
         print(f"{output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
         return BAD_FILE
-    return 0
+    return BAD_FILE if is_damaged else 0

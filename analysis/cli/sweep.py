@@ -56,20 +56,24 @@ def run(options: Namespace) -> int:
     """Run a sweep; 1 if cells have failed."""
     from filelock import FileLock, Timeout
 
+    from simulator.experiment.messages import in_one_line
+
     from ..sweeps.bundle import bundle_of
     from ..sweeps.cluster import ClusterError
     from ..sweeps.load import load_sweep
     from ..sweeps.store import StoreError, open_store
+    from ..sweeps.store_file import check_place, is_same_file
 
     sweep = load_sweep(options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder))
     if options.dry_run:
         return _dry_run(sweep, options)
     bundle = bundle_of(sweep)
     path = options.store or options.file.with_suffix(".sqlite")
-    if path.resolve() in (options.file.resolve(), sweep.base.resolve()):
+    if any(is_same_file(path, file) for file in (options.file, sweep.base)):
         print(f"ballplate sweep: --store {path} is the sweep's own file; name another", file=sys.stderr)
         return WRONG_USAGE
     try:
+        check_place(path, create=True)
         with FileLock(f"{path}.lock", timeout=0):
             store = open_store(path, create=True)
             try:
@@ -79,32 +83,46 @@ def run(options: Namespace) -> int:
     except Timeout:
         print(f"{path}: another process is computing into it; wait for it, or end it", file=sys.stderr)
     except OSError as error:
-        print(f"{path}: cannot be written ({error.strerror}); check the folder and its permissions", file=sys.stderr)
+        where = error.filename or path
+        text = f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
+        print(in_one_line(text), file=sys.stderr)
     except (StoreError, ClusterError) as error:
         print(error, file=sys.stderr)
     return BAD_FILE
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
+    from simulator.experiment.messages import in_one_line
+
     from ..sweeps.bundle import changes, definition
     from ..sweeps.execute import run_sweep
     from ..sweeps.local import ChangedError
-    from ..sweeps.store import add_sweep, of_other_methods, statuses, sweeps
+    from ..sweeps.store import add_sweep, definitions, ensure_in_place, keys, mend, of_other_methods, statuses, unread
     from .progress import ProgressBar
 
     new = definition(sweep, bundle)
-    stored = sweeps(store)
+    stored, unreadable = definitions(store)
     number = next((k for k, old in stored.items() if not changes(old, new)), None)
     has_results = "done" in statuses(store).values()
-    if number is None and has_results and not options.beside:
+    if number is None and unreadable and not options.beside:
+        which, why = next(iter(unreadable.items()))
+        text = f"what sweep {which} in it is of cannot be read ({why}); enter this one anew with --beside, where what"
+        print(in_one_line(f"{store.path}: {text} is the same is not computed again"), file=sys.stderr)
+        return BAD_FILE
+    if number is None and stored and has_results and not options.beside:
         print(f"{store.path}: holds another sweep; what has changed:", file=sys.stderr)
         for line in changes(stored[max(stored)], new)[:20]:
-            print(f"  {line}", file=sys.stderr)
+            print(f"  {in_one_line(line)}", file=sys.stderr)
         print("name another store with --store, or keep both in this one with --beside", file=sys.stderr)
         return BAD_FILE
     if number is None:
         number = add_sweep(store, new, bundle.files)
-    for text in of_other_methods(store, number):
+    mended, strays = mend(store, number, len(sweep.cells))
+    told = unread(store.path, mended, strays, len(sweep.cells), "", "what is missing is computed anew")
+    if told:
+        print(told, file=sys.stderr)
+    found = statuses(store)
+    for text in of_other_methods(key for key in keys(store, number).values() if (key, 0) in found):
         print(f"{store.path}: {text}, and computes these cells anew", file=sys.stderr)
     bar = ProgressBar("cells")
 
@@ -132,6 +150,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         return INTERRUPTED
     finally:
         bar.close()
+    ensure_in_place(store)
     _tell(store, f" of sweep {number}" if len({*stored, number}) > 1 else "", number, summary)
     return 1 if summary.failed or summary.left else 0
 
@@ -153,7 +172,7 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
     left = f", {summary.left} left" if summary.left else ""
     counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
     print(f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}")
-    found = results(store, number)
+    found = results(store, number, summary.cells)
     versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:
         print(f"{store.path}: the rows were computed with {len(versions)} different sets of versions", file=sys.stderr)

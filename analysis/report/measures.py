@@ -104,8 +104,9 @@ def trial_symbols(results: Results) -> list[str]:
     found = []
     for column in results.frame.columns:
         name, mark, _ = column.partition("_spread_ratio")
-        if mark and column.endswith("_spread_ratio"):
-            found.append(name.replace("_more", "'").replace("_", " "))
+        symbol = name.replace("_more", "'").replace("_", " ")
+        if mark and column.endswith("_spread_ratio") and symbol.rstrip("'") in DESCRIPTIONS:
+            found.append(symbol)
     order = list(DESCRIPTIONS)
     return sorted(found, key=lambda symbol: (order.index(symbol.rstrip("'")), symbol))
 

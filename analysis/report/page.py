@@ -22,7 +22,7 @@ from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
 from .plots import plot_svg
-from .results import Results, best_and_worst, criterion, one_line
+from .results import Results, best_and_worst, cell_list, criterion, one_line
 from .scene import MOST_BALLS, Scene, scene
 from .series import Plot, plots
 from .svg import micro
@@ -112,6 +112,8 @@ def _summary(results: Results) -> str:
     parts = [f"{results.count('done')} of {len(results.cells)} cells done"]
     parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
     parts += [f"{results.left} left"] if results.left else []
+    unreadable = len(results.found.unreadable)
+    parts += [f"{unreadable} could not be read from the damaged store"] if unreadable else []
     return ", ".join(parts) + "."
 
 
@@ -129,7 +131,9 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         facts.append((f"Axis {axis.name}", ", ".join(labels)))
     facts += [
         ("Cells", f"{len(results.cells)}: {results.count('done')} done, {results.count('failed')} failed, "
-                  f"{results.left} left"),
+                  f"{results.left} left"
+                  + (f", {len(results.found.unreadable)} could not be read: {_unreadable(results)}"
+                     if results.found.unreadable else "")),
         ("Recorded", ", ".join(stored["record"])),
         ("Monte Carlo", f"{stored['trials']} data sets of each cell" if stored["trials"] else "none"),
     ]  # fmt: skip
@@ -140,6 +144,12 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         words = ", ".join(f"{name.removesuffix('_version')} {one}" for name, one in zip(names, versions, strict=True))
         facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cells)"))
     return facts
+
+
+def _unreadable(results: Results) -> str:
+    """Which cells could not be read, and why the first of them."""
+    cells = sorted(results.found.unreadable)
+    return f"{cell_list(cells)} ({one_line(results.found.unreadable[cells[0]])})"
 
 
 def _plots(drawn: list[Plot]) -> list[tuple[str, list[Drawn]]]:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from simulator.quantities import QUANTITY, exact_number
 
 from ..sweeps.columns import MORE, symbol_column
-from ..sweeps.frame import frame
-from ..sweeps.store import Store, all_details, chosen_sweep, definition_of
+from ..sweeps.frame import frame_of
+from ..sweeps.store import Results as Found
+from ..sweeps.store import Store, chosen_sweep, definition_of, results
 
 if TYPE_CHECKING:
     import pandas
@@ -56,7 +57,8 @@ class Results:
     """A sweep and what has come of it.
 
     `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows of those that are
-    done or have failed, `chosen` (rows, axes) their indices, and `texts` what was told of them, by cell.
+    done or have failed, `chosen` (rows, axes) their indices, and `texts` what was told of them, by cell. `found` is
+    what the store holds of them.
     """
 
     number: int
@@ -66,6 +68,7 @@ class Results:
     frame: pandas.DataFrame
     chosen: Integers
     texts: dict[int, dict[str, Any]]
+    found: Found
 
     @property
     def title(self) -> str:
@@ -77,7 +80,7 @@ class Results:
 
     @property
     def left(self) -> int:
-        return len(self.cells) - len(self.frame)
+        return len(self.cells) - len(self.frame) - len(self.found.unreadable)
 
     def label(self, cell: int) -> str:
         """A cell in words."""
@@ -86,8 +89,8 @@ class Results:
         )
 
     def value(self, name: str, row: int) -> float:
-        """A figure of a row of the frame."""
-        return float(self.frame[name].to_numpy()[row])
+        """A figure of a row of the frame; NaN where none was recorded."""
+        return float(self.frame[name].to_numpy()[row]) if name in self.frame else math.nan
 
     @cached_property
     def statuses(self) -> list[str]:
@@ -100,8 +103,8 @@ class Results:
         return np.array([status == "done" for status in self.statuses], bool)
 
     def figure(self, name: str) -> NDArray[np.float64]:
-        """A column of the frame (rows,)."""
-        return np.asarray(self.frame[name], float)
+        """A column of the frame (rows,); NaN where none was recorded."""
+        return np.asarray(self.frame[name], float) if name in self.frame else np.full(len(self.frame), np.nan)
 
 
 def read_results(store: Store, sweep: int | None) -> Results:
@@ -113,8 +116,9 @@ def read_results(store: Store, sweep: int | None) -> Results:
     definition = definition_of(store, number)
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
-    found = frame(store, number)
-    return Results(number, definition, axes, cells, found, cells[found["cell"]], dict(all_details(store, number)))
+    found = results(store, number, len(cells))
+    texts = dict(zip(found.cells.tolist(), found.details, strict=True))
+    return Results(number, definition, axes, cells, frame_of(found, definition), cells[found.cells], texts, found)
 
 
 def _axis(stored: dict[str, Any]) -> Axis:

@@ -26,6 +26,7 @@ MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
 MOST_BEST = 10
 
 NOT_DONE = "left"
+UNREADABLE = "unreadable"
 
 # Behind a value that leaves out what is undetermined.
 STAR = "*"
@@ -185,7 +186,8 @@ def _below(
 
 def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> Entry:
     if row is None:
-        return Entry(NOT_DONE, None, cell, measure.figure)
+        text = UNREADABLE if cell in results.found.unreadable else NOT_DONE
+        return Entry(text, None, cell, measure.figure)
     if results.statuses[row] != "done":
         return Entry(results.statuses[row], None, cell, measure.figure)
     value = results.value(measure.figure, row)

@@ -44,7 +44,7 @@ def method_of(key: str) -> int:
     (2, 1, 1)
     """
     number, space, _ = key.partition(" ")
-    return int(number) if space and number.isdigit() else 1
+    return int(number) if space and number.isdecimal() and number.isascii() and len(number) < 10 else 1
 
 
 def without_method(key: str) -> str:
