@@ -15,7 +15,7 @@ from simulator.experiment.modules import python_models
 from simulator.experiment.yamltree import Node, read_tree, to_python
 
 from .model import Sweep
-from .named_files import named_files
+from .named_files import is_rooted, named_files
 
 # Of all files together, as they are kept in the store and sent to workers.
 MOST_BYTES = 100_000_000
@@ -83,7 +83,7 @@ def unpack(bundle: Bundle, folder: Path) -> Path:
     """
     for name, content in bundle.files:
         place = PurePosixPath(name)
-        if place.is_absolute() or ".." in place.parts or "\\" in name:
+        if is_rooted(name) or ".." in place.parts or "\\" in name:
             raise ValueError(f'"{name}" leads out of the folder')
         path = folder / place
         path.parent.mkdir(parents=True, exist_ok=True)

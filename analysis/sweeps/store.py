@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import count as numbers_from
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from simulator.machines.protocol import Array
 from ..montecarlo.tally import QuantityTally, Tally
 from .fingerprint import METHOD, METHODS, method_of
 from .load import MOST_CELLS
-from .store_file import GO_ON, NEWEST, WITH_DIGEST, StoreError, connected, damage, format_of, in_words
+from .store_file import GO_ON, NEWEST, WITH_DIGEST, StoreError, connected, damage, format_of, in_words, is_damage
 from .stored import (
     OF_RESULT,
     UnreadableError,
@@ -68,12 +69,14 @@ COLUMNS = "key, block, status, reason, seed, names, figures, details, versions, 
 class Store:
     """An open store; `texts` are those known by number.
 
-    `has_digests` is False of the first format, and `place` tells the file from another in its place.
+    `has_digests` is False of the first format, `damage` says what showed as it was opened, and `place` tells the file
+    from another in its place.
     """
 
     path: Path
     connection: sqlite3.Connection
     has_digests: bool = True
+    damage: str = ""
     place: tuple[int, int] | None = None
     texts: dict[str, int] = field(default_factory=dict)
 
@@ -95,17 +98,19 @@ def open_store(path: Path, create: bool = False) -> Store:
     """
     connection = None
     try:
-        connection = connected(path, create)
+        connection, wrong = connected(path, create)
         found = format_of(path, connection)
         if create:
             _prepare(path, connection, found)
         elif found is None:
             raise StoreError(f"{path}: is empty; name a store that ballplate sweep has made")
         place = os.stat(path)
-        return Store(path, connection, create or found != 1, (place.st_dev, place.st_ino))
+        return Store(path, connection, create or found != 1, wrong, (place.st_dev, place.st_ino))
     except (sqlite3.Error, OSError, StoreError) as error:
         if connection is not None:
             connection.close()
+        if isinstance(error, sqlite3.Error) and create and is_damage(error):
+            raise StoreError(f"{path}: is damaged ({error}); {GO_ON}") from None
         if isinstance(error, sqlite3.Error):
             raise in_words(path, error) from None
         raise
@@ -201,8 +206,12 @@ def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[st
             )
     with _transaction(store) as connection:
         text = json.dumps(definition, sort_keys=True)
-        number = int(connection.execute("INSERT INTO sweep (definition) VALUES (?)", [text]).lastrowid or 0)
-        connection.execute("UPDATE sweep SET digest = ? WHERE id = ?", [digest_of(number, text), number])
+        # Of a sweep whose definition is lost there may be cells.
+        used = "SELECT id FROM sweep UNION SELECT sweep FROM bundle UNION SELECT sweep FROM cell"
+        taken = {one for (one,) in connection.execute(used)}
+        number = next(number for number in numbers_from(1) if number not in taken)
+        insert = "INSERT INTO sweep (id, definition, digest) VALUES (?, ?, ?)"
+        connection.execute(insert, [number, text, digest_of(number, text)])
         connection.executemany(
             "INSERT INTO bundle (sweep, path, content, digest) VALUES (?, ?, ?, ?)",
             [(number, name, content, digest_of(number, name, content)) for name, content in files],
@@ -258,7 +267,7 @@ def chosen_sweep(store: Store, number: int | None) -> int:
         try:
             found = store.connection.execute(f"SELECT DISTINCT {column} FROM {table}").fetchall()
         except sqlite3.DatabaseError as error:
-            if not error.sqlite_errorname.startswith("SQLITE_CORRUPT"):
+            if not is_damage(error):
                 raise in_words(store.path, error) from None
             continue
         known |= {one for (one,) in found if isinstance(one, int)}
@@ -481,7 +490,7 @@ def results(store: Store, sweep: int, count: int | None = None) -> Results:
 
     :raises StoreError: the store cannot be read, or nothing of it.
     """
-    wrong = ""
+    wrong = store.damage
     try:
         if count is None:
             found = store.connection.execute(
@@ -489,10 +498,10 @@ def results(store: Store, sweep: int, count: int | None = None) -> Results:
             ).fetchone()[0]
             count = 0 if found is None else min(int(found) + 1, MOST_CELLS)
         reading = read_rows(store.connection, sweep, count, store.has_digests)
-        if reading.unreadable or reading.strays or len(reading.rows) < count:
+        if not wrong and (reading.unreadable or reading.strays or len(reading.rows) < count):
             wrong = damage(store.connection)
     except sqlite3.DatabaseError as error:
-        if not error.sqlite_errorname.startswith("SQLITE_CORRUPT"):
+        if not is_damage(error):
             raise in_words(store.path, error) from None
         wrong = damage(store.connection) or str(error)
     if wrong:
@@ -529,6 +538,6 @@ def unread(path: Path, unreadable: dict[int, str], strays: int, count: int, wron
     if cells:
         some = ", ".join(map(str, cells[:10])) + (f" and {len(cells) - 10} more" if len(cells) > 10 else "")
         told += f": {some} ({unreadable[cells[0]]})"
-    told += f"; {strays} entries belong to no cell" if strays else ""
+    told += f"; {strays} {'entry belongs' if strays == 1 else 'entries belong'} to no cell" if strays else ""
     told += f"; SQLite finds: {wrong}" if wrong else ""
     return in_one_line(f"{path}: {told}; {what_next}")

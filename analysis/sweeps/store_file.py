@@ -59,7 +59,7 @@ WORDS = {
     "SQLITE_PERM": "cannot be opened ({}); check its permissions and those of its folder",
     "SQLITE_CANTOPEN": "cannot be opened ({}); check its permissions, its folder's, and those of its -wal and -shm",
     "SQLITE_NOTADB": f"is no store of ballplate sweep, or its beginning is damaged ({{}}); {MEND}",
-    "SQLITE_CORRUPT": f"is damaged ({{}}); {GO_ON}",
+    "SQLITE_CORRUPT": "is damaged ({}); restore a copy, or start anew with ballplate sweep --store and a new name",
 }
 
 
@@ -79,10 +79,11 @@ def in_words(path: Path, error: sqlite3.Error) -> StoreError:
     return StoreError(f"{path}: cannot be used as a store ({error}); {MEND}")
 
 
-def connected(path: Path, create: bool) -> sqlite3.Connection:
-    """A connection to what is a store as far as its beginning tells, or, with `create`, may become one.
+def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
+    """A connection to what is a store as far as its beginning tells, and what damage shows; with `create` to a new one.
 
-    Without `create` it only reads, also where nothing can be written. Nothing blocks, and nothing is written yet.
+    Without `create` it only reads, also where nothing can be written, or where the end of the file is missing. Nothing
+    blocks, and nothing is written yet.
 
     :raises StoreError: no file that is, or may become, a store.
     :raises sqlite3.Error: SQLite cannot open it.
@@ -90,8 +91,8 @@ def connected(path: Path, create: bool) -> sqlite3.Connection:
     check_place(path, create)
     address = Path(os.path.abspath(path)).as_uri()
     if create:
-        return _opened(f"{address}?mode=rwc")
-    connection = _opened(f"{address}?mode=rw")
+        return _opened(f"{address}?mode=rwc"), ""
+    connection, wrong = _opened(f"{address}?mode=rw"), ""
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except sqlite3.OperationalError as error:
@@ -101,8 +102,20 @@ def connected(path: Path, create: bool) -> sqlite3.Connection:
         # In a place that cannot be written, as long as nobody else writes to the store.
         connection.close()
         connection = _opened(f"{address}?immutable=1")
+    except sqlite3.DatabaseError as error:
+        if not is_damage(error):
+            connection.close()
+            raise
+        # So SQLite looks at a file from which pages are missing.
+        connection.execute("PRAGMA writable_schema = ON")
+        wrong = str(error)
     connection.execute("PRAGMA query_only = ON")
-    return connection
+    return connection, wrong
+
+
+def is_damage(error: sqlite3.Error) -> bool:
+    """Whether it is the content of the file that is wrong."""
+    return (getattr(error, "sqlite_errorname", None) or "").startswith("SQLITE_CORRUPT")
 
 
 def _opened(address: str) -> sqlite3.Connection:
@@ -147,8 +160,8 @@ def check_place(path: Path, create: bool) -> None:
     if not start and not create:
         raise StoreError(f"{path}: is empty; {MEND}")
     if start and not start.startswith(MAGIC[: len(start)]):
-        what = "a text file" if _is_text(start) else "no database of SQLite, or its beginning is damaged"
-        raise StoreError(f"{path}: is no store of ballplate sweep but {what}; {MEND}")
+        what = " but a text file" if _is_text(start) else ", or its beginning is damaged"
+        raise StoreError(f"{path}: is no store of ballplate sweep{what}; {MEND}")
     if 0 < len(start) < 100:
         raise StoreError(f"{path}: is cut off after {len(start)} bytes, so that nothing of it can be read; {MEND}")
 

@@ -274,11 +274,14 @@ class Reading:
 
 
 def texts_of(connection: sqlite3.Connection) -> Texts:
-    """All texts of a store, of a damaged one those that can be read."""
-    try:
-        return Texts(dict(connection.execute("SELECT id, value FROM text").fetchall()))
-    except sqlite3.DatabaseError:
-        pass
+    """All texts of a store.
+
+    :raises sqlite3.Error: they cannot be read.
+    """
+    return Texts(dict(connection.execute("SELECT id, value FROM text").fetchall()))
+
+
+def _salvaged_texts(connection: sqlite3.Connection) -> Texts:
     found: dict[int, str] = {}
     # The index holds them a second time.
     for source in ("text NOT INDEXED", "text INDEXED BY sqlite_autoindex_text_1"):
@@ -315,12 +318,20 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
                 rows.append(checked_row(number, key, tuple(raw), texts))
         except UnreadableError as error:
             unreadable[number] = str(error)
+    if has_digests and len(rows) + len(unreadable) < count:
+        # The rows of cells that seem not to be done may be there, under keys that are no longer theirs.
+        query = f"SELECT key, {OF_RESULT}, digest FROM result WHERE block = 0 AND key NOT IN (SELECT key FROM cell)"
+        for key, *raw in connection.execute(query):
+            try:
+                checked_row(0, key, tuple(raw), texts)
+            except UnreadableError:
+                strays += 1
     return Reading(rows, unreadable, texts, strays)
 
 
 def salvaged_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool) -> Reading:
     """The rows of a sweep that can be read in a damaged database, each looked for by itself."""
-    texts = texts_of(connection)
+    texts = _salvaged_texts(connection)
     by_key = _scanned(connection, has_digests)
     digest = "digest" if has_digests else "NULL"
     rows: list[StoredRow] = []

@@ -170,7 +170,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     store = made_up(tmp_path / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)])
     contents = {"made-up.yaml": own, "base.yaml": base, "own_model.py": module}
     rows = [(1, name, content.encode()) for name, content in contents.items()]
-    store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+    store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
     assert "is run only with --run-modules" in report(store.path)
     assert not mark.exists()
@@ -187,7 +187,7 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
         with store.connection:
             store.connection.execute("DELETE FROM bundle")
             rows = [(1, "made-up.yaml", b""), (1, "base.yaml", b""), (1, name, b"x")]
-            store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+            store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
         with pytest.raises(NoExperimentError, match="leads out of the folder"):
             experiments(store, read_results(store, 1), [0])
         assert not (tmp_path / "out.yaml").exists()
@@ -202,7 +202,7 @@ def test_a_base_other_than_the_one_told_is_not_loaded(tmp_path: Path) -> None:
     with store.connection:
         store.connection.execute("DELETE FROM bundle")
         rows = [(1, "made-up.yaml", sweep), (1, "base.yaml", good), (1, "evil.yaml", evil)]
-        store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+        store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     sys.modules.pop("this", None)
     (found,) = experiments(store, read_results(store, 1), [0])
     assert found.error_model.kind == "kinematic" and "this" not in sys.modules
