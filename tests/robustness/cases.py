@@ -32,7 +32,7 @@ from tests.robustness.mutations import (
 )
 from tests.robustness.recipes import RECIPES
 from tests.robustness.stores import changed_store
-from tests.robustness.worker import CONTROL, outcome
+from tests.robustness.worker import CONTROL, FORM, outcome
 
 # Files that others name, and that are read with them.
 NAMED = {
@@ -57,6 +57,10 @@ SWEEPS = ("sweep.yaml", "trials.yaml", "ranges.yaml", "subsets.yaml", "variants.
 READ = ("done", "earlier", "results", "designs", "folder")
 BESIDE_STORES = ("-wal", "-shm", "-journal", ".lock")
 STATUSES = (0, 1, 2, 3)
+ERROR = re.compile(FORM)
+# Of processor time; some commands compute a design again and again.
+SECONDS, LONG = 10.0, 60.0
+REPEATING = ("reach", "plan", "compare", "sweep", "reproduce")
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,10 @@ class Case:
     arguments: tuple[str, ...]
     changes: tuple[str, ...]
     contents: tuple[tuple[str, bytes], ...] = ()
+
+    @property
+    def seconds(self) -> float:
+        return LONG if set(REPEATING) & set(self.arguments) else SECONDS
 
     def __str__(self) -> str:
         line = shlex.join(("ballplate", *self.arguments))
@@ -200,6 +208,12 @@ def _of_status(status: int, out: str, err: str) -> Iterator[str]:
         yield f"a traceback: {err[-2000:]}"
     if status == 2 and not re.search(r"^ballplate\b.*: .", err, re.MULTILINE):
         yield f"status 2, but not what is wrong: {err[-500:]!r}"
+    if status == 3:
+        # A store that cannot be used may tell more, in lines below.
+        ill = [
+            line for line in err.splitlines() if not line.startswith(("warning: ", "  ")) and not ERROR.fullmatch(line)
+        ]
+        yield from (f"not in the stated form: {line[:600]!r}" for line in ill[:1])
     for line in err.splitlines():
         if any(category(letter) in CONTROL for letter in line):
             yield f"control characters on standard error: {line[:500]!r}"
@@ -241,6 +255,8 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     elif command in ("export", "report"):
         stores = {options.store}
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
+    if not getattr(options, "force", True):
+        allowed -= before.keys()
     for path in stores:
         name = _name(path, folder)
         allowed |= {name + end for end in BESIDE_STORES}

@@ -41,7 +41,7 @@ def faults(kit: Path, folder: Path, numbers: Iterable[int]) -> list[str]:
             one = case(kit, number)
             place = folder / f"case-{number}"
             lay_out(kit, one, place)
-            fault = worker((one.arguments, str(place)))
+            fault = worker((one.arguments, str(place)), one.seconds)
             if fault is None:
                 shutil.rmtree(place)
                 continue

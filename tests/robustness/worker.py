@@ -26,6 +26,9 @@ WAIT = 6.0
 # Control characters, half characters, and ends of lines and paragraphs.
 CONTROL = ("Cc", "Cs", "Zl", "Zp")
 
+# Of an error in a file after its name: where, what, and what would be right, which what was expected is.
+FORM = r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*"
+
 
 class OutOfTimeError(BaseException):
     """A trial takes too long; derived so that nothing under test takes it for an error of its own."""
@@ -59,18 +62,14 @@ def complaint(arguments: Sequence[str], files: Path) -> str | None:
         return f"status 3 with output: {out[:500]}"
     # Every kind of line end counts.
     lines = err.splitlines()
-    # What was expected is what would be right.
-    form = re.compile(
-        re.escape(str(files))
-        + r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*"
-    )
+    form = re.compile(re.escape(str(files)) + FORM)
     ill = [line for line in lines if not form.fullmatch(line) or any(category(letter) in CONTROL for letter in line)]
     if not lines:
         return "status 3, and no error"
     return f"not in the stated form: {ill[0][:600]!r}" if ill else None
 
 
-def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) -> None:
+def _serve(connection: Connection, trial: Trial, memory: int) -> None:
     """Try files until told to end. What was imported before is not counted, what is used together is."""
     import analysis.estimators
     import analysis.montecarlo.study
@@ -89,7 +88,7 @@ def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) ->
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
     connection.send(None)
     while True:
-        request = connection.recv()
+        request, seconds = connection.recv()
         signal.setitimer(signal.ITIMER_PROF, seconds)
         try:
             found = trial(request)
@@ -130,19 +129,23 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, other = context.Pipe()
-        arguments = (other, self.trial, self.seconds, self.memory)
+        arguments = (other, self.trial, self.memory)
         self.process = context.Process(target=_serve, args=arguments, daemon=True)
         self.process.start()
         other.close()
         self.connection.send(list(self.warm_up))
         self.connection.recv()
 
-    def __call__(self, request: Any) -> str | None:
-        """What is wrong with what comes of a request; a process that does not answer any more is replaced."""
-        self.connection.send(request)
+    def __call__(self, request: Any, seconds: float | None = None) -> str | None:
+        """What is wrong with what comes of a request, for which there may be more time than for others.
+
+        A process that does not answer any more is replaced.
+        """
+        seconds = seconds or self.seconds
+        self.connection.send((request, seconds))
         found: str | None
         try:
-            if self.connection.poll(WAIT * self.seconds):
+            if self.connection.poll(WAIT * seconds):
                 found, peak = self.connection.recv()
                 self.peak = max(self.peak, peak)
                 if peak > self.memory:
@@ -151,7 +154,7 @@ class Worker:
                     self._start()
                     found = found or f"{peak / GIGABYTE:.2f} GB of memory"
                 return found
-            found = f"no answer after {WAIT * self.seconds} s"
+            found = f"no answer after {WAIT * seconds} s"
         except EOFError:
             found = "the process has died"
         self._stop()

@@ -198,7 +198,7 @@ DAMAGED: dict[str, Damage] = {
     "details no JSON": by_sql("UPDATE result SET details = '{' WHERE rowid = 1"),
     "details a list": by_sql("UPDATE result SET details = '[]' WHERE rowid = 1"),
     "details nested": by_sql(f"UPDATE result SET details = '{'[' * 100_000}' WHERE rowid = 1"),
-    "details of numbers": by_sql("UPDATE result SET details = '{\"weak\": 3, \"flags\": [1]}' WHERE rowid = 1"),
+    "details of numbers": by_sql('UPDATE result SET details = \'{"weak": 3, "flags": [1]}\' WHERE rowid = 1'),
     "details of bytes": by_sql("UPDATE result SET details = x'ff' WHERE rowid = 1"),
     "block a text": by_sql("UPDATE result SET block = 'x' WHERE rowid = 1"),
     "tally no tally": by_sql("UPDATE result SET tally = x'00' WHERE rowid = 1"),
