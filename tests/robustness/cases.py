@@ -208,12 +208,9 @@ def _of_status(status: int, out: str, err: str) -> Iterator[str]:
         yield f"a traceback: {err[-2000:]}"
     if status == 2 and not re.search(r"^ballplate\b.*: .", err, re.MULTILINE):
         yield f"status 2, but not what is wrong: {err[-500:]!r}"
-    if status == 3:
-        # A store that cannot be used may tell more, in lines below.
-        ill = [
-            line for line in err.splitlines() if not line.startswith(("warning: ", "  ")) and not ERROR.fullmatch(line)
-        ]
-        yield from (f"not in the stated form: {line[:600]!r}" for line in ill[:1])
+    # On standard output where that is asked for, as marks of a pull request or as a report.
+    if status == 3 and not out.strip() and not any(map(ERROR.fullmatch, err.splitlines())):
+        yield f"not in the stated form: {err[-600:]!r}"
     for line in err.splitlines():
         if any(category(letter) in CONTROL for letter in line):
             yield f"control characters on standard error: {line[:500]!r}"
