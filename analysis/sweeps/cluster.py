@@ -33,6 +33,8 @@ PREFIX = "ballplate-sweep-"
 # Seconds until a worker comes.
 PATIENCE = 30.0
 
+LOGGERS = ("distributed", "tornado", "asyncio")
+
 RESTART = "install the same wherever a worker runs; what is done is stored, and the same command goes on from there"
 
 
@@ -100,14 +102,18 @@ def _is_there(client: Any) -> bool:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep to ourselves what dask logs, tracebacks among it: errors are told in words."""
-    loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
-    before = [(logger.level, logger.propagate) for logger in loggers]
+    with suppress(ImportError):
+        import distributed  # noqa: F401
+    # Each of dask's loggers has a level of its own, once dask is loaded.
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in LOGGERS]
+    loggers = [logging.getLogger(name) for name in (*LOGGERS, *names)]
+    before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        for logger, (level, _) in zip(loggers, before, strict=True):
+        for logger, level in zip(loggers, before, strict=True):
             logger.setLevel(level)
 
 

@@ -43,6 +43,38 @@ def by_definition(change: Callable[[dict[str, Any]], object]) -> Damage:
     return apply
 
 
+# The tables of the first format.
+FIRST = """
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE sweep (id INTEGER PRIMARY KEY, definition TEXT NOT NULL);
+CREATE TABLE bundle (sweep INTEGER, path TEXT, content BLOB NOT NULL, PRIMARY KEY (sweep, path)) WITHOUT ROWID;
+CREATE TABLE cell (sweep INTEGER, number INTEGER, key TEXT NOT NULL, PRIMARY KEY (sweep, number)) WITHOUT ROWID;
+CREATE TABLE text (id INTEGER PRIMARY KEY, value TEXT NOT NULL UNIQUE);
+CREATE TABLE result (
+    key TEXT, block INTEGER, status TEXT NOT NULL, reason TEXT NOT NULL, seed INTEGER NOT NULL,
+    names INTEGER NOT NULL REFERENCES text, figures BLOB NOT NULL, details TEXT NOT NULL,
+    versions INTEGER NOT NULL REFERENCES text, seconds REAL NOT NULL, tally BLOB,
+    PRIMARY KEY (key, block)
+);
+"""
+
+
+def of_the_first_format(path: Path) -> None:
+    """Make of a store the same as the first format had it, without digests."""
+    newer = path.with_name("newer")
+    settled(path)
+    path.rename(newer)
+    connection = sqlite3.connect(path, isolation_level=None)
+    connection.executescript(FIRST)
+    connection.execute("ATTACH ? AS newer", [str(newer)])
+    for table in ("sweep", "bundle", "cell", "text", "result"):
+        names = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA main.table_info({table})"))
+        connection.execute(f"INSERT INTO {table} ({names}) SELECT {names} FROM newer.{table}")
+    connection.execute("INSERT INTO about VALUES ('format', 'ballplate sweep store 1')")
+    connection.close()
+    newer.unlink()
+
+
 def settled(path: Path) -> None:
     """Everything in the one file."""
     by_sql()(path)
@@ -174,7 +206,7 @@ DAMAGED: dict[str, Damage] = {
     "names a number": by_sql("UPDATE text SET value = '3' WHERE id = 1"),
     "names of numbers": by_sql("UPDATE text SET value = '[1, [2], null]' WHERE id = 1"),
     "names too few": by_sql("UPDATE text SET value = '[\"U4_average_m\"]' WHERE id = 1"),
-    "versions a list": by_sql("UPDATE text SET value = '[]' WHERE id = 2"),
+    "versions a list": by_sql("UPDATE text SET value = '[[]]' WHERE id = 2"),
     "versions no texts": by_sql("UPDATE text SET value = '{\"ballplate\": 3}' WHERE id = 2"),
     "names unknown": by_sql("UPDATE result SET names = 99 WHERE rowid = 1"),
     "versions unknown": by_sql("UPDATE result SET versions = 'x' WHERE rowid = 1"),
