@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
+from typing import NoReturn
 
 from .encoding import write_data_in_utf8, write_readably
 from .interruption import Interruption, files_named, interruptions, leave, tell, written
@@ -39,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
         sweep,
     )
 
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
         epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used.",
@@ -137,6 +138,15 @@ def _ended(status: int) -> int:
 def _without_room(error: OSError) -> int:
     print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
     return BAD_FILE
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells wrong usage in one line, whatever stands in the arguments; those of commands are of this class as well."""
+
+    def error(self, message: str) -> NoReturn:
+        from simulator.experiment.messages import in_one_line
+
+        super().error(in_one_line(message))
 
 
 class _Version(argparse.Action):

@@ -115,3 +115,22 @@ def test_names_of_files_are_no_commands(
         assert len(lines) == 3, k
         assert "\r" not in out and "\x1b" not in out and "##[" not in lines[0]
         assert not any(line.startswith(("::warning", "::error::")) for line in lines)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["\x1b[31m"],
+        ["check", "a.yaml", "--\x1b[31m"],
+        ["schema", "\x1b[31m"],
+        ["plan", "a.yaml", "--hours", "\x1b[31m\n::"],
+    ],
+)
+def test_wrong_usage_is_told_without_control_characters(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert "x1b[31m" in told and told.isprintable()
