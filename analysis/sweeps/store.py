@@ -333,7 +333,8 @@ def mend(store: Store, sweep: int, count: int) -> tuple[dict[int, str], int]:
     with _transaction(store) as connection:
         texts = texts_of(connection)
         bad: dict[object, str] = {}
-        rows = connection.execute(f"SELECT rowid, key, {OF_RESULT}, {store.digest} FROM result").fetchall()
+        places: list[tuple[int]] = []
+        rows = connection.execute(f"SELECT rowid, key, {OF_RESULT}, {store.digest} FROM result")
         for place, key, *raw in rows:
             try:
                 if not isinstance(key, str):
@@ -343,12 +344,14 @@ def mend(store: Store, sweep: int, count: int) -> tuple[dict[int, str], int]:
                     _unpacked(raw[-2])
             except UnreadableError as error:
                 bad[key] = str(error)
-                connection.execute("DELETE FROM result WHERE rowid = ?", [place])
+                places.append((place,))
+        connection.executemany("DELETE FROM result WHERE rowid = ?", places)
         entries = connection.execute(f"SELECT sweep, number, key, {store.digest} FROM cell").fetchall()
+        owned = {key for _, _, key, _ in entries}
         for of_sweep, number, key, digest in entries:
             try:
                 check_key(of_sweep, number, key, digest)
-                reason = bad.pop(key, "")
+                reason = bad.get(key, "")
             except UnreadableError as error:
                 reason = str(error)
                 connection.execute("DELETE FROM cell WHERE sweep IS ? AND number IS ?", [of_sweep, number])
@@ -356,7 +359,7 @@ def mend(store: Store, sweep: int, count: int) -> tuple[dict[int, str], int]:
                 found[number] = reason
             elif reason:
                 strays += 1
-    return found, strays + len(bad)
+    return found, strays + len(bad.keys() - owned)
 
 
 def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:

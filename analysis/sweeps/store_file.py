@@ -152,11 +152,14 @@ def check_place(path: Path, create: bool) -> None:
     except FileNotFoundError:
         if path.is_symlink():
             raise StoreError(f"{path}: is a link to a file that is not there; name a file") from None
-        if create:
-            return
-        raise StoreError(f"{path}: there is no such store; make it with ballplate sweep") from None
+        start = b""
+        if not create:
+            words = "there is no such store; make it with ballplate sweep"
+            raise StoreError(f"{path}: {words}") from None
     except OSError as error:
         raise StoreError(f"{path}: cannot be opened ({error.strerror}); check its name and permissions") from None
+    if create and not _is_writable(path.parent):
+        raise StoreError(f"{path}: its folder cannot be written; name another with --store, or see to its permissions")
     if not start and not create:
         raise StoreError(f"{path}: is empty; {MEND}")
     if start and not start.startswith(MAGIC[: len(start)]):
@@ -164,6 +167,11 @@ def check_place(path: Path, create: bool) -> None:
         raise StoreError(f"{path}: is no store of ballplate sweep{what}; {MEND}")
     if 0 < len(start) < 100:
         raise StoreError(f"{path}: is cut off after {len(start)} bytes, so that nothing of it can be read; {MEND}")
+
+
+def _is_writable(folder: Path) -> bool:
+    is_effective = os.access in os.supports_effective_ids
+    return not folder.is_dir() or os.access(folder, os.W_OK | os.X_OK, effective_ids=is_effective)
 
 
 def _is_text(start: bytes) -> bool:

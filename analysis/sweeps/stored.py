@@ -95,19 +95,22 @@ def plain(text: str) -> str:
     return text if text.isprintable() else "\n".join(map(in_one_line, text.split("\n")))
 
 
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse)
+
+
 def json_of(text: object) -> Any:
     """What a text of JSON says.
 
     :raises UnreadableError: no text, no JSON, or numbers that are none.
     """
-
-    def refuse(name: str) -> None:
-        raise ValueError(f"{name} is no number of JSON")
-
     if not isinstance(text, str):
         raise UnreadableError("no text")
     try:
-        return json.loads(text, parse_constant=refuse)
+        return _DECODER.decode(text)
     except (ValueError, RecursionError):
         raise UnreadableError("no JSON") from None
 
