@@ -368,7 +368,7 @@ def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
     if name.startswith("U6") and count > MOST_POINTS:
         text = (
             f"{count} points make {count * (count - 1) // 2} distances, which a search for {name} computes some "
-            f"thousand times, and takes days; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
+            f"thousand times, which takes hours; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
 

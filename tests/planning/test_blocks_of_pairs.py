@@ -112,7 +112,7 @@ def test_more_points_than_a_plan_goes_through(tmp_path: Path) -> None:
         campaign(experiment, Request("U6-maximum", None))
     assert str(caught.value) == (
         f"{path}: evaluation.points: 5001 points make 12502500 distances, which a search for U6-maximum computes some "
-        "thousand times, and takes days; give at most 5000, better some hundred, or plan for tasks"
+        "thousand times, which takes hours; give at most 5000, better some hundred, or plan for tasks"
     )
     criteria.refuse_many_points(experiment, "tasks")
 
