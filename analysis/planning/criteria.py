@@ -54,7 +54,7 @@ BLOCK = 256
 MOST_PLACES_KEPT = 1024
 
 # Evaluation points between all of which a plan can make distances small: thousands of times in a search.
-MOST_POINTS = 5000
+MOST_POINTS = 2000
 
 # Functions whose uncertainties are kept, rather than computed twice, for the tangent of a largest value.
 KEPT = 4_000_000
@@ -362,7 +362,7 @@ def is_about_balls(name: CriterionName) -> bool:
 def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
     """Refuse more evaluation points than a search can go through.
 
-    :raises ExperimentError: there are more than 5000 and the criterion concerns them.
+    :raises ExperimentError: there are more than 2000 and the criterion concerns them.
     """
     count = len(experiment.evaluation.points)
     if name.startswith("U6") and count > MOST_POINTS:
