@@ -21,7 +21,17 @@ from ..settings import listing
 from .curves import read_curves
 from .machine_file import load_machine
 from .messages import ExperimentError, Message, Steps
-from .model import SLIGHTLY, Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
+from .model import (
+    SLIGHTLY,
+    Calibration,
+    DistanceCalibration,
+    Evaluation,
+    Floats,
+    Machine,
+    Position,
+    RadiusCalibration,
+    Volume,
+)
 from .problems import Problems, written_text
 from .references import References
 from .structure import Sections
@@ -35,6 +45,8 @@ MOST_SHARED = 3500
 MOST_LENGTHS = 20_000
 # Lengths of a standard of which some have a ball in common, whose uncertainties are therefore treated together.
 MOST_JOINT_LENGTHS = 3000
+# Derivatives of the evaluation points by machine errors: for each point, axis and error.
+MOST_DERIVATIVES = 50_000_000
 AXES = ("x", "y", "z")
 
 
@@ -365,6 +377,26 @@ def check_size(
         )
         problems.add(("positions",), text, of_key=True)
     check_lengths({("calibration", i): one for i, one in calibrations.items()}, positions.values(), references)
+
+
+def check_derivatives(
+    sections: Sections, machine: Machine | None, evaluation: Evaluation | None, references: References
+) -> None:
+    """Report more evaluation points than there is memory for, with so many machine errors."""
+    settings = sections.get("error_model")
+    if settings is None or machine is None or evaluation is None or references.problems.has_below(("error_model",)):
+        return
+    count, d = evaluation.points.shape
+    # Errors are at most as many as parameters are, so that they need seldom be counted.
+    if count * d * MOST_SHARED <= MOST_DERIVATIVES:
+        return
+    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    if count * d * errors > MOST_DERIVATIVES:
+        text = (
+            f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at most "
+            f"{MOST_DERIVATIVES // (d * errors)} points are possible with so many errors"
+        )
+        references.problems.add(("evaluation", "points"), text)
 
 
 def check_lengths(

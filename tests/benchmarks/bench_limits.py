@@ -93,7 +93,7 @@ def joint_lengths(folder: Path) -> Path:
 
 
 def pool(folder: Path) -> Path:
-    return _changed(folder, ("random: 100", "random: 5000"), source=ROOT / "designs" / "planning" / "campaign.yaml")
+    return _changed(folder, ("random: 100", "random: 2000"), source=ROOT / "designs" / "planning" / "campaign.yaml")
 
 
 def cells(folder: Path) -> Path:
@@ -141,7 +141,7 @@ CASES = (
     Case("run, 40,000 balls", lambda folder: ["run", many_balls(folder)]),
     Case("reliability, 40,000 evaluation points", lambda folder: ["reliability", many_points(folder)]),
     Case(
-        "plan, 5000 evaluation points", lambda folder: ["plan", pool(folder), "--positions", "4", "--workers", "1"], 1
+        "plan, 2000 evaluation points", lambda folder: ["plan", pool(folder), "--positions", "4", "--workers", "1"], 1
     ),
     Case("lengths, 4913 points", lambda folder: ["lengths", QUICKSTART, "--grid", "17"]),
     Case("simulate, 1,000,000 readings", lambda folder: ["simulate", many_readings(folder), "-o", folder / "r.csv"]),

@@ -48,6 +48,7 @@ LIMITS = {
     "lengths of one standard": (checks.MOST_JOINT_LENGTHS,),
     "directions of a gauge": (directions.MOST_DIRECTIONS,),
     "evaluation points |": (sections.MOST_POINTS,),
+    "derivatives of": (checks.MOST_DERIVATIVES,),
     "measuring tasks": (sections.MOST_TASKS,),
     "priors": (priors.MOST_PRIORS,),
     "variants": (variants.MOST_VARIANTS,),

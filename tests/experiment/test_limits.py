@@ -163,6 +163,20 @@ def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
     assert "have balls in common; at most 2 such" in refusals(tmp_path, joint)[0]
 
 
+def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path) -> None:
+    text = replaced("{kind: kinematic}", "{kind: kinematic, position_coefficients: 25, rotation_coefficients: 25}")
+    (line,) = refusals(tmp_path, text + "evaluation: {points: {random: 40000}}\n")
+    (tmp_path / "e.yaml").write_text(text)
+    errors = len(lay_out(load(tmp_path / "e.yaml")[0]).model.parameters)
+    most = 50_000_000 // (3 * errors)
+    assert line == (
+        f"11:22: evaluation.points: 40000 points with {errors} machine errors have {120_000 * errors} derivatives; at "
+        f"most {most} points are possible with so many errors"
+    )
+    (tmp_path / "e.yaml").write_text(f"{text}evaluation: {{points: {{random: {most}}}}}\n")
+    assert len(load(tmp_path / "e.yaml")[0].evaluation.points) == most
+
+
 @pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
 def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
     (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))

@@ -106,13 +106,13 @@ def test_many_points_take_little_memory() -> None:
 
 def test_more_points_than_a_plan_goes_through(tmp_path: Path) -> None:
     path = tmp_path / "pool.yaml"
-    path.write_text(TEXT.replace("random: 20", "random: 5001"))
+    path.write_text(TEXT.replace("random: 20", "random: 2001"))
     experiment = load(path, planning=True)[0]
     with pytest.raises(ExperimentError) as caught:
         campaign(experiment, Request("U6-maximum", None))
     assert str(caught.value) == (
-        f"{path}: evaluation.points: 5001 points make 12502500 distances, which a search for U6-maximum computes some "
-        "thousand times, and takes days; give at most 5000, better some hundred, or plan for tasks"
+        f"{path}: evaluation.points: 2001 points make 2001000 distances, which a search for U6-maximum computes some "
+        "thousand times, which takes hours; give at most 2000, better some hundred, or plan for tasks"
     )
     criteria.refuse_many_points(experiment, "tasks")
 
