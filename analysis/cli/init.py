@@ -23,7 +23,7 @@ def run(options: Namespace) -> int:
     """Write the file unless it exists."""
     from importlib.resources import files
 
-    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.experiment.messages import ExperimentError, Message, in_one_line
 
     name, command = ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
@@ -35,5 +35,5 @@ def run(options: Namespace) -> int:
     except OSError as error:
         reason = f"cannot be written ({error.strerror}); name a file in a folder that exists"
         raise ExperimentError([Message(str(options.file), 0, 0, "", reason)]) from None
-    print(f"{options.file} written; next: ballplate {command} {options.file}", file=sys.stderr)
+    print(in_one_line(f"{options.file} written; next: ballplate {command} {options.file}"), file=sys.stderr)
     return 0

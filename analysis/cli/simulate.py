@@ -42,7 +42,7 @@ def run(options: Namespace) -> int:
 
     from simulator.certificates import certified_values, drawn_values, with_values, write_certificate
     from simulator.experiment.load import message_at
-    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.experiment.messages import ExperimentError, Message, in_one_line
     from simulator.generate import (
         NoReadingError,
         exact_readings,
@@ -90,5 +90,5 @@ def run(options: Namespace) -> int:
     write_all(writers, options.force)
     for line, path in zip(told, writers, strict=True):
         if str(path) != "-":
-            print(line, file=sys.stderr)
+            print(in_one_line(line), file=sys.stderr)
     return 0
