@@ -124,8 +124,10 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
 
 def print_lines(lines: Sequence[str]) -> None:
     """Print lines; on a terminal, sentences are wrapped to its width, and tables are left alone."""
+    from simulator.experiment.messages import in_one_line
+
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
-    for line in lines:
+    for line in map(in_one_line, lines):
         is_sentence = "  " not in line.strip()
         wrapped = textwrap.wrap(line, width, subsequent_indent="  ") if width and is_sentence else [line]
         print("\n".join(wrapped or [""]))

@@ -49,10 +49,12 @@ def add_store(parser: ArgumentParser) -> None:
 
 def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
     """Tell of rows that this version would compute by another method."""
+    from simulator.experiment.messages import in_one_line
+
     from ..sweeps.store import of_other_methods
 
     for text in of_other_methods(keys):
-        print(f"{path}: {text}; run ballplate sweep again to compute them anew", file=sys.stderr)
+        print(in_one_line(f"{path}: {text}; run ballplate sweep again to compute them anew"), file=sys.stderr)
 
 
 def warn_of_damage(path: Path, found: Results, count: int) -> bool:

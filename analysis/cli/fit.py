@@ -80,6 +80,7 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
     from simulator.certificates import read_certificate
+    from simulator.experiment.messages import in_one_line
     from simulator.layout import lay_out
     from simulator.misreading_messages import doubts_about_lengths, doubts_about_volume
     from simulator.readings import read_readings
@@ -114,7 +115,8 @@ def run(options: Namespace) -> int:
     observed = read_readings(options.readings, lay_out(experiment))
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
         if names:
-            print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
+            told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
+            print(in_one_line(told), file=sys.stderr)
     doubts = doubts_about_lengths(observed.design, observed.x)
     for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
         print(f"warning: {doubt}", file=sys.stderr)

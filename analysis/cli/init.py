@@ -27,9 +27,11 @@ def run(options: Namespace) -> int:
     """Write the file."""
     from importlib.resources import files
 
+    from simulator.experiment.messages import in_one_line
+
     name, command = ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not write_outputs({options.file: text_writer(lambda stream: stream.write(text))}, options.force):
         return BAD_FILE
-    print(f"{options.file} written; next: ballplate {command} {options.file}", file=sys.stderr)
+    print(in_one_line(f"{options.file} written; next: ballplate {command} {options.file}"), file=sys.stderr)
     return 0

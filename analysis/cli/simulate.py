@@ -54,7 +54,7 @@ def run(options: Namespace) -> int:
 
     from simulator.certificates import certified_values, drawn_values, with_values, write_certificate
     from simulator.experiment.load import message_at
-    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.experiment.messages import ExperimentError, Message, in_one_line
     from simulator.generate import (
         NoReadingError,
         exact_readings,
@@ -101,7 +101,7 @@ def run(options: Namespace) -> int:
         return BAD_FILE
     for line, path in zip(told, texts, strict=True):
         if path in writers:
-            print(line, file=sys.stderr)
+            print(in_one_line(line), file=sys.stderr)
         else:
             texts[path](sys.stdout)
     return 0
