@@ -106,9 +106,12 @@ def open_store(path: Path, create: bool = False) -> Store:
             raise StoreError(f"{path}: is empty; name a store that ballplate sweep has made")
         place = os.stat(path)
         return Store(path, connection, create or found != 1, wrong, (place.st_dev, place.st_ino))
-    except (sqlite3.Error, OSError, StoreError) as error:
+    except (sqlite3.Error, UnicodeDecodeError, OSError, StoreError) as error:
         if connection is not None:
             connection.close()
+        if isinstance(error, UnicodeDecodeError):
+            # Of what SQLite says about names that are no text.
+            raise StoreError(f"{path}: is damaged (names of its tables are no text); restore a copy") from None
         if isinstance(error, sqlite3.Error) and create and is_damage(error):
             raise StoreError(f"{path}: is damaged ({error}); {GO_ON}") from None
         if isinstance(error, sqlite3.Error):

@@ -228,6 +228,8 @@ def damage(connection: sqlite3.Connection) -> str:
         lines = [str(line) for (line,) in connection.execute("PRAGMA integrity_check(3)")]
     except sqlite3.DatabaseError as error:
         return str(error)
+    except UnicodeDecodeError:
+        return "names that are no text"
     if lines == ["ok"]:
         return ""
     told = "; ".join(" ".join(line.split()) for line in lines)

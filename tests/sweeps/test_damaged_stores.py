@@ -128,6 +128,18 @@ def as_texts(column: pandas.Series) -> list[str]:
     return ["" if pandas.isna(value) else str(value) for value in column]
 
 
+def test_names_of_tables_that_are_no_text(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """SQLite quotes them in what it says, as they are."""
+    content = store.read_bytes()
+    assert b"CREATE TABLE result" in content
+    store.write_bytes(
+        content.replace(b"CREATE TABLE result", b"CREATE TABLX\xf1result").replace(b"resultresult", b"resu\xf1tresult")
+    )
+    for arguments in commands(store):
+        assert main(arguments) == 3
+        assert_told_in_lines(capsys.readouterr().err, store)
+
+
 def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
     connection = sqlite3.connect(store)
     (figures,) = connection.execute("SELECT figures FROM result WHERE rowid = 2").fetchone()
