@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -101,9 +102,9 @@ def run(options: Namespace) -> int:
         table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)
         table.columns = [cell_of_text(name) for name in table.columns]
     if str(options.output) == "-":
-        table.to_csv(sys.stdout, index=False)
+        table.to_csv(sys.stdout, index=False, lineterminator="\n")
         return BAD_FILE if is_damaged else 0
-    write = table.to_parquet if suffix == ".parquet" else table.to_csv
+    write = table.to_parquet if suffix == ".parquet" else partial(table.to_csv, lineterminator="\n")
     if not write_outputs({options.output: lambda path: write(path, index=False)}, options.force):
         return BAD_FILE
     return BAD_FILE if is_damaged else 0

@@ -173,6 +173,8 @@ def _report(step: str) -> None:
 
 def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
     """Write what was asked for; False if something cannot be written."""
+    from simulator.experiment.messages import in_one_line
+
     writers: dict[Path, Writer] = {}
     if options.output is not None:
         from ..planning.experiment_file import experiment_text
@@ -192,7 +194,7 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
     is_written = write_outputs(writers, options.force)
     for path in (options.output, options.sheet):
         if is_written and path is not None:
-            print(f"{path} written", file=sys.stderr)
+            print(in_one_line(f"{path} written"), file=sys.stderr)
     return is_written
 
 
