@@ -35,6 +35,9 @@ DESCRIPTIONS = {
     "tasks": "lengths of measuring tasks",
 }
 
+# Evaluation points whose derivatives by all shared parameters are formed at once.
+POINTS_AT_ONCE = 1000
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -215,17 +218,30 @@ def point_pairs(
     limit: LengthFunction | None = None,
 ) -> tuple[Array, PairSummary]:
     """U4 (points, d) and U6 at the design's evaluation points."""
-    probes = np.full(len(design.points), design.point_probe)
-    of_shared = correction_rows(design, layout, state, design.points, probes)
-    spread = of_shared @ found.shared
-    values = np.sqrt((spread**2).sum(axis=2))
-    drawn = None
-    if found.drawn is not None:
-        of_shared = correction_rows(design, layout, found.drawn, design.points, probes)
-        drawn = corrected_points(design, found.drawn, design.points, probes)
-    null = of_shared @ found.shared_null
-    size = np.sqrt(((of_shared * found.scale) ** 2).sum(axis=2))
-    corrected = corrected_points(design, state, design.points, probes)
     n, d = design.points.shape
+    probes = np.full(n, design.point_probe)
+    # Nothing else that is shared, such as poses, moves a corrected point.
+    offsets = layout.offset_columns[design.point_probe]
+    columns = np.concatenate([np.arange(len(layout))[layout.model], offsets[offsets >= 0]])
+    root = _narrow(found.shared[columns])
+    spread = np.empty((n, d, root.shape[1]))
+    null = np.empty((n, d, found.shared_null.shape[1]))
+    size = np.empty((n, d))
+    for start in range(0, n, POINTS_AT_ONCE):
+        some = slice(start, start + POINTS_AT_ONCE)
+        of_shared = correction_rows(design, layout, state, design.points[some], probes[some])
+        spread[some] = of_shared[:, :, columns] @ root
+        if found.drawn is not None:
+            of_shared = correction_rows(design, layout, found.drawn, design.points[some], probes[some])
+        null[some] = of_shared @ found.shared_null
+        size[some] = np.sqrt(((of_shared * found.scale) ** 2).sum(axis=2))
+    values = np.sqrt((spread**2).sum(axis=2))
+    drawn = None if found.drawn is None else corrected_points(design, found.drawn, design.points, probes)
+    corrected = corrected_points(design, state, design.points, probes)
     pairs = all_pairs(corrected, spread, np.zeros((n, d, d)), null, np.arange(n), limit, drawn)
     return blank(values, null, size), pairs
+
+
+def _narrow(root: Array) -> Array:
+    """A root of the same covariance root root' with no more columns than rows."""
+    return root if root.shape[0] >= root.shape[1] else np.asarray(np.linalg.qr(root.T, mode="r")).T

@@ -238,7 +238,7 @@ def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integ
             errors.append(np.zeros((root.shape[1], count)))
             errors[-1][:, own] = by_error
             together.append(Together(rows, root, by_error - (by_error @ outside.T) @ outside))
-    known, directions = _independent(np.concatenate(told))
+    known, directions = _independent(np.concatenate(told), len(consistencies) == 1)
     by_error = -np.concatenate(errors)
     by_known = by_error @ directions
     left, values, _ = np.linalg.svd(by_error - by_known @ directions.T, full_matrices=False)
@@ -298,10 +298,15 @@ def _outside(within: Array, uncertainty: Array, size: float) -> Array:
     return np.asarray(np.linalg.qr(scaled, mode="complete")[0][:, within.shape[1] :].T)
 
 
-def _independent(equations: Array) -> tuple[Array, Array]:
-    """What makes of `equations` (e, c), some told twice, orthonormal ones: a matrix (q, e), and the latter (c, q)."""
+def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
+    """What makes of `equations` (e, c), some told twice, orthonormal ones: a matrix (q, e), and the latter (c, q).
+
+    Those `told_once`, of a single set of lengths, are orthonormal as they are.
+    """
     if not len(equations):
         return np.zeros((0, 0)), np.zeros((equations.shape[1], 0))
+    if told_once:
+        return np.eye(len(equations)), equations.T
     left, values, right = np.linalg.svd(equations, full_matrices=False)
     kept = values > TOLD_TWICE * values[0]
     return np.asarray(left[:, kept].T / values[kept, None]), np.asarray(right[kept].T)

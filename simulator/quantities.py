@@ -5,6 +5,7 @@ A factor is held as a fraction and multiplied before rounding, so "0.2 um" is th
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from contextlib import suppress
@@ -58,6 +59,7 @@ BENDING_UNITS: Mapping[str, Fraction] = {f"{unit}/m": factor for unit, factor in
 DURATION_UNITS: Mapping[str, Fraction] = {"s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
+SMALLEST_FLOAT = float(SMALLEST)
 BASE_UNITS: Mapping[str, str] = {
     "length": "m",
     "angle": "rad",
@@ -95,6 +97,8 @@ CONSTANT_AND_RATIO = re.compile(rf"\s*([+-]?[^+]*(?:[eE]\+[^+]*)?)\+\s*({NUMBER}
 WITH_UNIT_OF_LENGTH = re.compile(
     rf"\s*\(\s*({NUMBER})\s*\+\s*L\s*/\s*({NUMBER})\s*\)\s*([^\s0-9()]+)\s+with\s+L\s+in\s+(\S+)\s*"
 )
+# Too few digits for a number other than zero to vanish.
+PLAIN = re.compile(r"[+-]?[0-9]{1,15}(?:\.[0-9]{1,30})?")
 # No uncertainty of a length grows so fast: it is millimetres that were divided, as data sheets do.
 STEEPEST = Fraction(1, 10**4)
 
@@ -137,6 +141,31 @@ def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> fl
             f"write 0, or {_article(kind)} of {float(SMALLEST):g} {unit} to {LARGEST:g} {unit}"
         )
     return value
+
+
+def power_of_ten(factor: Fraction) -> str:
+    """The exponent that multiplies a decimal number by a unit's factor; empty where it is no power of ten.
+
+    >>> power_of_ten(LENGTH_UNITS["mm"]), power_of_ten(LENGTH_UNITS["in"])
+    ('e-3', '')
+    """
+    exponent = round(math.log10(factor))
+    return f"e{exponent}" if factor == Fraction(10) ** exponent else ""
+
+
+def plain_number(number: str, power: str) -> float | None:
+    """Read digits with or without a point in between as `metres_or_radians` does, but sooner.
+
+    `power` is a unit's `power_of_ten`. None where the number is written otherwise, or is too large or too small.
+
+    >>> plain_number("750", "e-3"), plain_number("7.5e2", "e-3")
+    (0.75, None)
+    """
+    if not power or not PLAIN.fullmatch(number):
+        return None
+    # Adding zero removes its sign.
+    value = float(number + power) + 0.0
+    return value if value == 0.0 or SMALLEST_FLOAT <= abs(value) <= LARGEST else None
 
 
 def parse_length(value: object) -> float:

@@ -104,27 +104,34 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
         {design.ball_names[b]: int(b) for b in np.flatnonzero(design.ball_artefact == artefact)}
         for artefact in range(len(design.artefact_names))
     ]
-    index = np.zeros((len(rows), 3), np.int64)
+    # Rows of the same names, of which there are many, are looked up once.
+    places: dict[tuple[str, ...], tuple[int, int, int]] = {}
+    wrong: dict[tuple[str, ...], list[str]] = {}
+    index: list[tuple[int, int, int]] = []
     unknown: dict[str, list[Row]] = {}
-    for i, row in enumerate(rows):
+    for row in rows:
         if len(unknown) >= MOST_MESSAGES:
             unknown.setdefault(ENOUGH, []).append(row)
             break
-        position, ball, probe = (*row.texts, design.probe_names[0])[:3]
-        if position not in positions:
-            unknown.setdefault(f'unknown position "{position}"; {hint(position, positions)}', []).append(row)
-            continue
-        own = balls[design.position_artefact[positions[position]]]
-        if ball not in own:
-            unknown.setdefault(f'unknown ball "{ball}"; {hint(ball, own)}', []).append(row)
-        if probe not in probes:
-            unknown.setdefault(f'unknown probe "{probe}"; {hint(probe, probes)}', []).append(row)
-        index[i] = own.get(ball, 0), positions[position], probes.get(probe, 0)
+        if row.texts not in places:
+            position, ball, probe = (*row.texts, design.probe_names[0])[:3]
+            texts = wrong.setdefault(row.texts, [])
+            own: dict[str, int] = {}
+            if position not in positions:
+                texts.append(f'unknown position "{position}"; {hint(position, positions)}')
+            else:
+                own = balls[design.position_artefact[positions[position]]]
+                texts += [] if ball in own else [f'unknown ball "{ball}"; {hint(ball, own)}']
+                texts += [] if probe in probes else [f'unknown probe "{probe}"; {hint(probe, probes)}']
+            places[row.texts] = own.get(ball, 0), positions.get(position, 0), probes.get(probe, 0)
+        for text in wrong[row.texts]:
+            unknown.setdefault(text, []).append(row)
+        index.append(places[row.texts])
     messages = []
-    for text, places in unknown.items():
-        more = f" (and in {len(places) - 1} line{'s' * (len(places) > 2)} more)" if len(places) > 1 else ""
-        messages.append(places[0].mark.message("", text + more))
-    return index, messages
+    for text, found in unknown.items():
+        more = f" (and in {len(found) - 1} line{'s' * (len(found) > 2)} more)" if len(found) > 1 else ""
+        messages.append(found[0].mark.message("", text + more))
+    return np.array(index, np.int64).reshape(-1, 3), messages
 
 
 def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:

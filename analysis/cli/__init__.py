@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
+from typing import NoReturn
 
-from .interruption import interruptions
+from .encoding import write_data_in_utf8, write_readably
+from .interruption import Interruption, files_named, interruptions, leave, tell, written
+from .outputs import UsageError, check_outputs
+from .streams import lasting_streams
 
-AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,13 +40,13 @@ def parser() -> argparse.ArgumentParser:
         sweep,
     )
 
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
         epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used.",
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     experiments = (check, run, plan, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
@@ -49,43 +54,99 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit status."""
+    """Run a command and return its exit status; without arguments, that of the process itself."""
+    is_own_process = arguments is None
+    with interruptions(is_own_process) as interruption:
+        status = _answering(arguments, interruption)
+        if is_own_process and interruption.came is not None:
+            if sys.stdout is not None:
+                with suppress(OSError):
+                    sys.stdout.flush()
+            leave(status)
+        return status
+
+
+def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     try:
-        with interruptions() as answer:
-            return _main(arguments, answer)
+        with interruption.raising():
+            return _main(arguments, interruption)
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
+        pass
+    except Exception:
+        # What fails after a signal does so because of it.
+        if interruption.came is None:
+            raise
+    tell(interruption)
+    return interruption.status
 
 
-def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], None]) -> int:
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-    options = parser().parse_args(arguments)
-    options.answer_interruption = answer_interruption
+def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
+    with lasting_streams():
+        write_readably(sys.stdout, sys.stderr)
+        try:
+            options = parser().parse_args(arguments)
+        except SystemExit:
+            # Help is data, too.
+            if _ended(AS_EXPECTED) == BAD_FILE:
+                return BAD_FILE
+            raise
+        write_data_in_utf8(options)
+        interruption.kept = partial(written, files_named(options))
+        options.interruption = interruption
+        return _run(options)
+
+
+def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
-    from simulator.experiment.messages import ExperimentError
+    from simulator.experiment.messages import ExperimentError, in_one_line
 
     from ..internal_error import InternalError
 
     try:
-        status = int(options.run(options))
-        sys.stdout.flush()
-        return status
+        check_outputs(options)
+        return _ended(int(options.run(options)))
+    except UsageError as error:
+        print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
+        return USAGE
     except ExperimentError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
     except InternalError as error:
         print(f"internal error: {error}. Please report it with the file and the command.", file=sys.stderr)
         return INTERNAL
-    except BrokenPipeError:
-        # The reader has gone; say nothing, and keep the interpreter from flushing into the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return AS_EXPECTED
+    except Exception as error:
+        from .memory import no_memory
+
+        told = no_memory(error, options)
+        if told is not None:
+            print(told, file=sys.stderr)
+            return BAD_FILE
+        if isinstance(error, OSError):
+            return _without_room(error)
+        raise
+
+
+def _ended(status: int) -> int:
+    """The status of a command that has printed everything, once that has left."""
+    try:
+        sys.stdout.flush()
     except OSError as error:
-        print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return BAD_FILE
+        return _without_room(error)
+    return status
+
+
+def _without_room(error: OSError) -> int:
+    print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
+    return BAD_FILE
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells wrong usage in one line, whatever stands in the arguments; those of commands are of this class as well."""
+
+    def error(self, message: str) -> NoReturn:
+        from simulator.experiment.messages import in_one_line
+
+        super().error(in_one_line(message))
 
 
 class _Version(argparse.Action):

@@ -5,8 +5,11 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from .outputs import PARQUET, add_force, add_output, write_outputs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -25,14 +28,17 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "is 3.",
     )
     add_store(parser)
-    parser.add_argument(
+    add_output(
+        parser,
         "-o",
         "--output",
         metavar="FILE",
-        type=Path,
         required=True,
+        takes_screen=True,
+        needed=lambda path: PARQUET if path.suffix.lower() == ".parquet" else None,
         help="table, .csv or .parquet; - for CSV on the screen",
     )
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -44,10 +50,12 @@ def add_store(parser: ArgumentParser) -> None:
 
 def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
     """Tell of rows that this version would compute by another method."""
+    from simulator.experiment.messages import in_one_line
+
     from ..sweeps.store import of_other_methods
 
     for text in of_other_methods(keys):
-        print(f"{path}: {text}; run ballplate sweep again to compute them anew", file=sys.stderr)
+        print(in_one_line(f"{path}: {text}; run ballplate sweep again to compute them anew"), file=sys.stderr)
 
 
 def warn_of_damage(path: Path, found: Results, count: int) -> bool:
@@ -68,14 +76,10 @@ def run(options: Namespace) -> int:
 
     from ..sweeps.frame import frame_of
     from ..sweeps.store import StoreError, chosen_sweep, definition_of, open_store, results
-    from ..sweeps.store_file import is_same_file
 
     suffix = options.output.suffix.lower()
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
         print(f"ballplate export: {options.output} should end in .csv or .parquet", file=sys.stderr)
-        return WRONG_USAGE
-    if is_same_file(options.output, options.store):
-        print(f"ballplate export: -o {options.output} is the store itself; name another file", file=sys.stderr)
         return WRONG_USAGE
     try:
         with closing(open_store(options.store)) as store:
@@ -98,18 +102,9 @@ def run(options: Namespace) -> int:
         table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)
         table.columns = [cell_of_text(name) for name in table.columns]
     if str(options.output) == "-":
-        table.to_csv(sys.stdout, index=False)
+        table.to_csv(sys.stdout, index=False, lineterminator="\n")
         return BAD_FILE if is_damaged else 0
-    try:
-        if suffix == ".csv":
-            table.to_csv(options.output, index=False)
-        else:
-            table.to_parquet(options.output, index=False)
-    except ImportError:
-        text = "Parquet needs pyarrow; install it with: python -m pip install 'ballplate[parquet]'"
-        print(f"ballplate export: {text}", file=sys.stderr)
-        return BAD_FILE
-    except OSError as error:
-        print(f"{options.output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+    write = table.to_parquet if suffix == ".parquet" else partial(table.to_csv, lineterminator="\n")
+    if not write_outputs({options.output: lambda path: write(path, index=False)}, options.force):
         return BAD_FILE
     return BAD_FILE if is_damaged else 0

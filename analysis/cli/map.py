@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import count, draw, picture, print_json, print_lines
+from .common import add_picture, count, print_json, print_lines
+from .outputs import Writer, add_force, write_outputs
 
 if TYPE_CHECKING:
     from simulator.machines.description import Three
@@ -44,9 +46,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     where.add_argument("--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX")
     parser.add_argument("--points", metavar="N", type=_points, help="points along the line, at least 2; default 21")
-    parser.add_argument(
-        "--plot", metavar="FILE", type=picture, help="draw it as well, in three dimensions or along the line or axis"
-    )
+    add_picture(parser, "--plot", help="draw it as well, in three dimensions or along the line or axis")
+    add_force(parser)
     parser.add_argument(
         "--magnification", metavar="N", type=count, help="of errors in the drawing of the grid; default: as fits"
     )
@@ -110,9 +111,6 @@ def run(options: Namespace) -> int:
     machine = load_machine(options.file, doubts)
     for doubt in doubts:
         print(f"warning: {doubt}", file=sys.stderr)
-    if options.plot is not None and options.plot.resolve() == options.file.resolve():
-        print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
-        return WRONG_USAGE
     drawn = options.plot is not None and options.line is None and options.error is None
     if options.magnification is not None and not drawn:
         print("ballplate map: --magnification is for the drawing of the grid; leave it out", file=sys.stderr)
@@ -146,11 +144,12 @@ def _of_one(found: AlongAxis, options: Namespace) -> int:
     from ..report.volumetric import draw_along
     from ..volumetric_tables import along_csv, along_data, along_lines
 
+    status = _drawn(options, partial(draw_along, found))
     if options.format == "json":
         print_json([along_data(found)])
     else:
         print_lines(along_lines(found) if options.format == "text" else list(along_csv(found)))
-    return _drawn(options, lambda path: draw_along(found, path))
+    return status
 
 
 def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace) -> int:
@@ -160,13 +159,14 @@ def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace
 
     found = machine.errors(between(start, end, options.points or POINTS))
     length = machine.lengths(start[None], end[None])
+    status = _drawn(options, partial(draw_line, found))
     if options.format == "json":
         print_json([{**machine_data(machine), "length": length_data(length)[0], "line": error_data(found)}])
     elif options.format == "csv":
         print_lines(list(error_csv(found)))
     else:
         print_lines([*error_lines(found), length_line(length)])
-    return _drawn(options, lambda path: draw_line(found, path))
+    return status
 
 
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
@@ -183,6 +183,7 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
 
     found = machine.errors(machine.grid(options.grid))
     diagonals = machine.diagonals()
+    status = _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
     if options.format == "json":
         data = {**machine_data(machine), "diagonals": diagonal_data(diagonals), "grid": error_data(found)}
         print_json([data])
@@ -190,8 +191,9 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
         print_lines(list(error_csv(found)))
     else:
         print_lines([*machine_lines(machine), "", *diagonal_lines(diagonals), "", *error_lines(found)])
-    return _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
+    return status
 
 
-def _drawn(options: Namespace, draw_to) -> int:  # type: ignore[no-untyped-def]
-    return 0 if options.plot is None or draw(draw_to, options.plot) else BAD_FILE
+def _drawn(options: Namespace, writer: Writer) -> int:
+    """Draw what was asked for, before anything is printed that nobody may read to its end."""
+    return 0 if options.plot is None or write_outputs({options.plot: writer}, options.force) else BAD_FILE

@@ -6,22 +6,12 @@ import sys
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import (
-    add_file,
-    add_json,
-    count,
-    draw,
-    picture,
-    print_json,
-    print_lines,
-    refuse_existing,
-    seed,
-    single,
-    write,
-)
+from .common import add_file, add_json, add_picture, count, print_json, print_lines, seed, single
+from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -74,13 +64,17 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="a design chosen from this pool before, to compare with and go on from; default: the positions as drawn",
     )
     output = parser.add_argument_group("output")
-    output.add_argument("-o", "--output", metavar="YAML", type=Path, help="write the choice as an experiment file")
-    output.add_argument(
-        "--sheet", metavar="FILE", type=_sheet, help="write the run sheet: .html to print, .md, .csv or .txt"
+    add_output(output, "-o", "--output", metavar="YAML", help="write the choice as an experiment file")
+    add_output(
+        output,
+        "--sheet",
+        metavar="FILE",
+        type=_sheet,
+        help="write the run sheet: .html to print, .md, .csv or .txt",
     )
     output.add_argument("--curve", action="store_true", help="plan for smaller and larger budgets as well")
-    output.add_argument("--plot", metavar="FILE", type=picture, help="draw the choice, its bound, gains, and the curve")
-    output.add_argument("--force", action="store_true", help="overwrite files that there are already")
+    add_picture(output, "--plot", help="draw the choice, its bound, gains, and the curve")
+    add_force(output)
     add_json(parser)
     parser.add_argument("--seed", type=seed, default=1, help="of the random starts of the search; default 1")
     parser.add_argument(
@@ -127,11 +121,6 @@ def run(options: Namespace) -> int:
     from ..planning.tables import campaign_data, campaign_lines
     from ..processes import processors
 
-    if not options.force:
-        refuse_existing(options.output, options.sheet)
-    elif options.output is not None and options.output.resolve() == options.files[0].resolve():
-        text = "is the file that the pool stands in; name another"
-        raise ExperimentError([Message(str(options.output), 0, 0, "", text)])
     experiment = single(options, planning=True)
     offered = None if experiment.pool is None else offer(experiment.pool)
     messages: list[Message] = []
@@ -161,11 +150,17 @@ def run(options: Namespace) -> int:
     request = Request(options.criterion, budget, options.curve, options.seed)
     found = campaign(experiment, request, offered, earlier, options.workers or processors(), _report)
     sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
+    try:
+        is_written = _written(found, sheet, options)
+    except ExperimentError as error:
+        # What took so long to find is told nevertheless.
+        print(error, file=sys.stderr)
+        is_written = False
     if options.json:
         print_json([campaign_data(found, sheet)])
     else:
         print_lines(campaign_lines(found, sheet))
-    if not _written(found, sheet, options):
+    if not is_written:
         return BAD_FILE
     is_full = found.plan.verdict.deficiency == found.left_open
     return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
@@ -177,7 +172,10 @@ def _report(step: str) -> None:
 
 
 def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
-    """Write what was asked for; False if a picture could not be drawn."""
+    """Write what was asked for; False if something cannot be written."""
+    from simulator.experiment.messages import in_one_line
+
+    writers: dict[Path, Writer] = {}
     if options.output is not None:
         from ..planning.experiment_file import experiment_text
 
@@ -186,12 +184,18 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         )
         deficiency = found.left_open or None
         text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent, None, deficiency)
-        write(options.output, text, options.force)
+        writers[options.output] = text_writer(lambda stream: stream.write(text))
     if options.sheet is not None:
-        write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)
-    # Numbered as on the run sheet.
-    in_order = replace(found, chosen=sheet.chosen)
-    return options.plot is None or draw(lambda path: _draw(in_order, path), options.plot)
+        told = _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet)
+        writers[options.sheet] = text_writer(lambda stream: stream.write(told))
+    if options.plot is not None:
+        # Numbered as on the run sheet.
+        writers[options.plot] = partial(_draw, replace(found, chosen=sheet.chosen))
+    is_written = write_outputs(writers, options.force)
+    for path in (options.output, options.sheet):
+        if is_written and path is not None:
+            print(in_one_line(f"{path} written"), file=sys.stderr)
+    return is_written
 
 
 def _draw(found: Campaign, path: Path) -> None:

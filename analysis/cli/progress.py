@@ -40,13 +40,15 @@ class ProgressBar:
         if room >= 5:
             filled = round(room * min(done / max(wanted, 1), 1.0))
             text = f"[{'#' * filled}{'.' * (room - filled)}] {text}"
-        print(f"\r\x1b[K{text[: shutil.get_terminal_size().columns - 1]}", end="", file=sys.stderr, flush=True)
+        width = shutil.get_terminal_size().columns - 1
+        # Blanks over what was there: not every console of Windows knows a sequence that clears the line.
+        print(f"\r{text[:width]:<{width}}", end="", file=sys.stderr, flush=True)
         self.drawn = True
 
     def close(self) -> None:
         """Take the bar away."""
         if self.drawn:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            print(f"\r{'':<{shutil.get_terminal_size().columns - 1}}\r", end="", file=sys.stderr, flush=True)
 
 
 def duration(seconds: float) -> str:

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from .export import add_store, warn_of_damage, warn_of_other_methods
+from .outputs import PAGE, add_force, add_output, write_outputs
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -23,7 +24,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "tells of the cells that can be read; the exit status then is 3.",
     )
     add_store(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="page or tables; default, and -: the screen")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        takes_screen=True,
+        help="page or tables; default, and -: the screen",
+    )
+    add_force(parser)
     parser.add_argument(
         "--format",
         choices=("html", "text", "markdown", "csv", "latex"),
@@ -41,12 +50,8 @@ def run(options: Namespace) -> int:
     """Write the report."""
     from ..report.results import read_results
     from ..sweeps.store import StoreError, open_store
-    from ..sweeps.store_file import is_same_file
 
     output: Path | None = options.output
-    if output is not None and is_same_file(output, options.store):
-        print(f"ballplate report: -o {output} is the store itself; name another file", file=sys.stderr)
-        return WRONG_USAGE
     if str(output) == "-":
         output = None
     suffix = "" if output is None else output.suffix.lower()
@@ -55,6 +60,9 @@ def run(options: Namespace) -> int:
         print(f"ballplate report: {output} should end in one of {endings}; or state --format", file=sys.stderr)
         return WRONG_USAGE
     form = options.format or SUFFIXES.get(suffix, "html")
+    if form == "html" and PAGE.is_missing:
+        print(f"ballplate report: {PAGE.told}", file=sys.stderr)
+        return BAD_FILE
     try:
         with closing(open_store(options.store)) as store:
             results = read_results(store, options.sweep)
@@ -72,18 +80,10 @@ def run(options: Namespace) -> int:
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
-    except ImportError as error:
-        if error.name is None or error.name.partition(".")[0] not in ("jinja2", "markupsafe", "matplotlib"):
-            raise
-        told = "a page needs jinja2 and matplotlib; install them with: python -m pip install 'ballplate[report]'"
-        print(f"ballplate report: {told}", file=sys.stderr)
-        return BAD_FILE
     if output is None:
         sys.stdout.write(text)
         return BAD_FILE if is_damaged else 0
-    try:
-        output.write_bytes(text.encode("utf-8", "replace"))
-    except OSError as error:
-        print(f"{output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+    content = text.encode("utf-8", "replace")
+    if not write_outputs({output: lambda path: path.write_bytes(content)}, options.force):
         return BAD_FILE
     return BAD_FILE if is_damaged else 0

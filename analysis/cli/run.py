@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ..montecarlo.study import Trials
 
-WRONG_USAGE, INTERRUPTED = 2, 130
+WRONG_USAGE = 2
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -55,6 +55,7 @@ def run(options: Namespace) -> int:
     if not with_trials and (options.seed is not None or options.workers is not None):
         print("ballplate run: --seed and --workers have a meaning with --trials or --until only", file=sys.stderr)
         return WRONG_USAGE
+    kept = options.interruption.kept
     for experiment in experiments(options):
         plans.append(plan(experiment, with_scale=True))
         if not options.json:
@@ -67,15 +68,16 @@ def run(options: Namespace) -> int:
             data["monte_carlo"] = trials_data(done)
             if not options.json:
                 print_lines(["", *trials_lines(done)])
+                options.interruption.kept = kept
             interrupted = done.outcome is not None and done.outcome.interrupted
         found.append(data)
         if interrupted:
-            print("interrupted: the figures are those of the data sets done so far", file=sys.stderr)
+            print(f"{options.interruption.word}: the figures are those of the data sets done so far", file=sys.stderr)
             break
     if options.json:
         print_json(found)
     if interrupted:
-        return INTERRUPTED
+        return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1
 
 
@@ -88,7 +90,8 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
     bar = ProgressBar("data sets")
 
     def report(progress: Progress) -> None:
-        options.answer_interruption()
+        options.interruption.answer()
+        options.interruption.kept = lambda: f"the figures of the {progress.done} data sets done are lost"
         remark = f"accurate to {100 * progress.accuracy:.2g} %" if progress.accuracy < 1.0 else ""
         bar.show(progress.done, progress.wanted, remark)
 

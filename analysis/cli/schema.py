@@ -15,7 +15,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "complete and check as you type.",
     )
     parser.add_argument("files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, prints_data=True)
 
 
 def run(options: Namespace) -> int:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 from .common import add_file, seed
+from .outputs import add_force, add_output, text_writer, write_outputs
+
+BAD_FILE = 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -18,19 +23,26 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "same readings, with and without --certificate.",
     )
     add_file(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="CSV", required=True, type=Path, help="file to write, or - for standard output"
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="CSV",
+        required=True,
+        takes_screen=True,
+        help="file to write, or - for standard output",
     )
-    parser.add_argument(
+    add_output(
+        parser,
         "--certificate",
         metavar="CSV",
-        type=Path,
+        takes_screen=True,
         help="also write values of certificates, priors and probe offsets, drawn about what is read, for "
         "fit --certificate",
     )
     parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
     parser.add_argument("--exact", action="store_true", help="leave all noise out; artefacts are as drawn")
-    parser.add_argument("--force", action="store_true", help="overwrite the output file if there is one")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -42,7 +54,7 @@ def run(options: Namespace) -> int:
 
     from simulator.certificates import certified_values, drawn_values, with_values, write_certificate
     from simulator.experiment.load import message_at
-    from simulator.experiment.messages import ExperimentError, Message
+    from simulator.experiment.messages import ExperimentError, Message, in_one_line
     from simulator.generate import (
         NoReadingError,
         exact_readings,
@@ -54,7 +66,7 @@ def run(options: Namespace) -> int:
     from simulator.machines.truth import true_machine
     from simulator.readings import write_readings
 
-    from .common import single, write_all
+    from .common import single
 
     experiment = single(options)
     if options.certificate and not certified_values(experiment):
@@ -74,21 +86,22 @@ def run(options: Namespace) -> int:
     except NoReadingError as error:
         text = f"{error}; state smaller ones"
         raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
-    writers = {options.output: lambda stream: write_readings(stream, design, readings, x)}
+    texts: dict[Path, Callable[[TextIO], None]] = {
+        options.output: lambda stream: write_readings(stream, design, readings, x)
+    }
     told = [f"{len(readings)} readings written to {options.output}"]
     if options.certificate:
-        if options.certificate == options.output:
-            text = "is to have both readings and certificate; name two files"
-            raise ExperimentError([Message(str(options.certificate), 0, 0, "", text)])
         values = drawn_values(experiment, design, truth, on_truth.model, generator)
         how = "exact" if options.exact else f"drawn with seed {chosen}"
         comment = f"certificate values of {experiment.label}, {how}, for fit --certificate"
-        writers[options.certificate] = lambda stream: write_certificate(
-            stream, with_values(experiment, values), comment
-        )
+        texts[options.certificate] = lambda stream: write_certificate(stream, with_values(experiment, values), comment)
         told.append(f"{len(values)} certificate values written to {options.certificate}")
-    write_all(writers, options.force)
-    for line, path in zip(told, writers, strict=True):
-        if str(path) != "-":
-            print(line, file=sys.stderr)
+    writers = {path: text_writer(write) for path, write in texts.items() if str(path) != "-"}
+    if not write_outputs(writers, options.force):
+        return BAD_FILE
+    for line, path in zip(told, texts, strict=True):
+        if path in writers:
+            print(in_one_line(line), file=sys.stderr)
+        else:
+            texts[path](sys.stdout)
     return 0

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..sweeps.model import Sweep
     from ..sweeps.store import Store
 
-WRONG_USAGE, BAD_FILE, INTERRUPTED = 2, 3, 130
+WRONG_USAGE, BAD_FILE = 2, 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -81,7 +81,7 @@ def run(options: Namespace) -> int:
             finally:
                 store.close()
     except Timeout:
-        print(f"{path}: another process is computing into it; wait for it, or end it", file=sys.stderr)
+        print(in_one_line(f"{path}: another process is computing into it; wait for it, or end it"), file=sys.stderr)
     except OSError as error:
         where = error.filename or path
         text = f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
@@ -110,7 +110,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         print(in_one_line(f"{store.path}: {text} is the same is not computed again"), file=sys.stderr)
         return BAD_FILE
     if number is None and stored and has_results and not options.beside:
-        print(f"{store.path}: holds another sweep; what has changed:", file=sys.stderr)
+        print(in_one_line(f"{store.path}: holds another sweep; what has changed:"), file=sys.stderr)
         for line in changes(stored[max(stored)], new)[:20]:
             print(f"  {in_one_line(line)}", file=sys.stderr)
         print("name another store with --store, or keep both in this one with --beside", file=sys.stderr)
@@ -123,11 +123,12 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         print(told, file=sys.stderr)
     found = statuses(store)
     for text in of_other_methods(key for key in keys(store, number).values() if (key, 0) in found):
-        print(f"{store.path}: {text}, and computes these cells anew", file=sys.stderr)
+        print(in_one_line(f"{store.path}: {text}, and computes these cells anew"), file=sys.stderr)
+    options.interruption.kept = lambda: f"what is done is in {store.path}, and the same command goes on from there"
     bar = ProgressBar("cells")
 
     def report(summary: Summary) -> None:
-        options.answer_interruption()
+        options.interruption.answer()
         remark = ", ".join(
             ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
             + ([f"{summary.failed} failed"] if summary.failed else [])
@@ -138,16 +139,12 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         with _runner(sweep, bundle, options) as runner:
             summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
         if summary.left:
-            options.answer_interruption()
+            options.interruption.answer()
     except ChangedError:
         bar.close()
         text = "the files of the sweep have been changed while it ran; what is done is stored, start it again"
-        print(f"{options.file}: {text}", file=sys.stderr)
+        print(in_one_line(f"{options.file}: {text}"), file=sys.stderr)
         return BAD_FILE
-    except KeyboardInterrupt:
-        bar.close()
-        print(f"interrupted; what is done is in {store.path}, and the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
     finally:
         bar.close()
     ensure_in_place(store)
@@ -166,16 +163,20 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
 
 
 def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
+    from simulator.experiment.messages import in_one_line
+
     from ..sweeps.store import results
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
     counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
-    print(f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}")
+    told = f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}"
+    print(in_one_line(told))
     found = results(store, number, summary.cells)
     versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:
-        print(f"{store.path}: the rows were computed with {len(versions)} different sets of versions", file=sys.stderr)
+        text = f"{store.path}: the rows were computed with {len(versions)} different sets of versions"
+        print(in_one_line(text), file=sys.stderr)
     if summary.failed:
         reasons: dict[str, list[int]] = {}
         for cell, status, reason in zip(found.cells.tolist(), found.statuses, found.reasons, strict=True):

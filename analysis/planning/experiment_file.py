@@ -71,7 +71,7 @@ def experiment_text(
         for key in root.items
     }
     kept = {key: chunk for key, chunk in chunks.items() if is_same[key]}
-    first = text.split("\n", 1)[0]
+    first = text.splitlines()[0]
     head = [first] if first.startswith(SCHEMA_LINE) and folder.resolve() == source.parent.resolve() else []
     head += [f"# {in_one_line(line)}".rstrip() for line in header.splitlines()]
     for parts in (kept, {}):
@@ -126,7 +126,12 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
     def there(name: Any) -> Any:
         if not isinstance(name, str) or Path(name).is_absolute():
             return name
-        return Path(os.path.relpath((source / name).resolve(), folder.resolve())).as_posix()
+        target = (source / name).resolve()
+        try:
+            return Path(os.path.relpath(target, folder.resolve())).as_posix()
+        except ValueError:
+            # On Windows nothing leads from one drive to another.
+            return target.as_posix()
 
     def model(settings: Any) -> Any:
         settings = _with(settings, "file", there)

@@ -42,7 +42,7 @@ EXACTLY = 1e8
 MOST_KINDS = 24
 
 # Matrices of all candidates together, in bytes.
-MOST_BYTES = 4 << 30
+MOST_BYTES = 2 << 30
 
 
 @dataclass(frozen=True)
@@ -195,9 +195,13 @@ def pool_information(
     certificates = [*even_known, *chain(*even_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
-    if len(candidates) * size**2 * 8 > MOST_BYTES:
-        limit = f"more than {MOST_BYTES >> 30} GB"
-        text = f"{len(candidates)} candidates with {size} parameters each take {limit}; offer fewer"
+    each = 8 * size**2
+    if len(candidates) * each > MOST_BYTES:
+        taken = f"{len(candidates) * each / 1e9:.3g} GB of memory"
+        text = (
+            f"{len(candidates)} candidates with {size} parameters each take {taken}; offer at most "
+            f"{MOST_BYTES // each}, positions of the experiment and certificates counted"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in known])

@@ -162,4 +162,7 @@ def save(figure: Figure, path: Path, words: str) -> None:
     else:
         metadata = {"Title": words, "Software": None}
     with matplotlib.rc_context({"svg.fonttype": "path"}):
-        figure.savefig(path, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
+        # Not to the file itself: where a disk is full, errors of the compression hide that of the file.
+        whole = io.BytesIO()
+        figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
+    path.write_bytes(whole.getvalue())

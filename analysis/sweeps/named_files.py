@@ -60,6 +60,26 @@ def named_files(sweep: Sweep) -> list[Path]:
     return sorted(found)
 
 
+def named_by(source: Path) -> list[Path]:
+    """Files that an experiment or machine file names, those that they name, and its modules, as far as they are there.
+
+    Empty where the file cannot be read: loading it tells why.
+    """
+    try:
+        root = read_tree(source)
+    except ExperimentError:
+        return []
+    found: set[Path] = set()
+    for scalar in path_scalars(root, ""):
+        text = str(scalar.value)
+        named = [Path(text)] if Path(text).is_absolute() else _there(source.parent, text)
+        for path in named:
+            found |= {path, *_of_machine_file(path)}
+    for folder, scalar in _modules([("", root)], source.parent):
+        found |= _imported(folder, str(scalar.value).partition(":")[0])
+    return sorted(found)
+
+
 def _last(path: str) -> str:
     """The last key of a path such as those of variants and axes."""
     return path.rpartition(".")[2].partition("[")[0]

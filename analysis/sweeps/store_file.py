@@ -10,7 +10,8 @@ import re
 import sqlite3
 import stat
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePath
+from urllib.parse import quote
 
 from simulator.experiment.messages import in_one_line
 
@@ -89,18 +90,21 @@ def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
     :raises sqlite3.Error: SQLite cannot open it.
     """
     check_place(path, create)
-    address = Path(os.path.abspath(path)).as_uri()
+    address = address_of(PurePath(os.path.abspath(path)))
     if create:
         return _opened(f"{address}?mode=rwc"), ""
     connection, wrong = _opened(f"{address}?mode=rw"), ""
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except sqlite3.OperationalError as error:
-        if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
-            connection.close()
-            raise
-        # In a place that cannot be written, as long as nobody else writes to the store.
         connection.close()
+        if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR")):
+            raise
+        # In a place that cannot be written, or is full, as long as nobody else writes to the store.
+        log = Path(f"{path}-wal")
+        if log.exists() and log.stat().st_size > 0:
+            words = f"what was written last stands in {log.name}, which cannot be read in this folder ({error})"
+            raise StoreError(f"{path}: {words}; copy both to a folder that can be written") from None
         connection = _opened(f"{address}?immutable=1")
     except sqlite3.DatabaseError as error:
         if not is_damage(error):
@@ -111,6 +115,19 @@ def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
         wrong = str(error)
     connection.execute("PRAGMA query_only = ON")
     return connection, wrong
+
+
+def address_of(path: PurePath) -> str:
+    """The address by which SQLite opens the file of an absolute path.
+
+    >>> from pathlib import PurePosixPath, PureWindowsPath
+    >>> address_of(PurePosixPath("/a b/c"))
+    'file:///a%20b/c'
+    >>> address_of(PureWindowsPath("C:/a")), address_of(PureWindowsPath("//server/share/a"))
+    ('file:///C%3A/a', 'file:////server/share/a')
+    """
+    text = path.as_posix()
+    return f"file://{'' if text.startswith('/') else '/'}{quote(os.fsencode(text))}"
 
 
 def is_damage(error: sqlite3.Error) -> bool:

@@ -85,7 +85,7 @@ class _Example(SphinxDirective):
             raise self.refuse(f"{what}\nexit status {status} instead of {expected}:\n{text}")
         text = text.replace("\r\n", "\n").replace(f"{self.folder}/", "")
         # What a progress bar has drawn is cleared again.
-        return [line.rpartition("\r\x1b[K")[2].rstrip() for line in text.rstrip("\n").split("\n")] if text else []
+        return [line.rpartition("\r")[2].rstrip() for line in text.rstrip("\n").split("\n")] if text else []
 
 
 class Console(_Example):

@@ -105,7 +105,7 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
         factors.append(units[unit])
     axes = sorted({name[2] for name in names if name != POSITION})
     if not messages and (POSITION not in names or not axes):
-        messages.append(mark.message("", f"a position and at least one error are needed, as in {EXAMPLE}"))
+        messages.append(mark.message("", f"has no position, or no error; write columns as in {EXAMPLE}"))
     if len(axes) > 1:
         messages.append(mark.message("", f"errors of the axes {listing(axes)}; write one file for each axis"))
     if messages:

@@ -9,6 +9,7 @@ from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
 from .checks import (
     check_calibration_read,
+    check_derivatives,
     check_error_model,
     check_inside,
     check_names,
@@ -145,6 +146,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
     evaluation = resolve_evaluation(sections, machine, probes, references)
+    check_derivatives(sections, machine, evaluation, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
     experiment = Experiment(

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
-from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians
+from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians, plain_number, power_of_ten
 from ..settings import hint, listing, shorten
 from ..spreadsheets import text_of_cell
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
@@ -19,9 +19,11 @@ CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
 MOST_ROWS = 1_000_000
 # Far more than there are names for.
 MOST_COLUMNS = 1000
+# Texts of rows that are kept to be shared by those that have the same.
+MOST_KNOWN = 100_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Row:
     """A line of a table: texts of its named columns and lengths, in metres, of its length columns."""
 
@@ -67,11 +69,16 @@ def read_table(
         raise ExperimentError([Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")])
     places, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, example)
     rows = []
-    for number, line in lines[1 : MOST_ROWS + 1]:
+    plain = _PlainRows.of(places, factors, texts, (*lengths, *optional))
+    for number, line in islice(lines, 1, MOST_ROWS + 1):
         mark = Mark(file, number, 1)
         if len(messages) >= MOST_MESSAGES:
             messages.append(mark.message("", ENOUGH))
             break
+        row = plain.row(mark, line)
+        if row is not None:
+            rows.append(row)
+            continue
         cells = _cells(line)
         if cells is None or len(cells) != len(places):
             messages.append(mark.message("", wrong_count(line, cells, len(places))))
@@ -96,6 +103,52 @@ def read_table(
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
+
+
+@dataclass(frozen=True)
+class _PlainRows:
+    """Reads lines that hold nothing unusual, in a fraction of the time that others take.
+
+    ``count`` is the number of columns, ``texts`` and ``lengths`` where each of the row's is, -1 where it is not; the
+    latter come with the power of ten that makes metres of the column's unit, empty where none does. ``known`` has
+    texts of rows before, of which there are as a rule few.
+    """
+
+    count: int
+    texts: tuple[int, ...]
+    lengths: tuple[tuple[int, str], ...]
+    known: dict[tuple[str, ...], tuple[str, ...]]
+
+    @classmethod
+    def of(
+        cls, places: Sequence[str], factors: dict[str, Fraction], texts: Sequence[str], lengths: Sequence[str]
+    ) -> _PlainRows:
+        by_name = {name: i for i, name in enumerate(places)}
+        powers = [(by_name.get(name, -1), power_of_ten(factors.get(name, Fraction(1)))) for name in lengths]
+        return cls(len(places), tuple(by_name[name] for name in texts), tuple(powers), {})
+
+    def row(self, mark: Mark, line: str) -> Row | None:
+        """The row of a line; None where it has to be looked at more closely."""
+        if '"' in line:
+            return None
+        cells = [cell.strip() for cell in line.split(",")]
+        if len(cells) != self.count:
+            return None
+        lengths = []
+        for i, power in self.lengths:
+            value = 0.0 if i < 0 else plain_number(cells[i], power)
+            if value is None:
+                return None
+            lengths.append(value)
+        own = tuple(cells[i] for i in self.texts)
+        texts = self.known.get(own)
+        if texts is None:
+            if not all(own):
+                return None
+            texts = tuple(map(text_of_cell, own))
+            if len(self.known) < MOST_KNOWN:
+                self.known[own] = texts
+        return Row(mark, texts, tuple(lengths))
 
 
 def refuse_columns(mark: Mark, header: str, example: str) -> None:

@@ -51,7 +51,7 @@ REMEDIES = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Mark:
     """A place in a file; line and column count from 1."""
 
@@ -109,6 +109,8 @@ def read_text(path: Path) -> str:
     file = str(path)
     try:
         kind = path.stat().st_mode
+        if stat.S_ISDIR(kind):
+            raise _refusal(file, "this is a folder; name a file in it")
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
             raise _refusal(file, "this is a device; name a file")
         # A pipe of the shell's has a writer; any other may wait for one for ever.
@@ -118,8 +120,6 @@ def read_text(path: Path) -> str:
             content = stream.read(MOST_BYTES + 1)
     except FileNotFoundError:
         raise _refusal(file, "there is no such file; check the name and the folder") from None
-    except IsADirectoryError:
-        raise _refusal(file, "this is a folder; name a file in it") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise _refusal(file, f"cannot be read ({reason}); check its name and permissions") from None

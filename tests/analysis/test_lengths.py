@@ -213,7 +213,7 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         (["--target", "1 um", "--grid", "20"], "a grid of 8000 points is too fine"),
         (["--target", "1 um", "--grid", "11", "--pairs", "p.csv"], "885115 lengths are too many for --pairs"),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),
-        (["--target", "1 um", "--csv", file], "are the same file; name another"),
+        (["--target", "1 um", "--csv", file], "which is read; name another"),
     ):
         assert main(["lengths", file, *options]) == 2
         assert told in capsys.readouterr().err

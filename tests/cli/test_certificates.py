@@ -150,8 +150,8 @@ def test_both_files_are_written_or_none(tmp_path: Path, capsys: pytest.CaptureFi
     readings.write_text("old")
     assert main([*arguments, str(tmp_path / "nowhere" / "certificate.csv"), "--force"]) == 3
     assert readings.read_text() == "old"
-    assert main([*arguments, str(readings), "--force"]) == 3
-    assert "name two files" in capsys.readouterr().err and readings.read_text() == "old"
+    assert main([*arguments, str(readings), "--force"]) == 2
+    assert "are the same file; name another" in capsys.readouterr().err and readings.read_text() == "old"
     assert main([*arguments, str(certificate), "--force"]) == 0
     assert certificate.read_text().startswith("# certificate values of quickstart, drawn with seed 1")
     bare = tmp_path / "bare.yaml"

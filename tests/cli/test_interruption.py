@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import signal
 import subprocess
 import sys
+import types
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -12,8 +15,10 @@ from typing import Any
 
 import pytest
 
+from analysis import processes
 from analysis.cli import main
 from analysis.cli.interruption import interruptions
+from analysis.processes import in_processes
 from analysis.sweeps import execute
 from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
 
@@ -70,19 +75,19 @@ def test_one_that_was_swallowed_ends_monte_carlo(
 
 
 def test_they_are_remembered() -> None:
-    with interruptions() as answer:
-        answer()
+    with interruptions() as interruption:
+        interruption.answer()
         swallowed()
         with pytest.raises(KeyboardInterrupt):
-            answer()
+            interruption.answer()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_ignored_ones_stay_ignored() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with interruptions() as answer:
+    with interruptions() as interruption:
         signal.raise_signal(signal.SIGINT)
-        answer()
+        interruption.answer()
 
 
 @pytest.mark.parametrize("module", ["analysis.cli.common", "simulator.experiment.messages", "numpy", "joblib"])
@@ -109,3 +114,50 @@ def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
     )
     assert done.returncode == 130, done.stderr
     assert done.stderr.startswith("interrupted") and done.stderr.count("\n") == 1
+
+
+def test_work_of_one_process_leaves_signals_alone() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    assert list(in_processes(abs, [(-1,), (2,)], 1)) == [1, 2]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_processes_are_started_undisturbed(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    """A signal amid their start is answered after it, and they end then."""
+    import joblib
+
+    class Interrupted(joblib.Parallel):  # type: ignore[misc]
+        def __call__(self, tasks: Any) -> Any:
+            results = super().__call__(tasks)
+            signal.raise_signal(number)
+            begun.append(number)
+            return results
+
+    begun: list[int] = []
+    monkeypatch.setattr(joblib, "Parallel", Interrupted)
+    with interruptions() as interruption, pytest.raises(KeyboardInterrupt), interruption.raising():
+        list(in_processes(abs, [(-1,), (2,)], 2))
+    assert begun == [number] and interruption.came == number
+    assert not [one for one in multiprocessing.active_children() if "Loky" in one.name]
+
+
+def test_where_signals_cannot_be_blocked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on Windows."""
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    assert list(in_processes(abs, [(-1,), (2,)], 2)) == [1, 2]
+
+
+def test_a_worker_of_windows_waits_for_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows keeps the number of a parent that has ended."""
+    done: list[object] = []
+    fake = types.SimpleNamespace(
+        INFINITE=-1,
+        OpenProcess=lambda rights, inherited, process: done.append(("opened", process)) or "handle",
+        WaitForSingleObject=lambda handle, limit: done.append(("waited", handle, limit)),
+    )
+    monkeypatch.setitem(sys.modules, "_winapi", fake)
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(os, "_exit", done.append)
+    processes._end_with(17)
+    assert done == [("opened", 17), ("waited", "handle", -1), 1]

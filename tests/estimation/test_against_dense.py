@@ -305,6 +305,17 @@ def test_rank_and_what_is_left_determined_of_a_deficient_design(
 
 
 @pytest.mark.parametrize(
+    ("make", "coefficients", "deficiency"), [(grid_of_four, 5, 0), (deficient_grid_of_seven, 10, 3)]
+)
+def test_evaluation_points_some_at_a_time(
+    monkeypatch: pytest.MonkeyPatch, make: Callable[[], Design], coefficients: int, deficiency: int
+) -> None:
+    monkeypatch.setattr("analysis.uncertainty.POINTS_AT_ONCE", 3)
+    design = with_points(make(), 8)
+    assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+
+
+@pytest.mark.parametrize(
     "make", [unequal_axes, length_standard_by_distance, length_standard_by_projection, two_artefacts]
 )
 def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], Design]) -> None:

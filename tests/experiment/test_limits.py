@@ -137,6 +137,46 @@ def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
     ]
 
 
+def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three thousand are possible; as many between balls of their own are no difficulty."""
+    bar = "  bar: {kind: grid, balls: [10, 8], size: [450 mm, 450 mm], role: length_standard}\npositions:"
+    text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
+    text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
+    text = text.replace(
+        "calibration:",
+        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\ncalibration:\n"
+        "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 1 um}",
+    )
+    assert refusals(tmp_path, text) == [
+        '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most 3000 such are possible: '
+        "calibrate fewer of them"
+    ]
+    (tmp_path / "e.yaml").write_text(text.replace("[10, 8]", "[11, 7]"))
+    assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 2926
+    monkeypatch.setattr("simulator.experiment.checks.MOST_JOINT_LENGTHS", 2)
+    text = text.replace("[10, 8]", "[2, 3]")
+    (tmp_path / "e.yaml").write_text(text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r2c1, r2c2], [r3c1, r3c2]]"))
+    assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 3
+    joint = text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r1c2, r2c2], [r3c1, r3c2]]")
+    assert "have balls in common; at most 2 such" in refusals(tmp_path, joint)[0]
+
+
+def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path) -> None:
+    text = replaced("{kind: kinematic}", "{kind: kinematic, position_coefficients: 25, rotation_coefficients: 25}")
+    (line,) = refusals(tmp_path, text + "evaluation: {points: {random: 40000}}\n")
+    (tmp_path / "e.yaml").write_text(text)
+    errors = len(lay_out(load(tmp_path / "e.yaml")[0]).model.parameters)
+    most = 50_000_000 // (3 * errors)
+    assert line == (
+        f"11:22: evaluation.points: 40000 points with {errors} machine errors have {120_000 * errors} derivatives; at "
+        f"most {most} points are possible with so many errors"
+    )
+    (tmp_path / "e.yaml").write_text(f"{text}evaluation: {{points: {{random: {most}}}}}\n")
+    assert len(load(tmp_path / "e.yaml")[0].evaluation.points) == most
+
+
 @pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
 def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
     (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))

@@ -231,8 +231,8 @@ def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_the_pool_is_not_overwritten_by_the_choice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "pool.yaml"
     path.write_text(TEXT)
-    assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 3
-    assert "the pool stands in" in capsys.readouterr().err
+    assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 2
+    assert "which is read; name another file" in capsys.readouterr().err
     assert path.read_text() == TEXT
 
 

@@ -176,7 +176,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
     page_file = tmp_path / "own.html"
-    command = [sys.executable, "-m", "analysis.cli", "report", store.path, "--run-modules", "-o", page_file]
+    command = [sys.executable, "-m", "analysis.cli", "report", store.path, "--run-modules", "--force", "-o", page_file]
     subprocess.run(command, check=True)
     assert mark.exists() and "cannot be drawn" not in page_file.read_text(encoding="utf-8")
 

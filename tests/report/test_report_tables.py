@@ -131,7 +131,7 @@ def test_the_command_writes_tables(small: Store, capsys: pytest.CaptureFixture[s
 
 def test_wrong_usage_is_told(small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["report", str(small.path), "-o", str(small.path)]) == 2
-    assert "is the store itself" in capsys.readouterr().err
+    assert "would overwrite" in capsys.readouterr().err
     assert main(["report", str(small.path), "--sweep", "7", "--format", "text"]) == 3
     assert "there is no such sweep; it has 1" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "none.sqlite"), "--format", "text"]) == 3
