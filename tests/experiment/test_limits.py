@@ -314,7 +314,7 @@ def test_variants_that_are_too_large_together(tmp_path: Path, monkeypatch: pytes
     path.write_text(text + "".join(names[:most]), encoding="utf-8")
     assert len(load(path)) == most
     (line,) = refusals(tmp_path, text + "".join(names))
-    place = f"{text.count(chr(10)) + most + 1}:8: variants.v{most}"
+    place = f"{text.count(chr(10)) + most + 1}:7: variants.v{most}"
     assert line == (
         f"{place}: the variants up to here have {(most + 1) * each} balls, balls read, calibrated values, priors and "
         f"evaluation points; at most {most * each} are possible: put some of the variants into a file of their own"
