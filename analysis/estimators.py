@@ -10,7 +10,7 @@ import numpy as np
 
 from simulator.design import Design, Integers, State
 from simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
-from simulator.estimation.length_equations import LENGTH_ESTIMATORS, LengthEstimator, NotAMetricError, length_estimate
+from simulator.estimation.length_equations import LengthEstimator, NotAMetricError, length_estimate
 from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
@@ -26,6 +26,13 @@ from .study import ParameterEstimate
 from .tables import SHOWN, aligned, number
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+
+# Derivatives, terms times parameters, of a rival estimator, which takes some 70 bytes for each, and more for few
+# parameters.
+MOST_DERIVATIVES = 15_000_000
+
+# Pairs of points of a comparison.
+MOST_POINTS = 100_000
 
 # Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth of that.
 ENOUGH = GaussNewtonSettings(smallest_step=1e-8)
@@ -83,6 +90,41 @@ def ball_pairs(experiment: Experiment, design: Design, name: str | None = None) 
     return np.concatenate(found)
 
 
+def count_terms(
+    experiment: Experiment, design: Design, estimator: RivalName, name: str | None = None, across_probes: bool = False
+) -> int:
+    """Number of terms of a rival estimator, but for certificates and priors, if every position has all the balls."""
+    count = 0
+    artefact_of = design.ball_artefact[design.readings.ball]
+    for k, (artefact, layout) in enumerate(experiment.layouts.items()):
+        if experiment.artefacts[artefact].role != "plate":
+            continue
+        chosen = name or ("braced" if "braced" in layout.pair_sets else "all")
+        balls = len(layout.names)
+        found = balls * (balls - 1) // 2 if chosen == "all" else len(layout.pair_sets.get(chosen, ()))
+        own = artefact_of == k
+        read = np.stack([design.readings.position[own], design.readings.probe[own]], axis=1)
+        probes = np.unique(np.unique(read, axis=0)[:, 0], return_counts=True)[1]
+        times = int((probes**2 if across_probes else probes).sum())
+        count += found * (times * (times - 1) // 2 if estimator == "cresto" else times)
+    return count
+
+
+def _refuse_many_terms(
+    experiment: Experiment, design: Design, estimator: RivalName, name: str | None, across_probes: bool
+) -> None:
+    """Refuse what would take more memory than there is, before pairs are made.
+
+    :raises ExperimentError: there are more terms than possible.
+    """
+    count = count_terms(experiment, design, estimator, name, across_probes)
+    most = MOST_DERIVATIVES // max(len(design.model.parameters), 1)
+    if count > most:
+        text = f"{estimator} with these pairs of balls has {count} terms; at most {most} are possible with "
+        text += f"{len(design.model.parameters)} parameters: take fewer --pairs, such as corners, or fewer balls"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
+
+
 def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
     """Refuse what estimators of distances alone cannot follow.
 
@@ -125,6 +167,7 @@ def fit_rival(
     """
     design = observed.design
     _refuse_unknown_lengths(experiment, design)
+    _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
     chosen = ball_pairs(experiment, design, pair_set)
     solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
@@ -160,9 +203,13 @@ def compare_estimators(
     corrected with the probe of the file's evaluation. `progress` is told the number of data sets done.
     """
     design = lay_out(experiment)
-    of_lengths = estimator in LENGTH_ESTIMATORS
-    (_refuse_other_lengths if of_lengths else _refuse_unknown_lengths)(experiment, design)
-    chosen = np.zeros((0, 2), np.int64) if of_lengths else ball_pairs(experiment, design, pair_set)
+    chosen = np.zeros((0, 2), np.int64)
+    if estimator == "length-equations" or estimator == "sphere-then-metric":
+        _refuse_other_lengths(experiment, design)
+    else:
+        _refuse_unknown_lengths(experiment, design)
+        _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
+        chosen = ball_pairs(experiment, design, pair_set)
     corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
     on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
     seed = experiment.seed if seed is None else seed

@@ -41,6 +41,16 @@ def count(text: str) -> int:
     return int(text)
 
 
+def trial_count(text: str) -> int:
+    """Read a number of synthetic data sets from the command line."""
+    from ..montecarlo.trials import MOST_TRIALS
+
+    found = count(text)
+    if found > MOST_TRIALS:
+        raise ArgumentTypeError(f"{found} data sets are too many; at most {MOST_TRIALS} are possible")
+    return found
+
+
 def whole(text: str) -> int:
     """Read an index from the command line."""
     if not text.isascii() or not text.isdigit():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentTypeError, Namespace
 from functools import partial
 
-from .common import add_file, add_json, count, seed
+from .common import add_file, add_json, count, seed, trial_count
 
 PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "braced", "all")
 
@@ -19,7 +19,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "CISE 15/98, section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
     )
     add_file(parser, several=True)
-    parser.add_argument("--trials", metavar="N", type=count, default=100, help="number of data sets; default 100")
+    parser.add_argument("--trials", metavar="N", type=trial_count, default=100, help="number of data sets; default 100")
     parser.add_argument(
         "--estimator",
         choices=("distances", "cresto", "kruth", "length-equations", "sphere-then-metric"),
@@ -28,7 +28,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_pairs(parser)
     parser.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
-    parser.add_argument("--points", metavar="N", type=count, default=200, help="pairs of points; default 200")
+    parser.add_argument("--points", metavar="N", type=_points, default=200, help="pairs of points; default 200")
     for key, words in (("rms", "root mean square"), ("maximum", "largest difference")):
         parser.add_argument(
             f"--published-{key}",
@@ -53,6 +53,15 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
         action="store_true",
         help="use distances between balls read with different probes in the same position, too",
     )
+
+
+def _points(text: str) -> int:
+    from ..estimators import MOST_POINTS
+
+    found = count(text)
+    if found > MOST_POINTS:
+        raise ArgumentTypeError(f"{found} pairs of points are too many; at most {MOST_POINTS} are possible")
+    return found
 
 
 def _length(text: str) -> float:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import errno
-import re
 from argparse import Namespace
 from pathlib import Path
+
+from ..memory import want_of_memory
 
 # What makes a command's work smaller.
 SMALLER = {
@@ -24,7 +24,6 @@ SMALLER = {
     "map": "take a coarser --grid",
     "spline": "give fewer points",
 }
-WITH_SIZE = re.compile(r"Unable to allocate ([0-9.]+ [KMGTPE]?i?B|[0-9]+ bytes)")
 
 
 def no_memory(error: BaseException, options: Namespace) -> str | None:
@@ -38,11 +37,8 @@ def no_memory(error: BaseException, options: Namespace) -> str | None:
         return (
             f"{place}: a worker process of {name} was ended from outside, as a rule because memory ran short; {smaller}"
         )
-    if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
-        return None
-    found = WITH_SIZE.search(str(error))
-    size = f": there is no room for another {found[1]}" if found else ""
-    return f"{place}: {name} needs more memory than there is{size}; {smaller}"
+    want = want_of_memory(error)
+    return None if want is None else f"{place}: {name} {want}; {smaller}"
 
 
 def _paths(value: object) -> list[Path]:

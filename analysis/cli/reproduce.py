@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from .common import count
+from .common import trial_count
 
 WRONG_USAGE = 2
 
@@ -49,7 +49,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument("--quick", action="store_true", help="leave out what needs synthetic data sets (6.2.7)")
     parser.add_argument(
-        "--trials", metavar="N", type=count, default=100, help="number of data sets for 6.2.7; default 100"
+        "--trials", metavar="N", type=trial_count, default=100, help="number of data sets for 6.2.7; default 100"
     )
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print a JSON object in metres and radians")

@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, count, percentage, seed
+from .common import add_file, add_json, count, percentage, seed, trial_count
 
 if TYPE_CHECKING:
     from simulator.experiment.model import Experiment
@@ -39,9 +39,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _trial_count(text: str) -> int:
-    if count(text) < 2:
+    found = trial_count(text)
+    if found < 2:
         raise ArgumentTypeError(f'one data set has no scatter; ask for 2 at least, not "{text}"')
-    return count(text)
+    return found
 
 
 def run(options: Namespace) -> int:

@@ -20,7 +20,7 @@ from .targets import Target, targets
 BATCHES = 4
 TASK = BATCH * BATCHES
 
-# Replicates of a run that is to go on until its figures are accurate, at the most.
+# Replicates of a run, those of one included that is to go on until its figures are accurate.
 MOST_TRIALS = 1_000_000
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -213,7 +213,7 @@ def _campaign(
     problem = Problem(information, wanted, limits)
 
     report("searching")
-    best, relaxed = _search(problem, drawn, request.seed, workers)
+    best, relaxed = _search(problem, drawn, request.seed, workers, report)
     if relaxed is not None:
         relaxed.check(request.criterion, best.value)
     _refuse_lacking(experiment, problem, best, begun)
@@ -335,7 +335,9 @@ def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: 
     raise _impossible(experiment, "pool.limits.keep", text)
 
 
-def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> tuple[Found, Bound | None]:
+def _search(
+    problem: Problem, drawn: Sequence[int], seed: int, workers: int, report: Callable[[str], None]
+) -> tuple[Found, Bound | None]:
     """The best selection found, and the bound of all."""
     limits = problem.constraints
     # An interrupted position, which has to be chosen, comes with two ways to go on.
@@ -347,12 +349,13 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     shares = [first] if is_small else [[start] for start in first]
     depth = 2 if is_small else 1
     tasks: list[tuple[object, ...]] = [(problem, None, 0), *((problem, share, depth) for share in shares)]
-    relaxed, *found = in_processes(_task, tasks, workers)
+    relaxed, *found = _reported(in_processes(_task, tasks, workers), len(tasks), report)
     selections = [one for some in found if isinstance(some, list) for one in some]
     # Of a selection that is just enough, most of what an exchange passes through is deficient.
     ways = (False, True) if _is_just_enough(problem, min(selections, key=lambda one: one.order)) else (False,)
     for by_pivots in ways[1:]:
-        others = in_processes(_task, [(problem, share, depth, by_pivots) for share in shares], workers)
+        tasks = [(problem, share, depth, by_pivots) for share in shares]
+        others = _reported(in_processes(_task, tasks, workers), len(tasks), report)
         selections += [one for some in others if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
@@ -362,10 +365,18 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     if not is_small:
         best_starts = [one.chosen for one in selections[:BEST_STARTS]]
         tasks = [(problem, [start], 2, by_pivots) for start in best_starts for by_pivots in ways]
-        again = in_processes(_task, tasks, workers)
+        again = _reported(in_processes(_task, tasks, workers), len(tasks), report)
         selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: one.order)
     return best, relaxed if isinstance(relaxed, Bound) else None
+
+
+def _reported(
+    results: Iterable[list[Found] | Bound | None], count: int, report: Callable[[str], None]
+) -> Iterator[list[Found] | Bound | None]:
+    for k, result in enumerate(results, 1):
+        report(f"searching, {k} of {count} parts done")
+        yield result
 
 
 @single_threaded

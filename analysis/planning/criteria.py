@@ -53,8 +53,9 @@ OPEN = 1e-7
 BLOCK = 256
 MOST_PLACES_KEPT = 1024
 
-# Evaluation points between all of which a plan can make distances small: thousands of times in a search.
-MOST_POINTS = 2000
+# Evaluation points between all of which a plan can make distances small: thousands of times in a search, which with
+# so many takes two minutes on one processor, and ten of a large pool; it grows with the square of their number.
+MOST_POINTS = 1000
 
 # Functions whose uncertainties are kept, rather than computed twice, for the tangent of a largest value.
 KEPT = 4_000_000
@@ -362,13 +363,13 @@ def is_about_balls(name: CriterionName) -> bool:
 def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
     """Refuse more evaluation points than a search can go through.
 
-    :raises ExperimentError: there are more than 2000 and the criterion concerns them.
+    :raises ExperimentError: there are more than 1000 and the criterion concerns them.
     """
     count = len(experiment.evaluation.points)
     if name.startswith("U6") and count > MOST_POINTS:
         text = (
             f"{count} points make {count * (count - 1) // 2} distances, which a search for {name} computes some "
-            f"thousand times, which takes hours; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
+            f"thousand times, which takes too long; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
 

@@ -29,7 +29,7 @@ from .priors import resolve_priors
 from .problems import Problems, written, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
-from .variants import in_variants, variant_trees
+from .variants import MOST_OF_ALL, in_variants, size_of, variant_trees
 from .yamltree import Mapping, Mark, Node, mark_of, read_tree
 
 
@@ -57,11 +57,18 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
         _raise_if_any([*base_problems.messages, *messages], refused, source)
         assert experiment is not None
         return (experiment,)
-    experiments = []
+    experiments: list[Experiment] = []
     variants_of: dict[Message, list[str]] = {}
+    size = 0
     for name, tree in trees.items():
         experiment, messages = build(tree, source, name, planning)
         experiments += [experiment] if experiment else []
+        size += size_of(experiment) if experiment else 0
+        if size > MOST_OF_ALL and len(experiments) > 1:
+            text = f"the variants up to here have {size} balls, balls read, calibrated values, priors and evaluation "
+            text += f"points; at most {MOST_OF_ALL} are possible: put some of the variants into a file of their own"
+            base_problems.add(("variants", name), text)
+            break
         for message in messages:
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [

@@ -10,12 +10,26 @@ from pathlib import Path
 
 from ..settings import describe, hint, listing
 from .messages import Message, format_path
+from .model import Experiment, Position
 from .problems import Problems
 from .sections import ExperimentSettings
 from .yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
 
 MOST_VARIANTS = 1000
+# Balls, balls read, calibrated values, priors and evaluation points of all variants of a file, which are loaded
+# together.
+MOST_OF_ALL = 2_000_000
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
+
+
+def size_of(experiment: Experiment) -> int:
+    """Number of balls, balls read at each position and candidate, calibrated values, priors and evaluation points."""
+    candidates = () if experiment.pool is None else experiment.pool.candidates
+    offered = [one.item for one in candidates if isinstance(one.item, Position)]
+    read = sum(len(group.ball_indices) for one in (*experiment.positions, *offered) for group in one.readings)
+    known = sum(len(one.values) for one in experiment.calibration if one.kind != "radius")
+    balls = sum(len(layout.names) for layout in experiment.layouts.values())
+    return balls + read + known + len(experiment.priors) + len(experiment.evaluation.points)
 
 
 def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:

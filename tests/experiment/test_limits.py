@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from sys import modules
 
 import numpy as np
 import pytest
@@ -301,3 +302,24 @@ def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch:
         )
         whole = one.kept_root.T @ one.kept_root
         np.testing.assert_allclose(whole, plain.kept_root.T @ plain.kept_root, atol=1e-12 * abs(whole).max())
+
+
+def test_variants_that_are_too_large_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has 9 balls, reads them with one probe, and has 4 calibrated distances and 20 points."""
+    each, most = 9 + 9 + 4 + 20, 3
+    text = f"{GOOD}evaluation: {{points: {{random: 20, seed: 1}}, probe: down}}\nvariants:\n"
+    names = [f"  v{k}: {{seed: {k}}}\n" for k in range(most + 5)]
+    path = tmp_path / "e.yaml"
+    monkeypatch.setattr(modules["simulator.experiment.load"], "MOST_OF_ALL", most * each)
+    path.write_text(text + "".join(names[:most]), encoding="utf-8")
+    assert len(load(path)) == most
+    (line,) = refusals(tmp_path, text + "".join(names))
+    place = f"{text.count(chr(10)) + most + 1}:7: variants.v{most}"
+    assert line == (
+        f"{place}: the variants up to here have {(most + 1) * each} balls, balls read, calibrated values, priors and "
+        f"evaluation points; at most {most * each} are possible: put some of the variants into a file of their own"
+    )
+    # A single experiment has the other limits alone.
+    monkeypatch.setattr(modules["simulator.experiment.load"], "MOST_OF_ALL", each - 1)
+    path.write_text(text + names[0], encoding="utf-8")
+    assert len(load(path)) == 1

@@ -106,13 +106,13 @@ def test_many_points_take_little_memory() -> None:
 
 def test_more_points_than_a_plan_goes_through(tmp_path: Path) -> None:
     path = tmp_path / "pool.yaml"
-    path.write_text(TEXT.replace("random: 20", "random: 2001"))
+    path.write_text(TEXT.replace("random: 20", "random: 1001"))
     experiment = load(path, planning=True)[0]
     with pytest.raises(ExperimentError) as caught:
         campaign(experiment, Request("U6-maximum", None))
     assert str(caught.value) == (
-        f"{path}: evaluation.points: 2001 points make 2001000 distances, which a search for U6-maximum computes some "
-        "thousand times, which takes hours; give at most 2000, better some hundred, or plan for tasks"
+        f"{path}: evaluation.points: 1001 points make 500500 distances, which a search for U6-maximum computes some "
+        "thousand times, which takes too long; give at most 1000, better some hundred, or plan for tasks"
     )
     criteria.refuse_many_points(experiment, "tasks")
 

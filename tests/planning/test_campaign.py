@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -263,3 +264,14 @@ def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
     one.check("U6", 1e-6 * (1 - 5e-10))
     with pytest.raises(InternalError, match="U6 of the choice, 9.9.*e-07, is below 1e-06"):
         one.check("U6", 1e-6 * (1 - 5e-9))
+
+
+def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
+    steps: list[str] = []
+    campaign(load(drawn, planning=True)[0], Request("U6", Budget(positions=4)), report=steps.append)
+    told = [re.fullmatch(r"searching, ([0-9]+) of ([0-9]+) parts done", step) for step in steps]
+    parts = [(int(one[1]), int(one[2])) for one in told if one]
+    assert len(parts) > 1
+    counts = [count for k, count in parts if k == 1]
+    assert parts == [(k, count) for count in counts for k in range(1, count + 1)]
+    assert steps.index("searching") < steps.index(f"searching, 1 of {counts[0]} parts done")

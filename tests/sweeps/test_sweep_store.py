@@ -403,3 +403,27 @@ def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
     path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\nrecord: [U5]\n", encoding="utf-8")
     assert sweep(path) == 0
     assert rows(tmp_path / "small.sqlite")["noise"].tolist() == [str(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("place", "size", "told"),
+    [
+        ("plan", (1 << 58,), "it needs more memory than there is: there is no room for another 2.00 EiB; "),
+        ("experiment_of", (), "it needs more memory than there is; "),
+        ("trials", (1 << 58,), "it needs more memory than there is: there is no room for another 2.00 EiB; "),
+    ],
+)
+def test_a_cell_that_finds_no_memory_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, size: tuple[int, ...], told: str
+) -> None:
+    loaded = load_sweep(small_sweep(tmp_path, 2, "trials: 10\n"))
+
+    def finds_none(*_: object) -> None:
+        for each in size:
+            np.empty(each)
+        raise MemoryError
+
+    monkeypatch.setattr(f"analysis.sweeps.task.{place}", finds_none)
+    row = compute(loaded, Task(0))
+    assert row.status == "failed"
+    assert row.reason == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"
