@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -12,7 +13,7 @@ from typing import NoReturn
 from .encoding import write_data_in_utf8, write_readably
 from .interruption import Interruption, files_named, interruptions, leave, tell, written
 from .outputs import UsageError, check_outputs
-from .streams import lasting_streams
+from .streams import StandardOutputError, keep_standard_numbers, lasting_streams
 
 AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
 
@@ -56,6 +57,8 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status; without arguments, that of the process itself."""
     is_own_process = arguments is None
+    if is_own_process:
+        keep_standard_numbers()
     with interruptions(is_own_process) as interruption:
         status = _answering(arguments, interruption)
         if is_own_process and interruption.came is not None:
@@ -84,16 +87,21 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     with lasting_streams():
         write_readably(sys.stdout, sys.stderr)
         try:
-            options = parser().parse_args(arguments)
-        except SystemExit:
-            # Help is data, too.
-            if _ended(AS_EXPECTED) == BAD_FILE:
-                return BAD_FILE
-            raise
-        write_data_in_utf8(options)
-        interruption.kept = partial(written, files_named(options))
-        options.interruption = interruption
-        return _run(options)
+            try:
+                options = parser().parse_args(arguments)
+            except SystemExit:
+                # Help is data, too.
+                sys.stdout.flush()
+                raise
+            write_data_in_utf8(options)
+            interruption.kept = partial(written, files_named(options))
+            options.interruption = interruption
+            status = _run(options)
+            sys.stdout.flush()
+            return status
+        except StandardOutputError as error:
+            print(f"standard output: cannot be written ({error}); give it room", file=sys.stderr)
+            return BAD_FILE
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -104,7 +112,7 @@ def _run(options: argparse.Namespace) -> int:
 
     try:
         check_outputs(options)
-        return _ended(int(options.run(options)))
+        return int(options.run(options))
     except UsageError as error:
         print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
         return USAGE
@@ -122,22 +130,19 @@ def _run(options: argparse.Namespace) -> int:
             print(told, file=sys.stderr)
             return BAD_FILE
         if isinstance(error, OSError):
-            return _without_room(error)
+            print(in_one_line(_told(error, options)), file=sys.stderr)
+            return BAD_FILE
         raise
 
 
-def _ended(status: int) -> int:
-    """The status of a command that has printed everything, once that has left."""
+def _told(error: OSError, options: argparse.Namespace) -> str:
+    """What the system refused, of a file or without saying of which."""
     try:
-        sys.stdout.flush()
-    except OSError as error:
-        return _without_room(error)
-    return status
-
-
-def _without_room(error: OSError) -> int:
-    print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
-    return BAD_FILE
+        os.getcwd()
+    except FileNotFoundError:
+        return f"ballplate {options.command}: the current folder is not there any more; change to another"
+    where = error.filename or f"ballplate {options.command}"
+    return f"{where}: cannot be used ({error.strerror or error}); check the name, the permissions and the room there"
 
 
 class _Parser(argparse.ArgumentParser):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import importlib.util
 import os
+import re
 import shutil
 import stat
 import sys
@@ -19,7 +20,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 if TYPE_CHECKING:
     from simulator.experiment.messages import Message
@@ -29,6 +30,9 @@ FORCE = "overwrite files that there are already"
 
 # Options that name files which name others, as experiment and machine files do.
 NAMING = ("files", "file", "earlier")
+
+# Names of files that a process has open; the group is the number of one of this process.
+OPEN_FILE = re.compile(r"/dev/(?:stdout|stderr|fd/([0-9]+))|/proc/(?:self/fd/([0-9]+)|[^/]+/(?:task/[^/]+/)?fd/[0-9]+)")
 
 # What belongs to a store besides its file.
 BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
@@ -162,13 +166,13 @@ def _refuse_same(outputs: list[Output]) -> None:
 
 
 def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
-    there = [(one, _status(one.path)) for one in outputs if not _is_in_place(one.path)]
-    if not any(found for _, found in there):
+    there = [(one, found) for one in outputs if (found := _status(one.path)) and stat.S_ISREG(found.st_mode)]
+    if not there:
         return
     for path in _inputs(options, {one.dest for one in outputs}):
         status = _status(path)
         for one, found in there:
-            if status is not None and found is not None and os.path.samestat(status, found):
+            if status is not None and os.path.samestat(status, found):
                 raise UsageError(f"{one.option} {one.path} would overwrite {path}, which is read; name another file")
 
 
@@ -313,8 +317,7 @@ def _target(path: Path) -> Path:
 
 def _is_in_place(path: Path) -> bool:
     """Whether it is a device, a pipe, or an open file of the process's, of which no other can take the place."""
-    plain = os.path.abspath(path)
-    if plain in ("/dev/stdout", "/dev/stderr") or plain.startswith(("/dev/fd/", "/proc/")):
+    if OPEN_FILE.fullmatch(os.path.abspath(path)):
         return True
     found = _status(path)
     return found is not None and not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode)
@@ -400,5 +403,14 @@ def _write_in_place(path: Path, writer: Writer) -> None:
                 shutil.copyfileobj(content, sys.stdout.buffer)
                 sys.stdout.buffer.flush()
             else:
-                with path.open("wb") as stream:
+                with _in_place(path, found) as stream:
                     shutil.copyfileobj(content, stream)
+
+
+def _in_place(path: Path, found: os.stat_result | None) -> BinaryIO:
+    """A device or pipe to be written, or an open file of the process's, which goes on where it is and loses nothing."""
+    own = OPEN_FILE.fullmatch(os.path.abspath(path))
+    if own is None or found is None or not stat.S_ISREG(found.st_mode):
+        return path.open("wb")
+    number = own[1] or own[2]
+    return os.fdopen(os.dup(int(number)), "wb") if number else path.open("ab")

@@ -10,6 +10,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
+
+class StandardOutputError(Exception):
+    """Standard output cannot be written; the text is the system's reason.
+
+    No OSError, which would be taken for one of a file, and which some libraries pass over in silence.
+    """
+
+
 # What writes to the console of Windows.
 _CONSOLE: Any = getattr(io, "_WindowsConsoleIO", io.FileIO)
 
@@ -19,8 +27,9 @@ def lasting_streams() -> Iterator[None]:
     """Let a command work to its end whoever reads what it prints, so that its files and its status are its own.
 
     A reader of standard output that has left, such as ``head``, changes nothing: what follows is dropped. Any other
-    error of standard output is raised once, and what follows is dropped. One that was closed beforehand is such an
-    error as soon as something is printed. Errors of standard error are not told, as there is no place for them.
+    error of standard output is raised once as StandardOutputError, and what follows is dropped. One that was closed
+    beforehand is such an error as soon as something is printed. Errors of standard error are not told, as there is no
+    place for them.
     """
     before = sys.stdout, sys.stderr
     sys.stdout = _lasting(sys.stdout, 1, is_told=True)
@@ -29,17 +38,25 @@ def lasting_streams() -> Iterator[None]:
         yield
     finally:
         for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError):
+            with suppress(StandardOutputError, OSError, ValueError):
                 stream.flush()
         sys.stdout, sys.stderr = before
+
+
+def keep_standard_numbers() -> None:
+    """Open the null device in the place of standard streams that are closed.
+
+    Otherwise files that are opened later would take their numbers, here or in workers, and receive what libraries and
+    the interpreter write to these.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(number, True)
+    os.close(number)
 
 
 def _lasting(stream: Any, number: int, is_told: bool) -> Any:
     """The stream with errors answered; as it is where somebody has put one of his own in its place."""
     if stream is None:
-        # No file that is opened later may take the number of the closed one.
-        with suppress(OSError):
-            os.open(os.devnull, os.O_WRONLY)
         closed = io.BufferedWriter(_Lasting(None, number, is_told))
         return io.TextIOWrapper(closed, encoding="utf-8", errors="replace", line_buffering=True)
     buffer = getattr(stream, "buffer", None)
@@ -78,7 +95,7 @@ class _Lasting(io.RawIOBase):
             # Windows tells by EINVAL that the other end of a pipe is closed.
             has_left = isinstance(error, BrokenPipeError) or os.name == "nt" and error.errno == errno.EINVAL
             if self._is_told and not has_left:
-                raise
+                raise StandardOutputError(error.strerror) from None
             return len(data)
 
     def writable(self) -> bool:

@@ -644,6 +644,43 @@ def test_standard_output_by_its_name(files: Path, tmp_path: Path) -> None:
     assert text.startswith("x_mm,y_mm,") and "design: a plate in two positions" in text.splitlines()
 
 
+def test_an_open_file_goes_on_where_it_is(files: Path, tmp_path: Path) -> None:
+    path = tmp_path / "all.txt"
+    path.write_text("before\n")
+    with path.open("a") as stream:
+        names = (
+            f"/dev/fd/{stream.fileno()}",
+            f"/proc/self/fd/{stream.fileno()}",
+            f"/proc/{os.getpid()}/fd/{stream.fileno()}",
+        )
+        for name in names:
+            assert write_outputs({Path(name): written_text(f"{name}\n")}, force=False)
+    assert path.read_text().splitlines() == ["before", *names]
+
+
+def test_an_open_file_is_an_input_too(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    experiment = files / "design.yaml"
+    before = experiment.read_bytes()
+    with experiment.open("a") as stream:
+        for name in (f"/proc/self/fd/{stream.fileno()}", f"/dev/fd/{stream.fileno()}"):
+            assert main(["simulate", str(experiment), "-o", name, "--force"]) == 2
+            assert f"would overwrite {experiment}, which is read" in capsys.readouterr().err
+    assert experiment.read_bytes() == before
+
+
+@pytest.mark.parametrize("start", ["/proc/self/cwd", "/proc/self/root"])
+def test_files_reached_through_a_process_are_files(
+    start: str, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    name = f"{start}/readings.csv" if start.endswith("cwd") else f"{start}{path}"
+    assert main(["simulate", str(files / "design.yaml"), "-o", name]) == 3
+    assert capsys.readouterr().err.startswith(f"{name}: exists already; ")
+    assert path.read_text() == "mine"
+
+
 @pytest.mark.parametrize("has_links", [True, False])
 def test_a_file_that_has_come_meanwhile_stays(
     has_links: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
