@@ -18,6 +18,9 @@ Result = TypeVar("Result")
 # Seconds between two looks of a worker at whether the process that started it still runs.
 PARENT_INTERVAL = 1.0
 
+# The name of joblib's threads that manage processes, and the seconds that one has to end.
+MANAGER, MANAGER_LIMIT = "ExecutorManagerThread", 0.2
+
 
 def in_processes(
     function: Callable[..., Result],
@@ -58,9 +61,31 @@ def in_processes(
     finally:
         if not finished and results is not None:
             # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), _managers_silenced():
                 warnings.simplefilter("ignore", UserWarning)
                 results.close()
+
+
+@contextmanager
+def _managers_silenced() -> Iterator[None]:
+    """Let threads that manage processes end without a word: what is taken away from them amid their work is no error.
+
+    Joblib's may look for a task that was just withdrawn.
+    """
+    before = threading.excepthook
+
+    def tell(arguments: threading.ExceptHookArgs) -> None:
+        if arguments.thread is None or arguments.thread.name != MANAGER:
+            before(arguments)
+
+    threading.excepthook = tell
+    try:
+        yield
+        for thread in threading.enumerate():
+            if thread.name == MANAGER:
+                thread.join(MANAGER_LIMIT)
+    finally:
+        threading.excepthook = before
 
 
 def begin_worker(parent: int) -> None:

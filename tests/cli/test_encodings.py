@@ -170,8 +170,8 @@ def opened(tree: ast.AST) -> list[ast.Call]:
         else:
             is_os = getattr(getattr(node.func, "value", None), "id", "") == "os"
             is_opened = getattr(node.func, "attr", "") in ("open", "read_text", "write_text") and not is_os
-        modes = [one.value for one in node.args if isinstance(one, ast.Constant)]
-        if is_opened and not any(mode in ("rb", "wb", "xb", "ab") for mode in modes):
+        modes = [one.value for one in node.args if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+        if is_opened and not any("b" in mode and set(mode) <= set("rwxab+") for mode in modes):
             found.append(node)
     return found
 
