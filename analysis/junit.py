@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from simulator.experiment.messages import in_one_line
+
 from .annotations import advice_lines
 from .checking import CheckedDesign, CheckedFile
 from .tables import plan_lines, verdict_lines
@@ -42,16 +44,17 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
     case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
-    told = [*plan_lines(design.plan), *advice_lines(design)]
+    # Outside attributes a line's end is one, and the log of a build server may take what follows for a command.
+    told = [_clean(in_one_line(line)) for line in (*plan_lines(design.plan), *advice_lines(design))]
     if design.place is None:
-        ElementTree.SubElement(case, "system-out").text = _clean("\n".join(told))
+        ElementTree.SubElement(case, "system-out").text = "\n".join(told)
         return case
     is_rank = bool(design.plan.verdict.complaint)
     message = _clean(verdict_lines(design.plan.verdict)[0] if is_rank else "; ".join(design.missed))
     kind = "rank" if is_rank else "goal"
     failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"
-    failure.text = _clean("\n".join([place, *told]))
+    failure.text = "\n".join([_clean(in_one_line(place)), *told])
     return case
 
 

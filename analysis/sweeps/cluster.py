@@ -232,7 +232,10 @@ def _loaded(source: Path, folder: Path) -> Sweep:
 @cache
 def _unpacked(bundle: Bundle) -> tuple[tempfile.TemporaryDirectory[str], Path]:
     """A folder with the files, which lasts as long as the worker, and the sweep file in it."""
-    folder = tempfile.TemporaryDirectory(prefix=PREFIX)
+    from distributed import get_worker
+
+    # In the worker's own folder, which dask deletes also where the worker was killed.
+    folder = tempfile.TemporaryDirectory(prefix=PREFIX, dir=get_worker().local_directory)
     # Modules of an earlier sweep would be taken for those of this one.
     for name, module in list(sys.modules.items()):
         if PREFIX in (getattr(module, "__file__", None) or ""):

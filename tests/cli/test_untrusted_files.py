@@ -159,3 +159,19 @@ def test_what_is_written_is_told_without_control_characters(
         out, err = capsys.readouterr()
         told = [text for text in (out + err).splitlines() if "[31m" in text]
         assert told and all(text.isprintable() for text in told), line
+
+
+def test_a_report_for_build_servers_has_no_lines_of_a_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Printed on the log of a server that reads commands in it."""
+    monkeypatch.chdir(tmp_path)
+    text = QUICKSTART.read_text(encoding="utf-8")
+    names = "a\n::error::b.yaml", "c\n::error::d.yaml"
+    Path(names[0]).write_text(text, encoding="utf-8")
+    Path(names[1]).write_text(
+        text.replace("expected_rank_deficiency: 0", "expected_rank_deficiency: 1"), encoding="utf-8"
+    )
+    assert main(["check", "--format", "junit", *names]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert not any(line.startswith("::") for line in lines) and any("\\x0a::error::" in line for line in lines)
