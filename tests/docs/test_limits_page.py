@@ -56,7 +56,7 @@ LIMITS = {
     "points of a curve": (curves.MOST_POINTS,),
     "coefficients of a polynomial": (machine_sections.MOST_COEFFICIENTS,),
     "`plan` | candidates of": (pool_groups.MOST_CANDIDATES,),
-    "`plan` | candidates' matrices": (information.MOST_BYTES >> 30,),
+    "`plan` | candidates' matrices": (information.MOST_BYTES // 10**6,),
     "`plan` | evaluation points": (criteria.MOST_POINTS,),
     "balls, balls read": (variants.MOST_OF_ALL,),
     "`run --trials`": (trials.MOST_TRIALS,),
