@@ -88,9 +88,7 @@ def refuse_many_entries(design: Design, source: Path, cure: str) -> None:
     rows, columns = entries(design)
     if rows * columns > MOST_ENTRIES:
         text = f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; at most "
-        text += (
-            f"{MOST_ENTRIES // columns} are possible with {columns} parameters of machine, poses and tied balls: "
-        )
+        text += f"{MOST_ENTRIES // columns} are possible with {columns} parameters of machine, poses and tied balls: "
         raise ExperimentError([Message(str(source), 0, 0, "positions", text + cure)])
 
 

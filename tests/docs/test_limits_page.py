@@ -12,6 +12,7 @@ from analysis.cli import lengths as lengths_command
 from analysis.cli import spline
 from analysis.montecarlo import trials
 from analysis.planning import criteria, information
+from analysis.reach import search
 from analysis.reliability import leftover
 from analysis.sweeps import axes, bundle, load, settings
 from simulator.experiment import (
@@ -66,6 +67,7 @@ LIMITS = {
     "`compare --points`": (estimators.MOST_POINTS,),
     "`sweep` | cells": (load.MOST_CELLS,),
     "`sweep` | values": (axes.MOST_VALUES,),
+    "`reach`": (search.MOST_POINTS,),
     "`lengths` |": (lengths.MOST_POINTS,),
     "`lengths --pairs`": (lengths_command.MOST_PAIRS,),
     "`map`": (volumetric.MOST_POINTS,),
