@@ -26,6 +26,7 @@ from simulator.threads import single_threaded
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
+from .reliability.leftover import refuse_many_entries
 from .reliability.search import diagnosis
 from .reliability.suspects import Diagnosis
 from .scale import Scale, scale_of
@@ -198,8 +199,11 @@ def fit(
 
     `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as the
     coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
+
+    :raises ExperimentError: there are more readings than there is memory for.
     """
     design = observed.design
+    refuse_many_entries(design, experiment.source, "fit the means of repeated readings, with u as a column, or fewer")
     layout = shared_layout(design)
     solution = estimate(design, observed.x)
     if solution.status != "converged":

@@ -41,8 +41,8 @@ EXACTLY = 1e8
 # Kinds of reading (which balls, how often) beyond which all combinations of balls are kept.
 MOST_KINDS = 24
 
-# Matrices of all candidates together, in bytes.
-MOST_BYTES = 2 << 30
+# Matrices of all candidates together, in bytes; a plan takes two and a half times as much.
+MOST_BYTES = 800_000_000
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from simulator.experiment.load import build, tree_of
-from simulator.experiment.messages import ExperimentError
+from simulator.experiment.messages import ExperimentError, Message
 from simulator.experiment.model import Experiment
 from simulator.experiment.variants import override
 from simulator.experiment.yamltree import Mapping, Node, Scalar
@@ -21,6 +21,9 @@ from ..goals import Goal, Judgement, check_goal, judge
 from ..study import Worth, plan, worth
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
+
+# Evaluation points, the distances between which are gone through for each value tried.
+MOST_POINTS = 10_000
 
 # Columns of balls up to which every number is tried, and the ratio beyond; values of a size that are tried first,
 # and about the best of them if none does.
@@ -97,8 +100,13 @@ def reach(
 
     :raises GoalError: the experiment does not have what the goal is about.
     :raises NotVariableError: a single unknown is asked for that the experiment does not have.
-    :raises ExperimentError: the target is wrong.
+    :raises ExperimentError: the target is wrong, or there are more than 10,000 evaluation points.
     """
+    count = len(experiment.evaluation.points)
+    if count > MOST_POINTS:
+        text = f"{count} points make {count * (count - 1) // 2} distances, which reach computes for every value that "
+        text += f"it tries, some dozens, which takes too long; give at most {MOST_POINTS}, better some hundred"
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
     root = tree_of(experiment.source, experiment.name)
     # Planning is at zero machine error, and true machines take time to check.
     zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})

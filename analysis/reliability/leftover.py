@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from simulator.estimation.elimination import eliminate
 from simulator.estimation.gauss_newton import as_drawn
 from simulator.estimation.hat import hat_rows, row_places, whitened_residuals
 from simulator.estimation.parameters import shared_layout
+from simulator.experiment.messages import ExperimentError, Message
 from simulator.machines.protocol import Array
 
 if TYPE_CHECKING:
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 
 # A direction of which no more than this share is left in the residuals is not tested.
 HIDDEN = 1e-8
+
+# Entries of the root of the hat matrix; with what is tested, some 95 bytes are taken for each.
+MOST_ENTRIES = 20_000_000
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,27 @@ class Leftover:
         columns = d * self.ball[at][:, None] + np.arange(d)
         entries = (self.own[at].ravel(), (np.repeat(at, d), columns.ravel()))
         return csr_array(entries, shape=(len(self.ball), d * self.balls))
+
+
+def entries(design: Design) -> tuple[int, int]:
+    """Rows of all observations of a design, and columns that they may have in common.
+
+    Those are the shared parameters and the co-ordinates of balls that certificates of distances tie together.
+    """
+    tied = np.unique(np.concatenate([design.distances.first, design.distances.second]))
+    return len(row_places(design)), len(shared_layout(design)) + design.dimension * len(tied)
+
+
+def refuse_many_entries(design: Design, source: Path, cure: str) -> None:
+    """Refuse to look for mistakes in more observations than there is memory for; `cure` says what makes them fewer.
+
+    :raises ExperimentError: there are too many for so many parameters.
+    """
+    rows, columns = entries(design)
+    if rows * columns > MOST_ENTRIES:
+        text = f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; at most "
+        text += f"{MOST_ENTRIES // columns} are possible with {columns} parameters of machine, poses and tied balls: "
+        raise ExperimentError([Message(str(source), 0, 0, "positions", text + cure)])
 
 
 def orthonormal(left: Array, size: Array) -> Array:

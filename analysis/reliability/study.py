@@ -20,7 +20,7 @@ from simulator.threads import single_threaded
 
 from .effects import SYMBOLS, Functions, Largest, ball_distances, error_functions, point_distances
 from .events import event_groups
-from .leftover import Columns, leftover
+from .leftover import Columns, leftover, refuse_many_entries
 from .patterns import Patterns, patterns
 from .power import noncentrality
 from .response import responses
@@ -106,10 +106,13 @@ def reliability(
     power: float = POWER,
     sigma: Literal["estimated", "given"] | None = None,
 ) -> Reliability:
-    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file says."""
-    return reliability_of(
-        lay_out(experiment), false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment
-    )
+    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file says.
+
+    :raises ExperimentError: it has more observations than there is memory for.
+    """
+    design = lay_out(experiment)
+    refuse_many_entries(design, experiment.source, "read fewer balls, or in fewer positions")
+    return reliability_of(design, false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment)
 
 
 @single_threaded

@@ -26,6 +26,10 @@ Values = Annotated[
 VariantNames = Annotated[tuple[Name, ...], Field(min_length=1)]
 
 
+# Synthetic data sets of a cell, which are done in blocks, each of which is kept.
+MOST_TRIALS = 10_000_000
+
+
 class SubsetSettings(Settings):
     """Which entries of a list are kept, in the order of the list."""
 
@@ -95,7 +99,7 @@ class SweepSettings(Settings):
     only: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
         (), description="cells kept, in the same form; default: all"
     )
-    trials: Annotated[int, Field(ge=2, le=10_000_000)] | None = Field(
+    trials: Annotated[int, Field(ge=2, le=MOST_TRIALS)] | None = Field(
         None, description="synthetic data sets of each cell; default: none"
     )
     seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")

@@ -227,3 +227,14 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     for wrong in (["--goal", "U9"], ["--target", "3"], ["--share", "95%", "--goal", "tasks"], ["--calibration", "1"]):
         assert main(["reach", file, "--by", "certificate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("ballplate reach: ")
+
+
+def test_more_points_than_are_gone_through_for_each_value(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8").replace("random: 200", "random: 10001")
+    path = tmp_path / "many.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["reach", str(path)]) == 3
+    assert capsys.readouterr().err == (
+        f"{path}: evaluation.points: 10001 points make 50005000 distances, which reach computes for every value that "
+        "it tries, some dozens, which takes too long; give at most 10000, better some hundred\n"
+    )

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from analysis import curve, lengths, volumetric
+from analysis import curve, estimators, lengths, volumetric
 from analysis.cli import lengths as lengths_command
 from analysis.cli import spline
 from analysis.montecarlo import trials
 from analysis.planning import criteria, information
-from analysis.sweeps import axes, bundle, load
+from analysis.reach import search
+from analysis.reliability import leftover
+from analysis.sweeps import axes, bundle, load, settings
 from simulator.experiment import (
     calibrations,
     checks,
@@ -55,11 +57,17 @@ LIMITS = {
     "points of a curve": (curves.MOST_POINTS,),
     "coefficients of a polynomial": (machine_sections.MOST_COEFFICIENTS,),
     "`plan` | candidates of": (pool_groups.MOST_CANDIDATES,),
-    "`plan` | candidates' matrices": (information.MOST_BYTES >> 30,),
+    "`plan` | candidates' matrices": (information.MOST_BYTES // 10**6,),
     "`plan` | evaluation points": (criteria.MOST_POINTS,),
+    "balls, balls read": (variants.MOST_OF_ALL,),
     "`run --trials`": (trials.MOST_TRIALS,),
+    "`sweep` | synthetic": (settings.MOST_TRIALS,),
+    "`fit`, `reliability` |": (leftover.MOST_ENTRIES,),
+    "`compare`, `fit --estimator` |": (estimators.MOST_DERIVATIVES,),
+    "`compare --points`": (estimators.MOST_POINTS,),
     "`sweep` | cells": (load.MOST_CELLS,),
     "`sweep` | values": (axes.MOST_VALUES,),
+    "`reach`": (search.MOST_POINTS,),
     "`lengths` |": (lengths.MOST_POINTS,),
     "`lengths --pairs`": (lengths_command.MOST_PAIRS,),
     "`map`": (volumetric.MOST_POINTS,),
