@@ -68,5 +68,10 @@ def test_a_current_folder_that_has_been_deleted_is_told(
     monkeypatch.chdir(gone)
     gone.rmdir()
     assert main(["init", "new.yaml"]) == 3
-    told = "ballplate init: the current folder is not there any more; change to another\n"
+    assert capsys.readouterr().err.splitlines() == [
+        "new.yaml: cannot be written (No such file or directory); check the folder"
+    ]
+    monkeypatch.setattr(schema, "run", lambda _: Path.cwd())
+    assert main(["schema"]) == 3
+    told = "ballplate schema: the current folder is not there any more; change to another\n"
     assert capsys.readouterr() == ("", told)
