@@ -44,8 +44,8 @@ def parser() -> argparse.ArgumentParser:
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
-        epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used, 70 an error "
-        "of the program itself, 130 and 143 interrupted.",
+        epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used, 70 an "
+        "error of the program itself, 130 and 143 interrupted.",
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
