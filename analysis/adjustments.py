@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.machines.protocol import Array, Unit
+from ballplate.simulator.machines.protocol import Array, Unit
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
 

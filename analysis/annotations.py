@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from simulator.experiment.messages import in_one_line
+from ballplate.simulator.experiment.messages import in_one_line
 
 from .checking import CheckedDesign, CheckedFile
 from .planning.repair.tables import certificate_lines, repair_lines

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from itertools import combinations, combinations_with_replacement
 
 import numpy as np
-
-from simulator.design import Design
-from simulator.geometry.directions import directions
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Design
+from ballplate.simulator.geometry.directions import directions
+from ballplate.simulator.machines.protocol import Array
 
 # Singular values below this fraction of the largest: what readings tell of a direction through their own scatter only.
 MISSING = 1e-3

@@ -10,12 +10,11 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-
-from simulator.design import Design
-from simulator.estimation.parameters import SharedLayout
-from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import comparable
 
 from .bar_cures import MISSING, bars_to_add, listed
 

@@ -9,10 +9,9 @@ that have most freedom in it, and of equal ones the first by the order of names.
 from __future__ import annotations
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
+from ballplate.simulator.design import Integers
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import comparable
 
 
 def elementary_mixture(directions: Array) -> Array:

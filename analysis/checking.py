@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simulator.experiment.load import load, place_in
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.experiment.variants import unknown_variants
-from simulator.experiment.yamltree import Mark
+from ballplate.simulator.experiment.load import load, place_in
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import unknown_variants
+from ballplate.simulator.experiment.yamltree import Mark
 
 from .goals import Goal, GoalError, check_goal, judge
 from .study import Plan, check, worth

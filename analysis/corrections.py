@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
-from simulator.design import Design, Integers, State, probe_offsets
-from simulator.estimation.observations import offset_sensitivity
-from simulator.estimation.parameters import SharedLayout
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, Integers, State, probe_offsets
+from ballplate.simulator.estimation.observations import offset_sensitivity
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array
 
 
 def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:

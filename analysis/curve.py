@@ -8,14 +8,13 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-
-from simulator.geometry.profile import NotOnProfileError, Profile, along
-from simulator.splines.constraints import Constraint, periodic, prescribed, straight
-from simulator.splines.fit import SplineFit, fit
-from simulator.splines.knots import at_every, with_boundaries
-from simulator.splines.problems import Problem, SplineError
-from simulator.splines.read import ARC_LENGTH, Points
-from simulator.splines.space import Array, SplineSpace
+from ballplate.simulator.geometry.profile import NotOnProfileError, Profile, along
+from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, straight
+from ballplate.simulator.splines.fit import SplineFit, fit
+from ballplate.simulator.splines.knots import at_every, with_boundaries
+from ballplate.simulator.splines.problems import Problem, SplineError
+from ballplate.simulator.splines.read import ARC_LENGTH, Points
+from ballplate.simulator.splines.space import Array, SplineSpace
 
 Place = float | tuple[float, float] | Literal["start", "end"]
 """An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""

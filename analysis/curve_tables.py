@@ -7,13 +7,12 @@ import math
 from typing import Any
 
 import numpy as np
-
-from simulator.rounding import comparable
-from simulator.settings import listing
-from simulator.splines.constraints import Constraint
-from simulator.splines.pieces import Pieces, Powers, pieces
-from simulator.splines.read import Column
-from simulator.spreadsheets import CsvWriter
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.settings import listing
+from ballplate.simulator.splines.constraints import Constraint
+from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
+from ballplate.simulator.splines.read import Column
+from ballplate.simulator.spreadsheets import CsvWriter
 
 from .curve import Curve
 from .tables import aligned, number

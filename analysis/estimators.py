@@ -7,19 +7,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from simulator.design import Design, Integers, State
-from simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
-from simulator.estimation.length_equations import LENGTH_ESTIMATORS, LengthEstimator, NotAMetricError, length_estimate
-from simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.geometry.artefacts import pairs
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings, observe
+from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
+from ballplate.simulator.estimation.length_equations import (
+    LENGTH_ESTIMATORS,
+    LengthEstimator,
+    NotAMetricError,
+    length_estimate,
+)
+from ballplate.simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.geometry.artefacts import pairs
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import ObservedReadings, observe
 
 from .length_fits import has_all_errors
 from .study import ParameterEstimate

@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from simulator.quantities import QuantityError, parse_positive_angle, parse_positive_length
-from simulator.rounding import comparable
-from simulator.settings import listing
+from ballplate.simulator.quantities import QuantityError, parse_positive_angle, parse_positive_length
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.settings import listing
 
 from .study import Plan, Worth
 from .tables import number, percent, shown_unit, uncertainty_words

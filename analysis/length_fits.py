@@ -7,17 +7,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from simulator.design import Design
-from simulator.estimation.length_equations import LengthEstimator, LengthSolution, NotAMetricError, length_estimate
-from simulator.estimation.spheres import FLAT, fit_sphere
-from simulator.experiment.load import place_in
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.geometry.artefacts import TwoSpheresSettings
-from simulator.machines.protocol import Array
-from simulator.machines.spatial_metric import SpatialMetricModel
-from simulator.readings import ObservedReadings
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.length_equations import (
+    LengthEstimator,
+    LengthSolution,
+    NotAMetricError,
+    length_estimate,
+)
+from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
+from ballplate.simulator.experiment.load import place_in
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.readings import ObservedReadings
 
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
 from .tables import adjustment_data, adjustment_lines, aligned, finite, number

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-
-from simulator.experiment.model import Experiment
-from simulator.machines.protocol import Array
-from simulator.quantities import LengthFunction, format_length
-from simulator.rounding import comparable
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.quantities import LengthFunction, format_length
+from ballplate.simulator.rounding import comparable
 
 from .lengths import Groups, LengthMap, Settings, length_pairs
 from .tables import aligned, finite, number, percent, uncertainty_words

@@ -6,18 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.design import Design, Integers, nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.quantities import LengthFunction
+from ballplate.simulator.rounding import above, comparable
+from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
-
-from simulator.design import Design, Integers, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.quantities import LengthFunction
-from simulator.rounding import above, comparable
-from simulator.threads import single_threaded
 
 from .corrections import corrected_points, correction_rows
 from .pairs import PairTile, pair_tiles

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.design import Integers
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.quantities import LengthFunction
+from ballplate.simulator.rounding import comparable
 from numpy.typing import NDArray
-
-from simulator.design import Integers
-from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array
-from simulator.quantities import LengthFunction
-from simulator.rounding import comparable
 
 # Places on a side of the tiles in which pairs are worked through: their products stay in cache.
 TILE = 256

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.design import Design, State
-from simulator.estimation.covariance import Covariance, blank
-from simulator.experiment.model import Experiment
-from simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes, plate_axes
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation.covariance import Covariance, blank
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes, plate_axes
+from ballplate.simulator.machines.protocol import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from simulator.design import Design
-from simulator.estimation.covariance import Covariance, Spectrum
-from simulator.estimation.parameters import SharedLayout
-from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array, HasLines
-from simulator.quantities import Target
-from simulator.rounding import above, comparable, printable
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.covariance import Covariance, Spectrum
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.machines.protocol import Array, HasLines
+from ballplate.simulator.quantities import Target
+from ballplate.simulator.rounding import above, comparable, printable
 
 from .bar_directions import reasons
 from .canonical import elementary_mixture, principal_directions

@@ -11,23 +11,22 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation.gauss_newton import fitted_covariance
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
+from ballplate.simulator.experiment.load import place_in
+from ballplate.simulator.experiment.messages import ExperimentError, Message, Steps, format_path
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
+from ballplate.simulator.geometry.motions import rotation_from_vector, vector_from_rotation
+from ballplate.simulator.machines.metric import Scale
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.settings import MetricSettings, build_error_model
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.simulator.settings import listing
+from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
-
-from simulator.design import Design, State
-from simulator.estimation.gauss_newton import fitted_covariance
-from simulator.estimation.parameters import SharedLayout
-from simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
-from simulator.experiment.load import place_in
-from simulator.experiment.messages import ExperimentError, Message, Steps, format_path
-from simulator.experiment.model import Experiment
-from simulator.geometry.axes import PlateAxes, in_plate_axes
-from simulator.geometry.motions import rotation_from_vector, vector_from_rotation
-from simulator.machines.metric import Scale
-from simulator.machines.protocol import Array
-from simulator.machines.settings import MetricSettings, build_error_model
-from simulator.readings import ObservedReadings
-from simulator.settings import listing
-from simulator.threads import single_threaded
 
 from .plates import axes_of_plates
 from .study import Fit, ParameterEstimate, fit

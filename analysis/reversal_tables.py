@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-
-from simulator.geometry.axes import axes_words
+from ballplate.simulator.geometry.axes import axes_words
 
 from .reversal import ReversalFit
 from .tables import MOST_BALLS, SHOWN, aligned, fit_data, number, to_uncertainty

@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-
-from simulator.design import Design, State, nominal_state, probe_offsets
-from simulator.estimation.covariance import Covariance, shared_covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.settings import listing
+from ballplate.simulator.design import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.estimation.covariance import Covariance, shared_covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.settings import listing
 
 from .corrections import correction_rows
 from .pairs import PairSummary

@@ -6,22 +6,21 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
-from simulator.estimation.covariance import Covariance, covariance, shared_covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import Solution, estimate, fitted_covariance
-from simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
-from simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
-from simulator.experiment.model import Experiment
-from simulator.experiment.yamltree import Mark
-from simulator.geometry.motions import vector_from_rotation
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array, Unit
-from simulator.machines.spatial_metric import SpatialMetricModel
-from simulator.readings import ObservedReadings
-from simulator.rounding import comparable
-from simulator.threads import single_threaded
+from ballplate.simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
+from ballplate.simulator.estimation.covariance import Covariance, covariance, shared_covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import Solution, estimate, fitted_covariance
+from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
+from ballplate.simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.yamltree import Mark
+from ballplate.simulator.geometry.motions import vector_from_rotation
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array, Unit
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.threads import single_threaded
 
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
 from .plates import PlateCoordinates, plate_coordinates

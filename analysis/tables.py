@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from simulator.rounding import printable
+from ballplate.simulator.rounding import printable
 
 from .adjustments import ARCSECOND, Adjustment, freedom_words
 from .plates import PlateCoordinates

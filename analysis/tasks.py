@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.design import Design, State
-from simulator.estimation.covariance import Covariance
-from simulator.estimation.parameters import SharedLayout
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation.covariance import Covariance
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array
 
 from .corrections import corrected_points, correction_rows
 

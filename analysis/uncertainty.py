@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from simulator.design import Design, State
-from simulator.estimation.covariance import Covariance, blank
-from simulator.estimation.parameters import SharedLayout
-from simulator.machines.protocol import Array
-from simulator.quantities import LengthFunction, Target
-from simulator.rounding import comparable
-from simulator.threads import single_threaded
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation.covariance import Covariance, blank
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.quantities import LengthFunction, Target
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.threads import single_threaded
 
 from .corrections import corrected_points, correction_rows
 from .pairs import PairSummary, all_pairs

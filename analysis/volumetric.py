@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-
-from simulator.machines.arrangement import AXES
-from simulator.machines.curves import Points
-from simulator.machines.description import (
+from ballplate.simulator.machines.arrangement import AXES
+from ballplate.simulator.machines.curves import Points
+from ballplate.simulator.machines.description import (
     Combination,
     MachineDescription,
     ParametricError,
@@ -22,9 +21,9 @@ from simulator.machines.description import (
     stated_function,
     true_volumetric,
 )
-from simulator.machines.kinematic import KinematicModel, error_function
-from simulator.machines.protocol import Array, TrueMachine
-from simulator.machines.volumetric import VolumetricModel, squareness_field, thermal_field
+from ballplate.simulator.machines.kinematic import KinematicModel, error_function
+from ballplate.simulator.machines.protocol import Array, TrueMachine
+from ballplate.simulator.machines.volumetric import VolumetricModel, squareness_field, thermal_field
 
 # Points of a grid or a line: each takes half a kilobyte.
 MOST_POINTS = 200_000

@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-
-from simulator.machines.arrangement import AXES, Arrangement
-from simulator.machines.curves import NAMES
-from simulator.machines.protocol import Array, Parameter
-from simulator.machines.volumetric import SQUARENESS, meaning, symbol
-from simulator.quantities import format_length
-from simulator.rounding import comparable
-from simulator.settings import hint, listing
+from ballplate.simulator.machines.arrangement import AXES, Arrangement
+from ballplate.simulator.machines.curves import NAMES
+from ballplate.simulator.machines.protocol import Array, Parameter
+from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
+from ballplate.simulator.quantities import format_length
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.settings import hint, listing
 
 from .tables import SHOWN, aligned, number
 from .volumetric import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes

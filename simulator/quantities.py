@@ -158,7 +158,7 @@ def parse_positive_length(value: object) -> float:
     >>> parse_positive_length("0 mm")
     Traceback (most recent call last):
     ...
-    simulator.quantities.QuantityError: "0 mm" must be above zero; give a small one, such as 1 nm
+    ballplate.simulator.quantities.QuantityError: "0 mm" must be above zero; give a small one, such as 1 nm
     """
     return _positive(value, parse_length(value))
 

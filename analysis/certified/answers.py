@@ -6,11 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-
-from simulator.design import Design, State, probe_offsets
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.simulator.design import Design, State, probe_offsets
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.readings import read_readings
 
 from ..study import fit, plan
 from ..uncertainty import Quantity

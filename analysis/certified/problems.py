@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.settings import hint, shorten
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.settings import hint, shorten
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], Non
     options = parser().parse_args(arguments)
     options.answer_interruption = answer_interruption
     # Loaded only now, so that --help and wrong usage answer at once.
-    from simulator.experiment.messages import ExperimentError
+    from ballplate.simulator.experiment.messages import ExperimentError
 
     from ..internal_error import InternalError
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
 
 EXISTS = "exists already; name a new file, or overwrite it with --force"
@@ -98,7 +98,7 @@ def refuse_existing(*paths: Path | None) -> None:
 
     :raises ExperimentError: one of the files is there already.
     """
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     found = [path for path in paths if path is not None and path.exists()]
     if found:
@@ -110,7 +110,7 @@ def write(path: Path, text: str, force: bool = False) -> None:
 
     :raises ExperimentError: there is such a file already, or it cannot be written.
     """
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     try:
         with path.open("w" if force else "x", encoding="utf-8", newline="") as stream:
@@ -128,7 +128,7 @@ def write_all(writers: Mapping[Path, Callable[[TextIO], None]], force: bool = Fa
 
     :raises ExperimentError: without `force` there is one already, or one cannot be written.
     """
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     files = [path for path in writers if str(path) != "-"]
     made = []
@@ -160,9 +160,9 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
 
     :raises ExperimentError: the errors of all files together.
     """
-    from simulator.experiment.load import load
-    from simulator.experiment.messages import ExperimentError, Message
-    from simulator.experiment.variants import unknown_variants
+    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.variants import unknown_variants
 
     found: list[Experiment] = []
     messages: list[Message] = []
@@ -188,7 +188,7 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
 
     :raises ExperimentError: the file has several variants and none was chosen.
     """
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     found = experiments(options, planning)
     if len(found) > 1:

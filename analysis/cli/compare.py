@@ -56,7 +56,7 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
 
 
 def _length(text: str) -> float:
-    from simulator.quantities import QuantityError, parse_length
+    from ballplate.simulator.quantities import QuantityError, parse_length
 
     try:
         return parse_length(text)

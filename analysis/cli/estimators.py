@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
-    from simulator.readings import ObservedReadings
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.readings import ObservedReadings
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def warn_of_other_methods(store: Store, sweep: int) -> None:
 
 def run(options: Namespace) -> int:
     """Write the table."""
-    from simulator.spreadsheets import cell_of_text
+    from ballplate.simulator.spreadsheets import cell_of_text
 
     from ..sweeps.frame import frame
     from ..sweeps.store import StoreError, chosen_sweep, open_store

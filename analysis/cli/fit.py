@@ -12,8 +12,8 @@ from .compare import add_pairs
 from .estimators import ESTIMATORS
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
-    from simulator.readings import ObservedReadings
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.readings import ObservedReadings
 
     from ..study import Fit
 
@@ -77,11 +77,11 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
-    from simulator.certificates import read_certificate
-    from simulator.layout import lay_out
-    from simulator.misreading_messages import doubts_about_lengths, doubts_about_volume
-    from simulator.readings import read_readings
-    from simulator.settings import listing
+    from ballplate.simulator.certificates import read_certificate
+    from ballplate.simulator.layout import lay_out
+    from ballplate.simulator.misreading_messages import doubts_about_lengths, doubts_about_volume
+    from ballplate.simulator.readings import read_readings
+    from ballplate.simulator.settings import listing
 
     from ..study import fit
     from ..tables import fit_data, fit_lines

@@ -23,7 +23,7 @@ def run(options: Namespace) -> int:
     """Write the file unless it exists."""
     from importlib.resources import files
 
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     name, command = ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .common import add_file, add_json, draw, picture, print_json, print_lines, single
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
     from ..lengths import Settings
 
@@ -117,8 +117,8 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
     """What was asked for, or why it cannot be."""
     import math
 
-    from simulator.quantities import QuantityError, parse_length_function
-    from simulator.settings import hint
+    from ballplate.simulator.quantities import QuantityError, parse_length_function
+    from ballplate.simulator.settings import hint
 
     from ..lengths import MOST_POINTS, Settings
     from ..tasks import expansion

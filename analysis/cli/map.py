@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from .common import count, draw, picture, print_json, print_lines
 
 if TYPE_CHECKING:
-    from simulator.machines.description import Three
-    from simulator.machines.protocol import Array
+    from ballplate.simulator.machines.description import Three
+    from ballplate.simulator.machines.protocol import Array
 
     from ..volumetric import AlongAxis, Volumetric
 
@@ -80,7 +80,7 @@ def _points(text: str) -> int:
 
 
 def _line(text: str) -> dict[str, float] | tuple[Three, Three]:
-    from simulator.experiment.error_tables import LineError, parse_line, parse_point
+    from ballplate.simulator.experiment.error_tables import LineError, parse_line, parse_point
 
     try:
         start, to, end = text.partition(" to ")
@@ -100,9 +100,8 @@ def _line(text: str) -> dict[str, float] | tuple[Three, Three]:
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
     import numpy as np
-
-    from simulator.experiment.machine_file import load_machine
-    from simulator.experiment.messages import Message
+    from ballplate.simulator.experiment.machine_file import load_machine
+    from ballplate.simulator.experiment.messages import Message
 
     from ..volumetric import Volumetric, along_axes
 

@@ -24,7 +24,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
     from ..planning.campaign import Campaign
     from ..planning.schedule import RunSheet
@@ -115,8 +115,8 @@ def _sheet(text: str) -> Path:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
-    from simulator.experiment.load import load
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget

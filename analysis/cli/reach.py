@@ -51,7 +51,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
-    from simulator.quantities import QuantityError, parse_length_function
+    from ballplate.simulator.quantities import QuantityError, parse_length_function
 
     from ..goals import GoalError, parse_goal
     from ..reach.search import reach

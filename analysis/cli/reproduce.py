@@ -67,7 +67,7 @@ def run(options: Namespace) -> int:
         print("ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr)
         return WRONG_USAGE
 
-    from simulator.settings import hint
+    from ballplate.simulator.settings import hint
 
     from ..reproduction.compare import reproduce
     from ..reproduction.published import npl

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .common import add_file, add_json, count, percentage, seed
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
     from ..montecarlo.study import Trials
 

@@ -39,20 +39,19 @@ def run(options: Namespace) -> int:
     from dataclasses import replace
 
     import numpy as np
-
-    from simulator.certificates import certified_values, drawn_values, with_values, write_certificate
-    from simulator.experiment.load import message_at
-    from simulator.experiment.messages import ExperimentError, Message
-    from simulator.generate import (
+    from ballplate.simulator.certificates import certified_values, drawn_values, with_values, write_certificate
+    from ballplate.simulator.experiment.load import message_at
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.generate import (
         NoReadingError,
         exact_readings,
         noisy_readings,
         on_true_machine,
         true_artefacts,
     )
-    from simulator.layout import lay_out
-    from simulator.machines.truth import true_machine
-    from simulator.readings import write_readings
+    from ballplate.simulator.layout import lay_out
+    from ballplate.simulator.machines.truth import true_machine
+    from ballplate.simulator.readings import write_readings
 
     from .common import single, write_all
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from .common import count, draw, picture, print_json, print_lines
 
 if TYPE_CHECKING:
-    from simulator.experiment.messages import ExperimentError
-    from simulator.splines.problems import SplineError
-    from simulator.splines.read import Column, Points
+    from ballplate.simulator.experiment.messages import ExperimentError
+    from ballplate.simulator.splines.problems import SplineError
+    from ballplate.simulator.splines.read import Column, Points
 
     from ..curve import CurveSettings, Place
 
@@ -114,10 +114,9 @@ POWERS = "polynomials in the distance from the start of each piece (default), or
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
     import numpy as np
-
-    from simulator.experiment.messages import in_one_line
-    from simulator.splines.problems import SplineError
-    from simulator.splines.read import choose_points, read_points
+    from ballplate.simulator.experiment.messages import in_one_line
+    from ballplate.simulator.splines.problems import SplineError
+    from ballplate.simulator.splines.read import choose_points, read_points
 
     from ..curve import fit_curve
     from ..curve_tables import coefficients_csv, curve_data, curve_lines
@@ -168,7 +167,7 @@ def run(options: Namespace) -> int:
 
 def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
     """The problems with places in the unit of the abscissa."""
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.messages import ExperimentError, Message
 
     from ..curve_tables import shown
 
@@ -244,13 +243,13 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
 
 
 def _parser(kind: str) -> Callable[[object], float]:
-    from simulator.quantities import parse_angle, parse_length
+    from ballplate.simulator.quantities import parse_angle, parse_length
 
     return parse_length if kind == "length" else parse_angle
 
 
 def _quantity(option: str, text: str, kind: str) -> float:
-    from simulator.quantities import QuantityError
+    from ballplate.simulator.quantities import QuantityError
 
     if text.strip() in ("0", "-0", "0.0"):
         return 0.0
@@ -285,7 +284,7 @@ def _place(option: str, text: str, column: Column) -> Place:
 
 def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> float:
     """A value of the error, or a slope as a unit of the error over one of the abscissa."""
-    from simulator.quantities import UNITS, QuantityError, metres_or_radians, parse_ratio
+    from ballplate.simulator.quantities import UNITS, QuantityError, metres_or_radians, parse_ratio
 
     if derivative == 0:
         return _quantity(option, text, y.kind)

@@ -8,19 +8,18 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-
-from simulator.design import Design, Priors, nominal_state
-from simulator.estimation.covariance import spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import message_at
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.generate import NoReadingError, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.joined import JoinedModel
-from simulator.machines.truth import true_machine
-from simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
+from ballplate.simulator.design import Design, Priors, nominal_state
+from ballplate.simulator.estimation.covariance import spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import message_at
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import NoReadingError, on_true_machine
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.joined import JoinedModel
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
 
 from .figures import Outcome, outcome, power_of_difference, power_of_misfit
 from .tally import Tally

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from simulator.settings import listing
+from ballplate.simulator.settings import listing
 
 from ..tables import aligned, number, shown_unit
 from .figures import BEYOND, Comparison, Figure, Outcome

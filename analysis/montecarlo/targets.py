@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.design import Integers, probe_offsets
-from simulator.estimation.covariance import Covariance, covariance
-from simulator.estimation.observations import offset_sensitivity
-from simulator.geometry.motions import vector_from_rotation
-from simulator.machines.protocol import Array
-from simulator.montecarlo.reference import Reference
-from simulator.montecarlo.replicates import Deviations
-from simulator.threads import single_threaded
+from ballplate.simulator.design import Integers, probe_offsets
+from ballplate.simulator.estimation.covariance import Covariance, covariance
+from ballplate.simulator.estimation.observations import offset_sensitivity
+from ballplate.simulator.geometry.motions import vector_from_rotation
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.montecarlo.reference import Reference
+from ballplate.simulator.montecarlo.replicates import Deviations
+from ballplate.simulator.threads import single_threaded
 
 # Distances that are followed through all replicates; a sample of the pairs where there are more.
 MOST_PAIRS = 1000

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from simulator.montecarlo.reference import Reference
-from simulator.montecarlo.replicates import BATCH, estimate_batch
-from simulator.threads import single_threaded
+from ballplate.simulator.montecarlo.reference import Reference
+from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.threads import single_threaded
 
 from ..processes import in_processes
 from .figures import Outcome, outcome

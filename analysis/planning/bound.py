@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
-from simulator.threads import single_threaded
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.threads import single_threaded
 
 from ..internal_error import InternalError
 from .search import Losses, Problem, counted_root, fill, full_root, square_root

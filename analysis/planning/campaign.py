@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import AtMost, Candidate, Pool, with_chosen
-from simulator.rounding import comparable
-from simulator.settings import listing
-from simulator.threads import single_threaded
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import AtMost, Candidate, Pool, with_chosen
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.settings import listing
+from ballplate.simulator.threads import single_threaded
 
 from ..processes import in_processes
 from ..study import Plan, plan

@@ -13,13 +13,12 @@ from functools import cached_property
 from typing import Literal, Protocol, get_args
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.estimation.observations import offset_sensitivity
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Integers
+from ballplate.simulator.estimation.observations import offset_sensitivity
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.machines.protocol import Array
 
 from ..tasks import task_differences, task_rows
 from .information import Information

@@ -12,24 +12,23 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-
-from simulator.experiment.messages import ExperimentError, format_path, in_one_line
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate
-from simulator.experiment.problems import Problems
-from simulator.experiment.sections import ExperimentSettings
-from simulator.experiment.variants import variant_trees
-from simulator.experiment.yamltree import (
+from ballplate.simulator.experiment.messages import ExperimentError, format_path, in_one_line
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import Candidate
+from ballplate.simulator.experiment.problems import Problems
+from ballplate.simulator.experiment.sections import ExperimentSettings
+from ballplate.simulator.experiment.variants import variant_trees
+from ballplate.simulator.experiment.yamltree import (
     LOADER,
     parse_tree,
     read_text,
     resolve_scalar,
     to_python,
 )
-from simulator.experiment.yamltree import (
+from ballplate.simulator.experiment.yamltree import (
     Mapping as MappingNode,
 )
-from simulator.machines.custom import module_file
+from ballplate.simulator.machines.custom import module_file
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 SCHEMA_LINE = "# yaml-language-server:"

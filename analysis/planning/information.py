@@ -15,18 +15,17 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
-
-from simulator.design import Design
-from simulator.estimation.covariance import EXACT
-from simulator.estimation.elimination import ALIKE
-from simulator.estimation.graded import Collected, Triangle
-from simulator.estimation.graded import triangle as triangular
-from simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate
-from simulator.machines.protocol import Array
-from simulator.threads import scipy_linalg, single_threaded
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.covariance import EXACT
+from ballplate.simulator.estimation.elimination import ALIKE
+from ballplate.simulator.estimation.graded import Collected, Triangle
+from ballplate.simulator.estimation.graded import triangle as triangular
+from ballplate.simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import Candidate
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.threads import scipy_linalg, single_threaded
 
 from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_rows
 

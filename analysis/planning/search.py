@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
-from simulator.threads import scipy_linalg, single_threaded
+from ballplate.simulator.design import Integers
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.threads import scipy_linalg, single_threaded
 
 from .constraints import Constraints
 from .criteria import Criterion

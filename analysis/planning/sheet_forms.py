@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from simulator.experiment.messages import in_one_line
-from simulator.experiment.model import Experiment
-from simulator.quantities import format_duration
-from simulator.spreadsheets import CsvWriter
+from ballplate.simulator.experiment.messages import in_one_line
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.quantities import format_duration
+from ballplate.simulator.spreadsheets import CsvWriter
 
 from ..tables import aligned
 from .drawings import place_drawing

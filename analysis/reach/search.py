@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-
-from simulator.experiment.load import build, tree_of
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.variants import override
-from simulator.experiment.yamltree import Mapping, Node, Scalar
-from simulator.rounding import comparable
-from simulator.settings import listing
-from simulator.threads import single_threaded
+from ballplate.simulator.experiment.load import build, tree_of
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import override
+from ballplate.simulator.experiment.yamltree import Mapping, Node, Scalar
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.settings import listing
+from ballplate.simulator.threads import single_threaded
 
 from ..goals import Goal, Judgement, check_goal, judge
 from ..study import Worth, plan, worth

@@ -9,12 +9,12 @@ from fractions import Fraction
 from itertools import product
 from typing import Literal
 
-from simulator.experiment.model import Experiment
-from simulator.experiment.variants import node_at, override
-from simulator.experiment.yamltree import Mapping, Node, Scalar, Sequence, child
-from simulator.geometry.artefacts import GridSettings, SquareSettings
-from simulator.quantities import LengthFunction, format_length, parse_length_function
-from simulator.settings import hint, listing
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import node_at, override
+from ballplate.simulator.experiment.yamltree import Mapping, Node, Scalar, Sequence, child
+from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
+from ballplate.simulator.quantities import LengthFunction, format_length, parse_length_function
+from ballplate.simulator.settings import hint, listing
 
 from .steps import at_step, exact, round_down, round_up, step_of, times
 

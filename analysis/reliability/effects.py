@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from simulator.design import Design, Integers, State
-from simulator.estimation.covariance import Covariance, blank
-from simulator.estimation.parameters import SharedLayout
-from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
+from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.estimation.covariance import Covariance, blank
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import comparable
 
 from ..corrections import corrected_points, correction_rows
 from .response import Response

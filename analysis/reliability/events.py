@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-
-from simulator.design import Integers
+from ballplate.simulator.design import Integers
 
 from .patterns import Kind, Patterns
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from simulator.design import Design, Integers
-from simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.design import Design, Integers
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
 
 from .patterns import Patterns
 

@@ -12,10 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-
-from simulator.design import Design, Integers, State, locations, probe_offsets
-from simulator.estimation.hat import RowPlaces, row_places
-from simulator.estimation.observations import (
+from ballplate.simulator.design import Design, Integers, State, locations, probe_offsets
+from ballplate.simulator.estimation.hat import RowPlaces, row_places
+from ballplate.simulator.estimation.observations import (
     expected_readings,
     length_directions,
     length_values,
@@ -23,12 +22,11 @@ from simulator.estimation.observations import (
     reading_weights,
     rotation_sensitivity,
 )
-from simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array
 
 if TYPE_CHECKING:
+    from ballplate.simulator.whitening import Whitening
     from scipy.sparse import csc_array
-
-    from simulator.whitening import Whitening
 
 Kind = Literal[
     "reading", "length", "prior", "coordinate", "distance", "end", "ball", "moved", "shift", "turn", "probe",

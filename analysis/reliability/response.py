@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from simulator.design import Design, Integers, State
-from simulator.estimation.covariance import Covariance
-from simulator.estimation.hat import hat_rows
-from simulator.estimation.parameters import SharedLayout
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.estimation.covariance import Covariance
+from ballplate.simulator.estimation.hat import hat_rows
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array
 
 from .patterns import Patterns
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from simulator.design import Design, Integers, reading_uncertainties
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, Integers, reading_uncertainties
+from ballplate.simulator.machines.protocol import Array
 
 from .leftover import Leftover
 

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.design import Design, Integers, State
-from simulator.estimation.gauss_newton import Solution
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
+from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.threads import single_threaded
 
 from .events import SLIP, Cause, cause, event_groups, whole
 from .leftover import HIDDEN, Columns, Leftover, leftover, orthonormal

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from ballplate.simulator.design import Design, Integers, State, probe_offsets
+from ballplate.simulator.estimation.observations import length_directions, reading_weights, rotation_sensitivity
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
-
-from simulator.design import Design, Integers, State, probe_offsets
-from simulator.estimation.observations import length_directions, reading_weights, rotation_sensitivity
-from simulator.estimation.parameters import AXIS_NAMES
-from simulator.machines.protocol import Array
 
 # Scale readings closer than this (m) count as the same place on a scale.
 SAME_PLACE = 1e-3

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from simulator.design import Design, Integers, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.hat import row_places
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
+from ballplate.simulator.design import Design, Integers, nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.hat import row_places
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.threads import single_threaded
 
 from .effects import SYMBOLS, Functions, Largest, ball_distances, error_functions, point_distances
 from .events import event_groups

@@ -7,11 +7,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.estimation.parameters import AXIS_NAMES
-from simulator.rounding import comparable
-from simulator.spreadsheets import CsvWriter
+from ballplate.simulator.design import Integers
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.spreadsheets import CsvWriter
 
 from ..tables import SHOWN, aligned, finite, number
 from .effects import MOST_PLACES, SYMBOLS

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array
 
 # Below this, chances come from the leading term of their series.
 SMALLEST = 1e-280

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.estimation.parameters import AXIS_NAMES
-from simulator.experiment.yamltree import Mark
-from simulator.settings import listing
+from ballplate.simulator.design import Integers
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.experiment.yamltree import Mark
+from ballplate.simulator.settings import listing
 
 from ..tables import SHOWN, number
 from .names import common_ball, length_name, name, reading_name

@@ -6,9 +6,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.yamltree import read_tree
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.yamltree import read_tree
 
 from ..sweeps.bundle import Bundle, has_code, unpack
 from ..sweeps.load import experiment_of, load_sweep

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from simulator.rounding import comparable
-from simulator.splines.read import Points
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.splines.read import Points
 
 from ..curve import Curve, whole_profile
 from ..curve_tables import derivative_unit, shown

@@ -7,7 +7,7 @@ import re
 import textwrap
 from collections.abc import Callable, Sequence
 
-from simulator.spreadsheets import CsvWriter
+from ballplate.simulator.spreadsheets import CsvWriter
 
 from ..tables import aligned
 from .tables import Block, Row, Table

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
-
-from simulator.machines.protocol import Array
 
 from ..length_tables import target_words
 from ..lengths import LengthMap

@@ -10,10 +10,9 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.settings import listing
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.settings import listing
 
 from ..sweeps.store import Store
 from ..tables import number, percent, uncertainty_words

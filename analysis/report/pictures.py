@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array
 
 from ..tables import number
 from .scene import Place, Scene

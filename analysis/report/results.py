@@ -9,9 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.quantities import QUANTITY, exact_number
 from numpy.typing import NDArray
-
-from simulator.quantities import QUANTITY, exact_number
 
 from ..sweeps.columns import MORE, symbol_column
 from ..sweeps.frame import frame

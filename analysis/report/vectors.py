@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from simulator.machines.protocol import Array
-from simulator.readings import ObservedReadings
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings import ObservedReadings
 
 from ..reversal import ReversalFit
 from ..study import Fit, reading_residuals

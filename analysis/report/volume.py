@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from simulator.design import nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.threads import single_threaded
 
 from ..uncertainty import point_pairs
 

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.machines.protocol import Array
-from simulator.machines.volumetric import meaning, symbol
-from simulator.rounding import comparable
+from ballplate.simulator.design import Integers
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.volumetric import meaning, symbol
+from ballplate.simulator.rounding import comparable
 
 from ..tables import SHOWN, number
 from ..volumetric import AlongAxis, LengthErrors, VolumetricErrors

@@ -6,16 +6,15 @@ Three of its six quantities depend on choices that it does not state; these give
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.design import Design, State, nominal_state, pose_size
+from ballplate.simulator.estimation.covariance import Covariance, covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.observations import rotation_sensitivity
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
-
-from simulator.design import Design, State, nominal_state, pose_size
-from simulator.estimation.covariance import Covariance, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.observations import rotation_sensitivity
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
 
 from ..pairs import pair_tiles
 from ..uncertainty import Quantity, summarise

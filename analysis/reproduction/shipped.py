@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings
-from simulator.settings import hint
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import exact_readings, on_true_machine
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.simulator.settings import hint
 
 from ..study import Fit, Plan, fit, plan
 from ..uncertainty import Quantity

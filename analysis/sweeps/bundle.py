@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.modules import python_models
-from simulator.experiment.yamltree import Node, read_tree, to_python
+from ballplate.simulator.experiment.messages import ExperimentError, Message
+from ballplate.simulator.experiment.modules import python_models
+from ballplate.simulator.experiment.yamltree import Node, read_tree, to_python
 
 from .model import Sweep
 from .named_files import named_files

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.settings import PythonSettings
+from ballplate.simulator.settings import Settings
 from pydantic import BaseModel
-
-from simulator.experiment.model import Experiment
-from simulator.machines.settings import PythonSettings
-from simulator.settings import Settings
 
 # The methods that figures and verdicts have been computed by, and what each corrected of the one before. A new one
 # begins whenever any experiment comes to other figures or another verdict; its number is part of every cell's key.

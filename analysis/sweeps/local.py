@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.messages import ExperimentError
 
 from ..processes import in_processes
 from .bundle import Bundle, bundle_of, files_of

@@ -10,10 +10,10 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.modules import python_models
-from simulator.experiment.yamltree import Mapping, Node, Scalar, read_tree
-from simulator.experiment.yamltree import Sequence as Entries
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.modules import python_models
+from ballplate.simulator.experiment.yamltree import Mapping, Node, Scalar, read_tree
+from ballplate.simulator.experiment.yamltree import Sequence as Entries
 
 from .model import Sweep
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
+from ballplate.simulator.experiment.sections import Line, Seed
+from ballplate.simulator.geometry.artefacts import Name
+from ballplate.simulator.settings import FORM, Settings
 from pydantic import Field, Tag
-
-from simulator.experiment.sections import Line, Seed
-from simulator.geometry.artefacts import Name
-from simulator.settings import FORM, Settings
 
 Quantity = Literal["U1", "U2", "U3", "U4", "U5", "U6", "tasks"]
 QUANTITIES: tuple[Quantity, ...] = ("U1", "U2", "U3", "U4", "U5", "U6")

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import Integers
+from ballplate.simulator.machines.protocol import Array
 
 from ..montecarlo.tally import QuantityTally, Tally
 from .fingerprint import METHOD, METHODS, method_of

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.threads import single_threaded
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.threads import single_threaded
 
 from ..montecarlo.figures import Figure, Outcome
 from ..montecarlo.study import Trials, block_of_trials, combined, trials

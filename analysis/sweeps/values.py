@@ -8,9 +8,9 @@ from fractions import Fraction
 from itertools import combinations
 from typing import Any
 
-from simulator.experiment.yamltree import Mapping, Node, Scalar, Sequence, child, to_python
-from simulator.quantities import QUANTITY, QuantityError, exact_number, parse_angle, parse_length, parse_ratio
-from simulator.settings import shorten
+from ballplate.simulator.experiment.yamltree import Mapping, Node, Scalar, Sequence, child, to_python
+from ballplate.simulator.quantities import QUANTITY, QuantityError, exact_number, parse_angle, parse_length, parse_ratio
+from ballplate.simulator.settings import shorten
 
 from .model import Unit
 
@@ -24,7 +24,7 @@ KINDS: tuple[tuple[Unit, Callable[[object], float]], ...] = (
 def label(node: Node) -> str:
     """A value as a short text.
 
-    >>> from simulator.experiment.yamltree import parse_tree
+    >>> from ballplate.simulator.experiment.yamltree import parse_tree
     >>> label(parse_tree("[5, 750 mm]", ""))
     '[5, 750 mm]'
     """

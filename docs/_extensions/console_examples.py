@@ -46,14 +46,14 @@ LANGUAGES = {".yaml": "yaml", ".yml": "yaml", ".py": "python"}
 TERMINAL = {"COLUMNS": "100", "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "PYTHONPATH": str(TOP), "TERM": "dumb"}
 # What the commands load when they are run; loaded before, it takes no time for each of them.
 LOADED_BEFORE = (
-    "analysis.annotations",
-    "analysis.cli",
-    "analysis.junit",
-    "analysis.montecarlo.study",
-    "analysis.montecarlo.tables",
+    "ballplate.annotations",
+    "ballplate.cli",
+    "ballplate.junit",
+    "ballplate.montecarlo.study",
+    "ballplate.montecarlo.tables",
     "matplotlib.figure",
-    "simulator.generate",
-    "simulator.readings",
+    "ballplate.simulator.generate",
+    "ballplate.simulator.readings",
     "scipy.interpolate",
     "scipy.linalg",
     "scipy.spatial",
@@ -181,7 +181,7 @@ def _command(command: str) -> Callable[[], int]:
         return lambda: os.execvp("bash", ["bash", "-o", "pipefail", "-c", command])
 
     def run() -> int:
-        from analysis.cli import main
+        from ballplate.cli import main
 
         return main(shlex.split(command)[1:])
 
@@ -233,7 +233,7 @@ def _tools() -> str:
     if not _TOOLS:
         _TOOLS.append(tempfile.TemporaryDirectory(prefix="ballplate-docs-"))
         program = Path(_TOOLS[0].name, "ballplate")
-        code = "import sys; from analysis.cli import main; sys.exit(main())"
+        code = "import sys; from ballplate.cli import main; sys.exit(main())"
         program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -c {shlex.quote(code)} "$@"\n', "utf-8")
         program.chmod(0o755)
     return _TOOLS[0].name

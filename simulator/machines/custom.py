@@ -180,7 +180,7 @@ def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:
         if not isinstance(parameter, Parameter):
             raise CustomModelError(
                 f"{name}: parameters has an entry of type {type(parameter).__name__}; each must be a Parameter of "
-                "simulator.machines.protocol"
+                "ballplate.simulator.machines.protocol"
             )
         if parameter.unit not in ("m", "rad", "1"):
             raise CustomModelError(f'{name}: the unit of "{parameter.name}" is "{parameter.unit}"; known: m, rad, 1')

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-
-from analysis.rank import Verdict
-from analysis.study import check, plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
+from ballplate.rank import Verdict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.study import check, plan
 
 FOLDER = Path("designs/hurt_foss")
 NO_LENGTH = "no length is known (bar: length): the overall scale of the machine stays open until one is calibrated"

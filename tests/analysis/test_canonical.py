@@ -8,19 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.canonical import elementary_mixture, principal_directions
+from ballplate.rank import null_directions, verdict
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.quantities import LengthFunction, Target
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-
-from analysis.canonical import elementary_mixture, principal_directions
-from analysis.rank import null_directions, verdict
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.quantities import LengthFunction, Target
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 NOISE = 1e-12

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.simulator.design import Design, State, nominal_state
+from ballplate.simulator.estimation.covariance import Covariance, covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.generate import noisy_certificate, noisy_readings
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.quantities import LengthFunction, Target
+from ballplate.uncertainty import Quantity, uncertainties
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.uncertainty import Quantity, uncertainties
-from simulator.design import Design, State, nominal_state
-from simulator.estimation.covariance import Covariance, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import gauss_newton
-from simulator.estimation.initial import initial_state
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.generate import noisy_certificate, noisy_readings
-from simulator.geometry.motions import rotation_from_vector
-from simulator.quantities import LengthFunction, Target
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
 seeds = st.integers(0, 2**31)
@@ -189,7 +189,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
 @pytest.mark.parametrize("size", [1, 3, 5])
 def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     expected, _, _ = judged(small_design(4))
-    monkeypatch.setattr("analysis.pairs.TILE", size)
+    monkeypatch.setattr("ballplate.pairs.TILE", size)
     found, _, _ = judged(small_design(4))
     for symbol in ("U5", "U6"):
         assert_same(found[symbol], expected[symbol])
@@ -199,7 +199,7 @@ def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None
 @pytest.mark.parametrize("rows", [10, 64, 100_000])
 def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
     expected, _, _ = judged(small_design(4, "neighbours"))
-    monkeypatch.setattr("simulator.estimation.elimination.ROWS_AT_ONCE", rows)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.ROWS_AT_ONCE", rows)
     found, _, _ = judged(small_design(4, "neighbours"))
     for symbol, quantity in expected.items():
         assert_same(found[symbol], quantity)

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.lengths import (
+from ballplate.cli import main
+from ballplate.lengths import (
     Groups,
     Settings,
     class_edges,
@@ -22,11 +21,12 @@ from analysis.lengths import (
     length_map,
     length_pairs,
 )
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.quantities import LengthFunction
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.quantities import LengthFunction
+from ballplate.study import plan
+
 from tests.reference import dense
 
 TEXT = (

@@ -8,22 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from ballplate.plates import axes_of_plates, plate_coordinates
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.covariance import covariance
+from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import noisy_readings, on_true_machine
+from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.study import Fit, fit
 from numpy.typing import NDArray
-
-from analysis.plates import axes_of_plates, plate_coordinates
-from analysis.study import Fit, fit
-from simulator.design import Design
-from simulator.estimation.covariance import covariance
-from simulator.estimation.gauss_newton import gauss_newton
-from simulator.estimation.initial import initial_state
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import noisy_readings, on_true_machine
-from simulator.geometry.axes import PlateAxes, in_plate_axes
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")
 DISTANCES = [{"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.3 um"}]

@@ -8,15 +8,14 @@ from decimal import Decimal
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
+from ballplate.goals import Goal, GoalError, parse_goal
+from ballplate.reach.search import Answer, reach
+from ballplate.reach.steps import at_step, round_down, round_up, step_of
+from ballplate.reach.unknowns import NotVariableError
+from ballplate.simulator.experiment.load import load
+from ballplate.study import Plan, plan
 from scipy.optimize import brentq
-
-from analysis.cli import main
-from analysis.goals import Goal, GoalError, parse_goal
-from analysis.reach.search import Answer, reach
-from analysis.reach.steps import at_step, round_down, round_up, step_of
-from analysis.reach.unknowns import NotVariableError
-from analysis.study import Plan, plan
-from simulator.experiment.load import load
 
 TEXT = (
     Path("designs/quickstart.yaml")

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.scale import (
+from ballplate.cli import main
+from ballplate.scale import (
     EXACT_OFFSETS,
     OWN_SCALES,
     can_stretch,
@@ -19,13 +18,14 @@ from analysis.scale import (
     scale_uncertainty,
     with_offsets,
 )
-from analysis.study import check, plan
-from analysis.tables import plan_lines
-from simulator.design import nominal_state
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.study import check, plan
+from ballplate.tables import plan_lines
+
 from tests.reference import dense
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")

@@ -9,20 +9,19 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.corrections import correction_rows
-from analysis.lengths import Settings, length_map
-from analysis.rank import Verdict, weak_limit
-from analysis.study import check, plan
-from analysis.tables import percent, plan_lines
-from simulator.design import nominal_state
-from simulator.estimation.covariance import spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
+from ballplate.cli import main
+from ballplate.corrections import correction_rows
+from ballplate.lengths import Settings, length_map
+from ballplate.rank import Verdict, weak_limit
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.covariance import spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.study import check, plan
+from ballplate.tables import percent, plan_lines
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 TASKS = """\

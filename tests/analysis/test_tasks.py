@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.simulator.design import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.layout import lay_out
+from ballplate.study import plan
+from ballplate.tables import plan_data, plan_lines
+from ballplate.tasks import share_within, task_differences, task_rows
 
-from analysis.study import plan
-from analysis.tables import plan_data, plan_lines
-from analysis.tasks import share_within, task_differences, task_rows
-from simulator.design import Design, State, nominal_state, probe_offsets
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
 from tests.analysis.test_invariants import judged, small_design
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")

@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.constraints import Budget, constraints
-from analysis.planning.criteria import criterion
-from analysis.planning.information import Information, pool_information
-from analysis.planning.search import Losses, Problem, best_addition, counted_root, full_root
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.pool import with_chosen
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
+from ballplate.planning.constraints import Budget, constraints
+from ballplate.planning.criteria import criterion
+from ballplate.planning.information import Information, pool_information
+from ballplate.planning.search import Losses, Problem, best_addition, counted_root, full_root
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.threads import single_threaded
+from ballplate.study import plan
 
 POOL = Path("designs/planning/plate-pool.yaml")
 ROUNDS = 5

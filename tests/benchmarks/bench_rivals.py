@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.uncertainty import uncertainties
 
-from analysis.uncertainty import uncertainties
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
 from tests.reference.designs import grid_experiment
 
 from .linear_problem import Figures, figures, linear_problem

@@ -32,11 +32,12 @@ def peak() -> float:
 
 def measure(n: int) -> dict[str, float]:
     """Figures for a grid of n x n balls, in this process; times are the best of three."""
-    from analysis.uncertainty import ball_pairs, point_pairs
-    from simulator.design import nominal_state
-    from simulator.estimation.covariance import covariance, spectrum
-    from simulator.estimation.elimination import eliminate
-    from simulator.estimation.parameters import shared_layout
+    from ballplate.simulator.design import nominal_state
+    from ballplate.simulator.estimation.covariance import covariance, spectrum
+    from ballplate.simulator.estimation.elimination import eliminate
+    from ballplate.simulator.estimation.parameters import shared_layout
+    from ballplate.uncertainty import ball_pairs, point_pairs
+
     from tests.reference.designs import grid_experiment
 
     def estimate(size: int):  # type: ignore[no-untyped-def]

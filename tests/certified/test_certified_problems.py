@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.certified.answers import answers
+from ballplate.certified.problems import certified_problems
+from ballplate.certified.score import Score, scores
+from ballplate.cli import main
 
-from analysis.certified.answers import answers
-from analysis.certified.problems import certified_problems
-from analysis.certified.score import Score, scores
-from analysis.cli import main
 from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made
 from tests.certified.problems import PROBLEMS

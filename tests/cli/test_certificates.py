@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from simulator.certificates import certified_values, read_certificate
-from simulator.design import Design
-from simulator.estimation.gauss_newton import estimate
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.cli import main
+from ballplate.simulator.certificates import certified_values, read_certificate
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.readings import read_readings
 
 QUICKSTART = "designs/quickstart.yaml"
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.simulator.design import State
+from ballplate.simulator.estimation.gauss_newton import fitted_covariance
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import exact_readings, noisy_readings, on_true_machine, true_artefacts
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import observe
+from ballplate.study import Fit, Plan, fit, plan
 
-from analysis.study import Fit, Plan, fit, plan
-from simulator.design import State
-from simulator.estimation.gauss_newton import fitted_covariance
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, noisy_readings, on_true_machine, true_artefacts
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import observe
 from tests.reference.random_experiments import random_experiment
 
 UPRIGHT = """

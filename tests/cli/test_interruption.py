@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.cli import main
+from ballplate.cli.interruption import interruptions
+from ballplate.sweeps import execute
 
-from analysis.cli import main
-from analysis.cli.interruption import interruptions
-from analysis.sweeps import execute
 from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
 
 
@@ -55,7 +55,7 @@ def test_one_that_was_swallowed_ends_a_sweep(
 def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from analysis.montecarlo import trials
+    from ballplate.montecarlo import trials
 
     accuracy_of = trials.accuracy_of
 
@@ -85,7 +85,9 @@ def test_ignored_ones_stay_ignored() -> None:
         answer()
 
 
-@pytest.mark.parametrize("module", ["analysis.cli.common", "simulator.experiment.messages", "numpy", "joblib"])
+@pytest.mark.parametrize(
+    "module", ["ballplate.cli.common", "ballplate.simulator.experiment.messages", "numpy", "joblib"]
+)
 def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
     """The first second of every command is this."""
     path = small_sweep(tmp_path, 3)
@@ -96,7 +98,7 @@ def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
         f"        if name == {module!r}:\n"
         "            signal.raise_signal(signal.SIGINT)\n"
         "sys.meta_path.insert(0, Interrupting())\n"
-        "from analysis.cli import main\n"
+        "from ballplate.cli import main\n"
         "sys.exit(main(sys.argv[1:]))\n"
     )
     done = subprocess.run(

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 QUICKSTART = "designs/quickstart.yaml"
 Rows = list[dict[str, str]]

@@ -10,8 +10,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 PART = "designs/gilsinn/table-1.csv"
 DOME = (PART, "--y", "semi_finish_error", "--points", "12-32")

@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
+from ballplate.cli.progress import ProgressBar
 
-from analysis.cli import main
-from analysis.cli.progress import ProgressBar
 from tests.sweeps.support import hearing_interruptions
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -112,7 +112,7 @@ def test_options_that_would_be_ignored(capsys: pytest.CaptureFixture[str]) -> No
 def test_an_interruption_reports_what_is_done(workers: str) -> None:
     arguments = ["run", QUICKSTART, "--trials", "1000000", "--workers", workers, "--json"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "analysis.cli", *arguments],
+        [sys.executable, "-m", "ballplate", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
 
-from analysis.cli import main
 from tests.cli.test_check_formats import described, shell
 
 QUICKSTART = Path(__file__).parents[2] / "designs" / "quickstart.yaml"

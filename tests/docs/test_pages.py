@@ -14,10 +14,9 @@ from typing import Any
 
 import pytest
 import yaml
-
-from analysis.cli import parser
-from simulator.experiment.machine_sections import machine_schema
-from simulator.experiment.schema import schema
+from ballplate.cli import parser
+from ballplate.simulator.experiment.machine_sections import machine_schema
+from ballplate.simulator.experiment.schema import schema
 
 DOCS = Path("docs")
 GUARD = (DOCS / "how-to/guard-designs.md").read_text(encoding="utf-8")

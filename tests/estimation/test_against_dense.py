@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.pairs import all_pairs
+from ballplate.simulator.design import Design, Lengths, Readings, State, nominal_state
+from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import newton_step
+from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.uncertainty import point_pairs, uncertainties
 from numpy.typing import NDArray
 
-from analysis.pairs import all_pairs
-from analysis.uncertainty import point_pairs, uncertainties
-from simulator.design import Design, Lengths, Readings, State, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import newton_step
-from simulator.estimation.observations import expected_readings
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.geometry.motions import rotation_from_vector
 from tests.reference import dense
 from tests.reference.designs import (
     SIGMA,

@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from ballplate.simulator.design import Design, State, nominal_state
+from ballplate.simulator.estimation.gauss_newton import moved
+from ballplate.simulator.estimation.length_equations import length_estimate
+from ballplate.simulator.estimation.observations import length_shared_rows
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.spheres import fit_sphere
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import exact_readings, on_true_machine, true_artefacts
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import read_readings, write_readings
+from ballplate.study import fit, plan
 from scipy.optimize import least_squares
 
-from analysis.study import fit, plan
-from simulator.design import Design, State, nominal_state
-from simulator.estimation.gauss_newton import moved
-from simulator.estimation.length_equations import length_estimate
-from simulator.estimation.observations import length_shared_rows
-from simulator.estimation.parameters import shared_layout
-from simulator.estimation.spheres import fit_sphere
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine, true_artefacts
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import read_readings, write_readings
 from tests.reference.derivatives import assert_derivative, central_difference
 
 FOLDER = Path("designs/hurt_foss")

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.study import plan
-from simulator.design import Design, nominal_state
-from simulator.estimation.observations import reading_blocks
-from simulator.experiment.load import load
-from simulator.layout import lay_out
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.observations import reading_blocks
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.layout import lay_out
+from ballplate.study import plan
 
 LAYOUTS = {
     "one ball": "[[0 mm, 0 mm, 0 mm]]",

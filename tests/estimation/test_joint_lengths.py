@@ -12,25 +12,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.study import trials
+from ballplate.simulator.design import Design, Lengths, State, nominal_state
+from ballplate.simulator.estimation.covariance import spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
+from ballplate.simulator.estimation.length_equations import length_estimate
+from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import exact_readings, on_true_machine, true_artefacts
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.study import plan
 from numpy.typing import NDArray
 
-from analysis.montecarlo.study import trials
-from analysis.study import plan
-from simulator.design import Design, Lengths, State, nominal_state
-from simulator.estimation.covariance import spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import gauss_newton, newton_step
-from simulator.estimation.length_equations import length_estimate
-from simulator.estimation.observations import expected_readings
-from simulator.estimation.parameters import shared_layout
-from simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine, true_artefacts
-from simulator.geometry.motions import rotation_from_vector
-from simulator.layout import lay_out
-from simulator.machines.spatial_metric import SpatialMetricModel
-from simulator.machines.truth import true_machine
 from tests.estimation.test_against_dense import compare, in_reference_basis
 from tests.reference import dense
 from tests.reference.standards import POSES, bar, experiment, flat, spatial

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.montecarlo.study import trials
-from analysis.study import plan
-from simulator.design import nominal_state
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import noisy_certificate
-from simulator.layout import lay_out
+from ballplate.montecarlo.study import trials
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import noisy_certificate
+from ballplate.simulator.layout import lay_out
+from ballplate.study import plan
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 

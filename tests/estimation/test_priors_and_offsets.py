@@ -8,27 +8,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.study import check, fit, plan
-from simulator.design import Design, State, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import gauss_newton, moved
-from simulator.estimation.initial import initial_state
-from simulator.estimation.observations import (
+from ballplate.simulator.design import Design, State, nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
     length_rows,
     prior_rows,
     reading_blocks,
 )
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.generate import exact_readings, noisy_certificate, noisy_readings
-from simulator.layout import lay_out
-from simulator.machines.truth import true_parameters
-from simulator.readings import read_readings, write_readings
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.generate import exact_readings, noisy_certificate, noisy_readings
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import true_parameters
+from ballplate.simulator.readings import read_readings, write_readings
+from ballplate.study import check, fit, plan
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 PRIORS = """\

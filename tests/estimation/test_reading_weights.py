@@ -6,15 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.study import fit, plan
-from simulator.design import nominal_state
-from simulator.estimation.observations import reading_weights
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.generate import exact_readings, noisy_readings
-from simulator.layout import lay_out
-from simulator.readings import read_readings, write_readings
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.observations import reading_weights
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.generate import exact_readings, noisy_readings
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.readings import read_readings, write_readings
+from ballplate.study import fit, plan
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")

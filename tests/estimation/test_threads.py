@@ -9,8 +9,8 @@ import sys
 import pytest
 
 PROGRAM = """
-from analysis.study import plan
-from simulator.experiment.load import load
+from ballplate.study import plan
+from ballplate.simulator.experiment.load import load
 (experiment,) = load("designs/quickstart.yaml")
 found = plan(experiment)
 print([(q.maximum.hex(), q.average.hex()) for q in found.quantities.values()], found.verdict.singular_values.tobytes())

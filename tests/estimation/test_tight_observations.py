@@ -8,15 +8,15 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from ballplate.simulator.design import Coordinates, Design, Distances, Priors, nominal_state
+from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.uncertainty import point_pairs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from analysis.uncertainty import point_pairs
-from simulator.design import Coordinates, Design, Distances, Priors, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
 from tests.reference import dense
 from tests.reference.designs import corner_sides, grid, plate_design, six_positions
 

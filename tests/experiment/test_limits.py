@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from simulator.estimation.elimination import SMALL, eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment import ExperimentError, load
-from simulator.experiment.messages import MOST_MESSAGES
-from simulator.experiment.yamltree import parse_tree, read_text
-from simulator.generate import true_artefacts
-from simulator.geometry.artefacts import BallLayout, coincident_balls
-from simulator.layout import lay_out
+from ballplate.simulator.estimation.elimination import SMALL, eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.messages import MOST_MESSAGES
+from ballplate.simulator.experiment.yamltree import parse_tree, read_text
+from ballplate.simulator.generate import true_artefacts
+from ballplate.simulator.geometry.artefacts import BallLayout, coincident_balls
+from ballplate.simulator.layout import lay_out
 
 GOOD = """\
 title: good
@@ -246,14 +245,14 @@ def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch:
     (tmp_path / "e.yaml").write_text(text)
     design = lay_out(load(tmp_path / "e.yaml")[0])
     arguments = design, shared_layout(design)
-    from simulator.design import nominal_state
+    from ballplate.simulator.design import nominal_state
 
     state = nominal_state(design)
     assert SMALL < 3 * 196
     some = eliminate(*arguments, state)
-    monkeypatch.setattr("simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
     few = eliminate(*arguments, state)
-    monkeypatch.setattr("simulator.estimation.elimination.SMALL", 10_000)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.SMALL", 10_000)
     plain = eliminate(*arguments, state)
     for one in (some, few):
         np.testing.assert_allclose(

@@ -4,11 +4,8 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.yamltree import (
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.yamltree import (
     DEEPEST,
     mark_of,
     parse_tree,
@@ -16,6 +13,8 @@ from simulator.experiment.yamltree import (
     resolve_scalar,
     to_python,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 
 def refusals(text: str) -> list[str]:

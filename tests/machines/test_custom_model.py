@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from analysis.study import check
-from simulator.experiment import ExperimentError, load
-from simulator.layout import lay_out
-from simulator.machines import custom
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines import custom
+from ballplate.study import check
 
 # A machine of straight axes in space: three scales and three angles.
 GOOD = """
 import numpy as np
-from simulator.machines.protocol import Parameter, Reported
+from ballplate.simulator.machines.protocol import Parameter, Reported
 
 
 class Straight:
@@ -168,8 +167,8 @@ def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
 
 
 def test_a_jacobian_is_compared_with_differences_of_full_rotations() -> None:
-    from simulator.machines.arrangement import ARRANGEMENTS
-    from simulator.machines.kinematic import kinematic_model
+    from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+    from ballplate.simulator.machines.kinematic import kinematic_model
 
     model = kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True)
     custom._check("own", model, np.zeros(3), np.ones(3))

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from simulator.experiment import ExperimentError, load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import TrueMachine, true_machine
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import exact_readings, on_true_machine
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import TrueMachine, true_machine
 
 EXPERIMENT = """\
 title: measured curves

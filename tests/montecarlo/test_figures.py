@@ -9,21 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
-
-from analysis.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
-from analysis.montecarlo.study import trials, true_experiment
-from analysis.montecarlo.tables import trials_data, trials_lines, with_error
-from analysis.montecarlo.tally import tally
-from analysis.montecarlo.targets import Target, sample_of_pairs, targets
-from analysis.montecarlo.trials import run_trials
-from analysis.study import plan
-from simulator.design import Design, nominal_state
-from simulator.estimation.observations import distance_rows, expected_readings, reading_blocks
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.montecarlo.reference import Reference, reference
-from simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
+from ballplate.montecarlo.study import trials, true_experiment
+from ballplate.montecarlo.tables import trials_data, trials_lines, with_error
+from ballplate.montecarlo.tally import tally
+from ballplate.montecarlo.targets import Target, sample_of_pairs, targets
+from ballplate.montecarlo.trials import run_trials
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.observations import distance_rows, expected_readings, reading_blocks
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.montecarlo.reference import Reference, reference
+from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.study import plan
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:

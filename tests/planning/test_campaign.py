@@ -9,21 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.internal_error import InternalError
-from analysis.planning.bound import Bound
-from analysis.planning.campaign import Request, campaign
-from analysis.planning.constraints import HOUR, Budget
-from analysis.planning.done import done_candidates
-from analysis.planning.earlier import earlier_choice
-from analysis.planning.offer import offer
-from analysis.planning.search import Problem
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import with_chosen
+from ballplate.cli import main
+from ballplate.internal_error import InternalError
+from ballplate.planning.bound import Bound
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import HOUR, Budget
+from ballplate.planning.done import done_candidates
+from ballplate.planning.earlier import earlier_choice
+from ballplate.planning.offer import offer
+from ballplate.planning.search import Problem
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.study import plan
 
 from .small_pool import TEXT
 
@@ -241,7 +240,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
     positions: int, drawn: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bound that is wrong on purpose, of the choice itself and of a point of the curve."""
-    from analysis.planning import campaign as planning
+    from ballplate.planning import campaign as planning
 
     right = planning.bound
 

@@ -8,17 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.campaign import Request, campaign
-from analysis.planning.constraints import Budget, constraints
-from analysis.planning.criteria import CriterionName, criterion, is_about_balls
-from analysis.planning.information import pool_information
-from analysis.planning.search import Losses, Problem, value
-from analysis.study import Plan, plan
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import with_chosen
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import Budget, constraints
+from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.planning.information import pool_information
+from ballplate.planning.search import Losses, Problem, value
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.study import Plan, plan
 
 from .small_pool import TEXT
 

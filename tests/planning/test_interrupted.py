@@ -9,18 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.planning.campaign import Campaign, Request, campaign
-from analysis.planning.constraints import Budget
-from analysis.planning.done import done_candidates
-from analysis.planning.information import pool_information
-from analysis.planning.offer import offer
-from analysis.planning.schedule import run_sheet
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import with_chosen
+from ballplate.cli import main
+from ballplate.planning.campaign import Campaign, Request, campaign
+from ballplate.planning.constraints import Budget
+from ballplate.planning.done import done_candidates
+from ballplate.planning.information import pool_information
+from ballplate.planning.offer import offer
+from ballplate.planning.schedule import run_sheet
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.study import plan
 
 from .random_pools import write_some
 

@@ -10,23 +10,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.campaign import TINY_POOL, Campaign
-from analysis.planning.constraints import Spent
-from analysis.planning.criteria import CriterionName
-from analysis.planning.experiment_file import experiment_text
-from analysis.planning.schedule import RunSheet, run_sheet
-from analysis.study import plan, worth
-from simulator.design import nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate, with_chosen
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.planning.campaign import TINY_POOL, Campaign
+from ballplate.planning.constraints import Spent
+from ballplate.planning.criteria import CriterionName
+from ballplate.planning.experiment_file import experiment_text
+from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import Candidate, with_chosen
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.readings import read_readings
+from ballplate.study import plan, worth
 
 from .random_pools import RandomPool, random_pool, write_some
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from analysis.planning.search import value
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Position
-from simulator.experiment.pool import with_chosen
+from ballplate.planning.search import value
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.study import plan
 
 from .small_pool import TEXT
 from .test_information import problem_of, selections, written

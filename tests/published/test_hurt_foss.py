@@ -8,20 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.montecarlo.study import true_experiment
-from analysis.study import fit, plan
-from simulator.design import Design
-from simulator.estimation.length_equations import LengthEstimator, length_estimate
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, noisy_certificate, noisy_readings
-from simulator.geometry.directions import directions
-from simulator.layout import lay_out
-from simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
-from simulator.montecarlo.reference import Truth, reference
-from simulator.montecarlo.replicates import BATCH, estimate_batch
-from simulator.readings import read_readings
+from ballplate.montecarlo.study import true_experiment
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.generate import exact_readings, noisy_certificate, noisy_readings
+from ballplate.simulator.geometry.directions import directions
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
+from ballplate.simulator.montecarlo.reference import Truth, reference
+from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.readings import read_readings
+from ballplate.study import fit, plan
 
 FOLDER = Path("designs/hurt_foss")
 NAMES = ("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")

@@ -13,22 +13,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.reliability.events import Cause, cause
+from ballplate.reliability.power import noncentrality
+from ballplate.reliability.search import FAMILY, Search, diagnosis
+from ballplate.reliability.suspects import Diagnosis
+from ballplate.simulator.design import Design, Readings
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.machines.true_machine_settings import RandomSettings
+from ballplate.simulator.machines.truth import TrueMachine, true_machine
+from ballplate.simulator.readings import observe
 from numpy.typing import NDArray
-
-from analysis.reliability.events import Cause, cause
-from analysis.reliability.power import noncentrality
-from analysis.reliability.search import FAMILY, Search, diagnosis
-from analysis.reliability.suspects import Diagnosis
-from simulator.design import Design, Readings
-from simulator.estimation.gauss_newton import estimate
-from simulator.experiment.load import load
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
-from simulator.machines.true_machine_settings import RandomSettings
-from simulator.machines.truth import TrueMachine, true_machine
-from simulator.readings import observe
 
 Real = NDArray[np.float64]
 Generator = np.random.Generator

@@ -7,26 +7,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.reliability.leftover import Columns, leftover
+from ballplate.reliability.patterns import Patterns, patterns
+from ballplate.reliability.power import alarm_limit, chance_of_alarm, noncentrality
+from ballplate.reliability.search import diagnosis
+from ballplate.reliability.study import Reliability, reliability_of
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.covariance import covariance, spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import Solution, estimate
+from ballplate.simulator.estimation.hat import hat_rows, row_places
+from ballplate.simulator.estimation.observations import rotation_sensitivity
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import ObservedReadings, observe
 from numpy.typing import NDArray
 from scipy.special import nctdtr
 from scipy.stats import binom
 
-from analysis.reliability.leftover import Columns, leftover
-from analysis.reliability.patterns import Patterns, patterns
-from analysis.reliability.power import alarm_limit, chance_of_alarm, noncentrality
-from analysis.reliability.search import diagnosis
-from analysis.reliability.study import Reliability, reliability_of
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import Solution, estimate
-from simulator.estimation.hat import hat_rows, row_places
-from simulator.estimation.observations import rotation_sensitivity
-from simulator.estimation.parameters import shared_layout
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings, observe
 from tests.reliability.designs import MIXED, PLANE, PLATE, experiment
 
 Real = NDArray[np.float64]

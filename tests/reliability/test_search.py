@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.reliability.leftover import leftover
+from ballplate.reliability.scatter import log_chances, ratio, scatters, with_scatter
+from ballplate.reliability.search import Search
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation.gauss_newton import estimate, moved
+from ballplate.simulator.estimation.hat import whitened_residuals
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings import observe
 from numpy.typing import NDArray
 
-from analysis.reliability.leftover import leftover
-from analysis.reliability.scatter import log_chances, ratio, scatters, with_scatter
-from analysis.reliability.search import Search
-from simulator.design import Design, State
-from simulator.estimation.gauss_newton import estimate, moved
-from simulator.estimation.hat import whitened_residuals
-from simulator.estimation.parameters import shared_layout
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import observe
 from tests.reliability.designs import MIXED, PLANE, experiment
 from tests.reliability.test_against_dense import numeric
 

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.reliability.names import name
+from ballplate.reliability.search import diagnosis
+from ballplate.reliability.study import reliability_of
+from ballplate.reliability.tables import reliability_data, write_observations
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.layout import lay_out
 from numpy.typing import NDArray
 
-from analysis.reliability.names import name
-from analysis.reliability.search import diagnosis
-from analysis.reliability.study import reliability_of
-from analysis.reliability.tables import reliability_data, write_observations
-from simulator.design import Design, nominal_state
-from simulator.estimation.gauss_newton import gauss_newton
-from simulator.estimation.observations import expected_readings
-from simulator.layout import lay_out
 from tests.reference import dense
 from tests.reference.standards import bar, experiment, flat
 from tests.reliability.test_against_dense import distances_of, orthonormal

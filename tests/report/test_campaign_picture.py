@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.campaign import Campaign, CurvePoint, Gain
-from analysis.planning.constraints import Budget, Spent
-from analysis.report.campaign import draw_campaign, words
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.pool import with_chosen
+from ballplate.planning.campaign import Campaign, CurvePoint, Gain
+from ballplate.planning.constraints import Budget, Spent
+from ballplate.report.campaign import draw_campaign, words
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.study import plan
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

@@ -9,17 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
+from ballplate.report.cells import NoExperimentError, experiments
+from ballplate.report.page import page
+from ballplate.report.results import read_results
+from ballplate.report.verdicts import ranks
+from ballplate.report.volume import error_map
+from ballplate.simulator.experiment.load import load
+from ballplate.study import plan
+from ballplate.sweeps.frame import frame
+from ballplate.sweeps.store import open_store
 
-from analysis.cli import main
-from analysis.report.cells import NoExperimentError, experiments
-from analysis.report.page import page
-from analysis.report.results import read_results
-from analysis.report.verdicts import ranks
-from analysis.report.volume import error_map
-from analysis.study import plan
-from analysis.sweeps.frame import frame
-from analysis.sweeps.store import open_store
-from simulator.experiment.load import load
 from tests.report.stores import Page, axis, done, failed, made_up
 
 
@@ -158,7 +158,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     mark = tmp_path / "has run"
     module = (
         "from pathlib import Path\n"
-        "from simulator.machines.settings import KinematicSettings, build_error_model\n"
+        "from ballplate.simulator.machines.settings import KinematicSettings, build_error_model\n"
         "def build(lower, upper):\n"
         f"    Path({str(mark)!r}).touch()\n"
         "    return build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower, upper)\n"
@@ -176,7 +176,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
     page_file = tmp_path / "own.html"
-    command = [sys.executable, "-m", "analysis.cli", "report", store.path, "--run-modules", "-o", page_file]
+    command = [sys.executable, "-m", "ballplate", "report", store.path, "--run-modules", "-o", page_file]
     subprocess.run(command, check=True)
     assert mark.exists() and "cannot be drawn" not in page_file.read_text(encoding="utf-8")
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.cli import main
+from ballplate.report.formats import FORMATS
+from ballplate.report.heatmaps import SHADES, heat_maps
+from ballplate.report.results import best_and_worst, read_results
+from ballplate.report.series import plots
+from ballplate.report.tables import MOST_BEST, MOST_ROWS, report_tables
+from ballplate.sweeps.store import Store
 
-from analysis.cli import main
-from analysis.report.formats import FORMATS
-from analysis.report.heatmaps import SHADES, heat_maps
-from analysis.report.results import best_and_worst, read_results
-from analysis.report.series import plots
-from analysis.report.tables import MOST_BEST, MOST_ROWS, report_tables
-from analysis.sweeps.store import Store
 from tests.report.stores import axis, done, failed, made_up
 
 GOLDEN = Path(__file__).parent / "golden"

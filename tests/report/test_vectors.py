@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.report.vectors import LONGEST, Vectors, draw_vectors, magnification, of_fit, of_reversal
-from analysis.reversal import fit_reversal
-from analysis.study import fit
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.cli import main
+from ballplate.report.vectors import LONGEST, Vectors, draw_vectors, magnification, of_fit, of_reversal
+from ballplate.reversal import fit_reversal
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.readings import read_readings
+from ballplate.study import fit
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.cli import main
 from hypothesis import HealthCheck, Phase, given, settings
 
-from analysis.cli import main
 from tests.robustness.experiments import (
     EXPERIMENTS,
     FILES,

@@ -33,7 +33,7 @@ class OutOfTimeError(BaseException):
 
 def outcome(arguments: Sequence[str]) -> tuple[int, str, str]:
     """Status, standard output and standard error of a command."""
-    from analysis.cli import main
+    from ballplate.cli import main
 
     # Encoded as a terminal's, so that what cannot be encoded shows.
     out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
@@ -72,9 +72,9 @@ def complaint(arguments: Sequence[str], files: Path) -> str | None:
 
 def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) -> None:
     """Try files until told to end. What was imported before is not counted, what is used together is."""
-    import analysis.estimators
-    import analysis.montecarlo.study
-    import analysis.study  # noqa: F401
+    import ballplate.estimators
+    import ballplate.montecarlo.study
+    import ballplate.study  # noqa: F401
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGPROF, _out_of_time)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, rows, straight
+from ballplate.simulator.splines.fit import SplineFit, fit
+from ballplate.simulator.splines.knots import at_every, with_boundaries
+from ballplate.simulator.splines.pieces import pieces
+from ballplate.simulator.splines.problems import SplineError
+from ballplate.simulator.splines.space import SplineSpace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, make_lsq_spline
 
-from simulator.splines.constraints import Constraint, periodic, prescribed, rows, straight
-from simulator.splines.fit import SplineFit, fit
-from simulator.splines.knots import at_every, with_boundaries
-from simulator.splines.pieces import pieces
-from simulator.splines.problems import SplineError
-from simulator.splines.space import SplineSpace
 from tests.reference import truncated_powers
 
 EPSILON = np.finfo(float).eps

@@ -11,16 +11,15 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
-
-from analysis.cli import main
-from analysis.montecarlo.study import trials
-from analysis.study import plan
-from analysis.sweeps.fingerprint import fingerprint
-from analysis.sweeps.load import experiment_of, load_sweep
-from analysis.sweeps.model import Sweep
-from analysis.sweeps.store import all_details, files, keys, open_store, results, sweeps
-from analysis.sweeps.task import BLOCK, Row, Task, compute
-from simulator.experiment.load import load
+from ballplate.cli import main
+from ballplate.montecarlo.study import trials
+from ballplate.simulator.experiment.load import load
+from ballplate.study import plan
+from ballplate.sweeps.fingerprint import fingerprint
+from ballplate.sweeps.load import experiment_of, load_sweep
+from ballplate.sweeps.model import Sweep
+from ballplate.sweeps.store import all_details, files, keys, open_store, results, sweeps
+from ballplate.sweeps.task import BLOCK, Row, Task, compute
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep
 
@@ -60,7 +59,7 @@ def test_a_second_run_computes_nothing(
 ) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path) == 1
-    monkeypatch.setattr("analysis.sweeps.local.compute", None)
+    monkeypatch.setattr("ballplate.sweeps.local.compute", None)
     capsys.readouterr()
     assert sweep(path) == 1
     assert capsys.readouterr().out == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
@@ -117,7 +116,7 @@ def test_an_interrupted_run_leaves_no_rows_of_two_methods(tmp_path: Path, monkey
         return compute(loaded, task)
 
     with monkeypatch.context() as patched:
-        patched.setattr("analysis.sweeps.local.compute", second_fails)
+        patched.setattr("ballplate.sweeps.local.compute", second_fails)
         assert sweep(path) == 130
     assert_same(rows(store), right[:1].reset_index(drop=True))
     sweep(path)
@@ -170,7 +169,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
             base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
         return compute(loaded, task)
 
-    monkeypatch.setattr("analysis.sweeps.local.compute", changing)
+    monkeypatch.setattr("ballplate.sweeps.local.compute", changing)
     assert sweep(path) == 3
     assert "have been changed while it ran" in capsys.readouterr().err
     # What was computed before the change is there, and nothing else.
@@ -191,7 +190,7 @@ def test_what_two_sweeps_share_is_computed_once(tmp_path: Path, monkeypatch: pyt
         done.append(task)
         return compute(loaded, task)
 
-    monkeypatch.setattr("analysis.sweeps.local.compute", counted)
+    monkeypatch.setattr("ballplate.sweeps.local.compute", counted)
     sweep(path, "--beside")
     # What is no valid experiment is judged anew.
     assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
@@ -217,7 +216,7 @@ def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
 def test_replicates_in_blocks_are_the_same_replicates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
     assert BLOCK % 512 == 0
-    monkeypatch.setattr("analysis.sweeps.task.BLOCK", 512)
+    monkeypatch.setattr("ballplate.sweeps.task.BLOCK", 512)
     assert sweep(path) == 1
     split = rows(tmp_path / "small.sqlite")
     monkeypatch.undo()
@@ -303,8 +302,8 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 MODEL = """
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
 from NAME_helper import SIZE
 
 

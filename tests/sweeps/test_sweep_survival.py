@@ -118,8 +118,8 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
     path = small_sweep(tmp_path, 2)
     (tmp_path / "deadly.py").write_text(
         "import multiprocessing, os\n"
-        "from simulator.machines.kinematic import kinematic_model\n"
-        "from simulator.machines.arrangement import ARRANGEMENTS\n"
+        "from ballplate.simulator.machines.kinematic import kinematic_model\n"
+        "from ballplate.simulator.machines.arrangement import ARRANGEMENTS\n"
         "def build(lower, upper, deadly=False):\n"
         "    if deadly and multiprocessing.current_process().name != 'MainProcess':\n"
         "        os.kill(os.getpid(), 9)\n"

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import Factor, eliminate
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import placed_only
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.rounding import above, comparable
+from ballplate.simulator.design import Design, nominal_state
+from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
+from ballplate.simulator.estimation.elimination import Factor, eliminate
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.messages import ExperimentError
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import above, comparable
 
 from ...rank import effects, weak_limit
 from .changes import Change, apply_all

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from simulator.design import nominal_state
-from simulator.estimation.observations import reading_blocks
-from simulator.experiment.model import DistanceCalibration, Position
-from simulator.experiment.pool import placed_only
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
+from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.observations import reading_blocks
+from ballplate.simulator.experiment.model import DistanceCalibration, Position
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.layout import lay_out
+from ballplate.simulator.machines.protocol import Array
 
 from .changes import Change
 from .judging import Examined

@@ -10,12 +10,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import placed_only
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
-from simulator.threads import single_threaded
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.rounding import comparable
+from ballplate.simulator.threads import single_threaded
 
 from ...rank import independent_mixture
 from ...study import Plan, plan
