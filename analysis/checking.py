@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.simulator.experiment.load import load, place_in
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.messages import ExperimentError, Message
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
@@ -122,7 +122,7 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
     steps: tuple[str, ...] = ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_accuracy",)
     if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
-    return replace(design, place=place_in(experiment.source, experiment.name, steps))
+    return replace(design, place=experiment.place(steps))
 
 
 def _goals(experiment: Experiment, goals: Sequence[Goal]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -15,7 +15,6 @@ from ballplate.simulator.estimation.length_equations import (
     length_estimate,
 )
 from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
-from ballplate.simulator.experiment.load import place_in
 from ballplate.simulator.experiment.messages import ExperimentError, Message
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
@@ -67,7 +66,7 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
         bars = [name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)]
         if bars and design.dimension == 3:
             text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
-            mark = place_in(experiment.source, experiment.name, ("artefacts", bars[0]))
+            mark = experiment.place(("artefacts", bars[0]))
             raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
     try:

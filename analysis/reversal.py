@@ -15,8 +15,7 @@ from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation.gauss_newton import fitted_covariance
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
-from ballplate.simulator.experiment.load import place_in
-from ballplate.simulator.experiment.messages import ExperimentError, Message, Steps, format_path
+from ballplate.simulator.experiment.messages import ExperimentError, Message, Steps
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.geometry.motions import rotation_from_vector, vector_from_rotation
@@ -182,7 +181,7 @@ def _length(value: float) -> str:
 
 
 def _message(experiment: Experiment, steps: Steps, text: str) -> Message:
-    return place_in(experiment.source, experiment.name, steps).message(format_path(steps), text)
+    return experiment.message(steps, text)
 
 
 def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Scale | None) -> None:

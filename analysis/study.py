@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
@@ -27,20 +27,24 @@ from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
 from .reliability.search import diagnosis
 from .reliability.suspects import Diagnosis
+from .result import Result
 from .scale import Scale, scale_of
 from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, length_uncertainties, uncertainties
+
+if TYPE_CHECKING:
+    from .montecarlo.study import Trials
 
 # Residuals that a fit names.
 LARGEST = 10
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a design will be worth: the verdict on its rank, and U1 to U6 and tasks if they were asked for.
+@dataclass(frozen=True, repr=False)
+class Plan(Result):
+    """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they were asked for.
 
     `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if that was asked for
-    and is determined.
+    and is determined. `monte_carlo` has replicates, if they were asked for.
     """
 
     label: str
@@ -51,6 +55,52 @@ class Plan:
     tasks: tuple[TaskUncertainty, ...] = ()
     lengths: Quantity | None = None
     scale: Scale | None = None
+    monte_carlo: Trials | None = None
+
+    def headline(self) -> str:
+        return ", ".join([rank_words(self.verdict), *_uncertainty_words(self.quantities)])
+
+    def lines(self) -> list[str]:
+        from .montecarlo.tables import trials_lines
+        from .tables import plan_lines
+
+        return plan_lines(self) + ([] if self.monte_carlo is None else ["", *trials_lines(self.monte_carlo)])
+
+    def to_dict(self) -> dict[str, Any]:
+        from .montecarlo.tables import trials_data
+        from .tables import plan_data
+
+        replicates = {} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}
+        return plan_data(self) | replicates
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each of U1 to U6."""
+        return [{"symbol": symbol, **quantity_row(quantity)} for symbol, quantity in self.quantities.items()]
+
+
+def rank_words(judged: Verdict) -> str:
+    """The rank in two words."""
+    return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
+
+
+def quantity_row(quantity: Quantity) -> dict[str, Any]:
+    """A quantity as the row of a table, in its own unit."""
+    return {
+        "standard uncertainty of": quantity.description,
+        "maximum": quantity.maximum,
+        "average": quantity.average,
+        "unit": quantity.unit,
+        "count": quantity.count,
+        "undetermined": quantity.undetermined,
+        "largest at": quantity.largest,
+    }
+
+
+def _uncertainty_words(quantities: dict[str, Quantity]) -> list[str]:
+    lengths = quantities.get("U6")
+    if lengths is None or np.isnan(lengths.average):
+        return []
+    return [f"U6 {1e6 * lengths.average:.3g} um on average, {1e6 * lengths.maximum:.3g} um at most"]
 
 
 @dataclass(frozen=True)
@@ -94,8 +144,8 @@ class Residual:
     standardised: float
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(Result):
     """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
 
     `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
@@ -119,6 +169,34 @@ class Fit:
     tasks: tuple[TaskUncertainty, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     marks: tuple[Mark, ...] = ()
+
+    def headline(self) -> str:
+        if not self.converged:
+            return f"the estimate has {self.solution.status}"
+        return ", ".join([rank_words(self.verdict), f"sigma {self.sigma:.3g}", *_uncertainty_words(self.quantities)])
+
+    def lines(self) -> list[str]:
+        from .tables import fit_lines
+
+        return fit_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        from .tables import fit_data
+
+        return fit_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each parameter."""
+        return [
+            {
+                "parameter": one.name,
+                "kind": one.kind,
+                "value": one.value,
+                "standard uncertainty": one.standard_uncertainty,
+                "unit": one.unit,
+            }
+            for one in self.estimates
+        ]
 
     @property
     def converged(self) -> bool:

@@ -39,7 +39,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         metavar="FOLDER",
         type=Path,
         default=None,
-        help="where the shipped designs are; default: designs/npl or designs/certified below the current folder",
+        help="where the shipped designs are; default: those that come with ballplate",
     )
     parser.add_argument(
         "--results",
@@ -73,6 +73,7 @@ def run(options: Namespace) -> int:
     from ..reproduction.published import npl
     from ..reproduction.shipped import Shipped
     from ..reproduction.tables import reproduction_data, reproduction_lines, reproduction_markdown
+    from ..shipped import shipped
     from .common import print_json, print_lines
     from .progress import ProgressBar
 
@@ -94,7 +95,7 @@ def run(options: Namespace) -> int:
     trials = None if options.quick else options.trials
     try:
         found = reproduce(
-            document, Shipped(options.designs or Path("designs", "npl")), options.experiment, trials, report
+            document, Shipped(options.designs or shipped("npl")), options.experiment, trials, report
         )
     finally:
         for bar in bars.values():
@@ -116,13 +117,14 @@ def _certified(options: Namespace) -> int:
     from ..certified.problems import certified_problems, read_results
     from ..certified.score import all_right, scores
     from ..certified.tables import score_data, score_lines
+    from ..shipped import shipped
     from .common import print_json, print_lines
     from .progress import ProgressBar
 
     if options.quick or options.markdown:
         print("ballplate reproduce: --quick and --markdown go with npl only; leave them out", file=sys.stderr)
         return WRONG_USAGE
-    problems = certified_problems(options.designs or Path("designs", "certified"), options.experiment)
+    problems = certified_problems(options.designs or shipped("certified"), options.experiment)
     if options.results:
         results = read_results(options.results, problems)
     else:

@@ -40,7 +40,6 @@ def run(options: Namespace) -> int:
 
     import numpy as np
     from ballplate.simulator.certificates import certified_values, drawn_values, with_values, write_certificate
-    from ballplate.simulator.experiment.load import message_at
     from ballplate.simulator.experiment.messages import ExperimentError, Message
     from ballplate.simulator.generate import (
         NoReadingError,
@@ -72,7 +71,7 @@ def run(options: Namespace) -> int:
             readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
         text = f"{error}; state smaller ones"
-        raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
+        raise ExperimentError([experiment.message(("true_machine",), text)]) from None
     writers = {options.output: lambda stream: write_readings(stream, design, readings, x)}
     told = [f"{len(readings)} readings written to {options.output}"]
     if options.certificate:

@@ -12,7 +12,6 @@ from ballplate.simulator.design import Design, Priors, nominal_state
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.parameters import shared_layout
-from ballplate.simulator.experiment.load import message_at
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.generate import NoReadingError, on_true_machine
@@ -122,7 +121,7 @@ def _shared(experiment: Experiment) -> Reference | str:
         return str(error)
     except (NoReadingError, TooWildError) as error:
         text = f"{error}; state smaller errors"
-        raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
+        raise ExperimentError([experiment.message(("true_machine",), text)]) from None
 
 
 def _optimism(experiment: Experiment, shared: Reference) -> Optimism:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment.messages import ExperimentError, Message
@@ -15,13 +16,14 @@ from ballplate.simulator.settings import listing
 from ballplate.simulator.threads import single_threaded
 
 from ..processes import in_processes
+from ..result import Result
 from ..study import Plan, plan
 from .bound import Bound, bound
 from .constraints import Budget, Constraints, Spent, constraints
 from .criteria import CriterionName, criterion, is_about_balls
 from .information import pool_information
 from .offer import Offer, offer, open_directions
-from .schedule import Completion, run_sheet
+from .schedule import Completion, RunSheet, run_sheet
 from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
 
 # Random starts of the search, in a large pool and in a small one.
@@ -73,8 +75,8 @@ class CurvePoint:
     bound: float
 
 
-@dataclass(frozen=True)
-class Campaign:
+@dataclass(frozen=True, repr=False)
+class Campaign(Result):
     """A selection and what is to be said of it; values in metres, those of `condition` ratios.
 
     `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
@@ -110,6 +112,42 @@ class Campaign:
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
+
+    @property
+    def label(self) -> str:  # type: ignore[override]
+        return self.plan.label
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        return self.plan.title
+
+    @property
+    def sheet(self) -> RunSheet:
+        """The choice in the order in which it is to be read."""
+        return run_sheet(self.chosen, self.pool.changes, self.done, self.completed, self.interrupted)
+
+    def headline(self) -> str:
+        count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
+        if not self.is_determined:
+            return f"{count}; something stays undetermined"
+        value = f"{1e6 * self.value:.4g} um" if self.unit == "m" else f"{self.value:.4g}"
+        return f"{count}, {self.criterion} {value}"
+
+    def lines(self) -> list[str]:
+        from .tables import campaign_lines
+
+        return campaign_lines(self, self.sheet)
+
+    def to_dict(self) -> dict[str, Any]:
+        from .tables import campaign_data
+
+        return campaign_data(self, self.sheet)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each step of the run sheet, times in seconds."""
+        from .sheet_forms import sheet_data
+
+        return list(sheet_data(self.sheet)["steps"])
 
     @property
     def efficiency(self) -> float:

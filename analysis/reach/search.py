@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from ballplate.simulator.experiment.load import build, tree_of
+from ballplate.simulator.experiment.load import build
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import override
@@ -17,6 +17,7 @@ from ballplate.simulator.settings import listing
 from ballplate.simulator.threads import single_threaded
 
 from ..goals import Goal, Judgement, check_goal, judge
+from ..result import Result
 from ..study import Worth, plan, worth
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
@@ -68,8 +69,8 @@ class Answer:
         return self.status in ("found", "any")
 
 
-@dataclass(frozen=True)
-class Reach:
+@dataclass(frozen=True, repr=False)
+class Reach(Result):
     """A goal, what the design as it is makes of it, and what each unknown must be."""
 
     label: str
@@ -78,6 +79,23 @@ class Reach:
     present: Judgement
     deficiency: int
     answers: tuple[Answer, ...]
+
+    def headline(self) -> str:
+        return self.present.words
+
+    def lines(self) -> list[str]:
+        from .tables import reach_lines
+
+        return reach_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        from .tables import reach_data
+
+        return reach_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each unknown."""
+        return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
 
 
 @single_threaded
@@ -98,7 +116,7 @@ def reach(
     :raises NotVariableError: a single unknown is asked for that the experiment does not have.
     :raises ExperimentError: the target is wrong.
     """
-    root = tree_of(experiment.source, experiment.name)
+    root = experiment.tree
     # Planning is at zero machine error, and true machines take time to check.
     zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
     root = override(root, "true_machine", zero, root.mark)

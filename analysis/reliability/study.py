@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.design import Design, Integers, nominal_state
@@ -17,6 +17,7 @@ from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.threads import single_threaded
 
+from ..result import Result
 from .effects import SYMBOLS, Functions, Largest, ball_distances, error_functions, point_distances
 from .events import event_groups
 from .leftover import Columns, leftover
@@ -45,8 +46,8 @@ class Effects:
     uncertainty: Array
 
 
-@dataclass(frozen=True)
-class Reliability:
+@dataclass(frozen=True, repr=False)
+class Reliability(Result):
     """What a design notices of biases, for each of its patterns.
 
     `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands for the mean of its
@@ -74,6 +75,31 @@ class Reliability:
     power: float
     noncentrality: float
     fit_noncentrality: float
+
+    def headline(self) -> str:
+        observations = self.design.observations
+        mean = (float(self.redundancy.sum()) + self.among_repeats) / observations
+        return f"redundancy {mean:.3g} of an observation on average; {len(self.patterns)} biases judged"
+
+    def lines(self) -> list[str]:
+        from .tables import reliability_lines
+
+        return reliability_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        from .tables import reliability_data
+
+        return reliability_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each bias: of an observation, a probe, a position, a certificate."""
+        data = self.to_dict()
+        rows = []
+        for one in (*data["observations_by_name"], *data["events"]):
+            changes = {symbol: effect.get("change") for symbol, effect in one["effects"].items()}
+            names = ("name", "kind", "redundancy", "minimal_detectable", "found_by_fit", "unit")
+            rows.append({name.replace("_", " "): one.get(name) for name in names} | changes)
+        return rows
 
     @property
     def found_by_fit(self) -> Array:

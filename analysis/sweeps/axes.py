@@ -6,9 +6,9 @@ from collections import Counter
 from dataclasses import replace
 
 from ballplate.simulator.experiment.messages import Steps
-from ballplate.simulator.experiment.problems import Problems, written
+from ballplate.simulator.experiment.problems import Problems
 from ballplate.simulator.experiment.variants import node_at, override
-from ballplate.simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python
+from ballplate.simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python, written
 from ballplate.simulator.settings import hint, listing
 
 from .model import Axis, Choice, Unit

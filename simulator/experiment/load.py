@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from ..machines.settings import with_defaults
@@ -18,18 +19,18 @@ from .checks import (
     check_use,
 )
 from .machine import resolve_evaluation, resolve_machine, target_of
-from .messages import ExperimentError, Message, Steps, format_path
+from .messages import ExperimentError, Message
 from .model import Calibration, Experiment
 from .modules import refused_modules
 from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
-from .problems import Problems, written, written_count
+from .problems import Problems, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import in_variants, variant_trees
-from .yamltree import Mapping, Mark, Node, mark_of, read_tree
+from .yamltree import Mapping, Node, mark_of, read_tree
 
 
 def load(path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True) -> tuple[Experiment, ...]:
@@ -60,7 +61,9 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
     variants_of: dict[Message, list[str]] = {}
     for name, tree in trees.items():
         experiment, messages = build(tree, source, name, planning)
-        experiments += [experiment] if experiment else []
+        if experiment is not None:
+            mark = mark_of(root, ("variants", name), of_key=True)
+            experiments.append(replace(experiment, mark=mark))
         for message in messages:
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [
@@ -71,27 +74,15 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
     return tuple(experiments)
 
 
-def message_at(source: Path, steps: Steps, text: str) -> Message:
-    """A message about a path of a file that is right by itself, such as a true machine that turns out too wild."""
-    return mark_of(read_tree(source, []), steps).message(format_path(steps), text)
+def with_pool(experiment: Experiment) -> Experiment:
+    """The same experiment with what a plan may choose from.
 
-
-def tree_of(source: Path, variant: str | None) -> Node:
-    """The tree of a file that is right, or of a variant of it, as ``build`` takes it."""
-    root = read_tree(source, [])
-    return _without_variants(root) if variant is None else variant_trees(root, Problems(root))[variant]
-
-
-def place_in(source: Path, variant: str | None, steps: Steps) -> Mark:
-    """Where a path stands in a file that is right, or in a variant of it.
-
-    What nobody has written is looked for in the variant's name, and without variants in the positions.
+    :raises ExperimentError: what a plan may choose from is wrong.
     """
-    root = read_tree(source, [])
-    tree = root if variant is None else variant_trees(root, Problems(root))[variant]
-    if written(tree, *steps) is not None:
-        return mark_of(tree, steps)
-    return mark_of(root, ("positions",) if variant is None else ("variants", variant), of_key=True)
+    found, messages = build(experiment.tree, experiment.source, experiment.name, planning=True)
+    if found is None:
+        raise ExperimentError(sorted(messages))
+    return replace(found, mark=experiment.mark)
 
 
 def build(
@@ -165,6 +156,8 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         sigma=sections.get("sigma"),
         expected_rank_deficiency=sections.get("expected_rank_deficiency"),
         seed=sections.get("seed"),
+        tree=root,
+        mark=mark_of(root, ("positions",), of_key=True),
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         offset_uncertainties=offset_uncertainties,

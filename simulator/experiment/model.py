@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..quantities import LengthFunction, Target
-from .yamltree import Mark
+from .messages import Message, Steps, format_path
+from .yamltree import Mark, Node, mark_of, written
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
@@ -184,7 +185,8 @@ class Experiment:
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are meant for.
     ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
     by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
-    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant.
+    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
+    without variants, and ``mark``: where the experiment itself stands.
     """
 
     title: str
@@ -204,6 +206,8 @@ class Experiment:
     sigma: Literal["estimated", "given"]
     expected_rank_deficiency: int | None
     seed: int
+    tree: Node = field(repr=False)
+    mark: Mark = field(repr=False)
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
@@ -219,3 +223,27 @@ class Experiment:
     def label(self) -> str:
         """Name of the file without its ending, and the variant in brackets."""
         return self.source.stem if self.name is None else f"{self.source.stem}[{self.name}]"
+
+    def __repr__(self) -> str:
+        return f"<Experiment {self.label}: {self.title}>"
+
+    def place(self, steps: Steps) -> Mark:
+        """Where a path stands; what nobody has written, where the experiment itself does."""
+        return self.mark if written(self.tree, *steps) is None else mark_of(self.tree, steps)
+
+    def message(self, steps: Steps, text: str) -> Message:
+        """A message about what stands at a path."""
+        return self.place(steps).message(format_path(steps), text)
+
+    def with_(self, changes: Mapping[str, object] | None = None, /, **sections: object) -> Experiment:
+        """The experiment with some of its entries changed, checked as a file is.
+
+        ``changes`` has new values by path, such as ``positions[P1].level`` or ``artefacts.plate.size``, as variants of
+        a file have; ``sections`` replaces whole entries by their names. Values are what a file would hold: texts with
+        units, numbers, lists and mappings. None removes an entry.
+
+        :raises ExperimentError: a path that does not exist, or an experiment that is wrong so.
+        """
+        from .changes import changed
+
+        return changed(self, {**(changes or {}), **sections})

@@ -25,9 +25,8 @@ from .messages import Steps
 from .model import Floats, Indices, Position, ReadingGroup, Volume
 from .placements import check_turns
 from .pool_sections import GroupSettings, LengthsByAxisSettings, ProbesByPlaneSettings, RangeSettings, form_of_balls
-from .problems import written
 from .references import References, lengths_per_axis
-from .yamltree import to_python
+from .yamltree import to_python, written
 
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000

@@ -30,10 +30,10 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .problems import written, written_count, written_text
+from .problems import written_count, written_text
 from .references import References, Tally, frozen
 from .structure import Sections
-from .yamltree import Mapping, Sequence, to_python
+from .yamltree import Mapping, Sequence, to_python, written
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
 

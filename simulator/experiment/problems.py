@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
-from .yamltree import Mapping, Mark, Node, Sequence, child, mark_of, to_python
+from .yamltree import Mapping, Mark, Node, Sequence, mark_of, to_python, written
 
 
 @dataclass(eq=False)
@@ -53,14 +53,6 @@ class Problems:
         return any(
             message.path == path or message.path.startswith((f"{path}.", f"{path}[")) for message in self.messages
         )
-
-
-def written(root: Node, *steps: Step) -> Node | None:
-    """Return what stands at a path of the file, or None."""
-    node: Node | None = root
-    for step in steps:
-        node = child(node, step)
-    return node
 
 
 def written_keys(root: Node, section: str) -> tuple[str, ...]:

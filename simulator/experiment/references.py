@@ -21,11 +21,11 @@ from ..quantities import format_length
 from ..settings import hint, listing, shorten
 from .messages import ExperimentError, Steps
 from .model import Floats, Indices
-from .problems import Problems, written, written_keys, written_text
+from .problems import Problems, written_keys, written_text
 from .sections import ProbeSettings
 from .structure import Sections
 from .tables import read_table
-from .yamltree import Mapping, Node
+from .yamltree import Mapping, Node, written
 from .yamltree import Sequence as SequenceNode
 
 DEFAULT_PROBE = "probe"

@@ -93,6 +93,32 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     return _replaced(root, steps, value, mark, ())
 
 
+def removed(root: Node, path: str) -> Node:
+    """Return the tree without the entry of a mapping or a list at a path.
+
+    :raises ValueError: the path is malformed, or nothing stands there.
+    """
+    return _less(root, list(_place(root, path)), ())
+
+
+def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
+    step, rest = steps[0], steps[1:]
+    here = (*above, step)
+    key: str | int = int(step) if isinstance(node, Sequence) else step
+    below = child(node, key)
+    if below is None:
+        known = node.items if isinstance(node, Mapping) else ()
+        raise ValueError(f"there is no {format_path(here)}; {hint(step, known)}")
+    if isinstance(node, Sequence):
+        i = int(step)
+        kept = (_less(below, rest, here),) if rest else ()
+        return replace(node, items=(*node.items[:i], *kept, *node.items[i + 1 :]))
+    assert isinstance(node, Mapping)
+    if rest:
+        return replace(node, items={**node.items, step: _less(below, rest, here)})
+    return replace(node, items={name: item for name, item in node.items.items() if name != step})
+
+
 def _steps(path: str) -> list[str]:
     steps = [match[1] or match[2] or "" for match in STEP.finditer(path)]
     if not path or "".join(match[0] for match in STEP.finditer(path)) != path or "" in steps:

@@ -183,6 +183,14 @@ def child(node: Node | None, step: Step) -> Node | None:
     return None
 
 
+def written(root: Node, *steps: Step) -> Node | None:
+    """Return what stands at a path, or None."""
+    node: Node | None = root
+    for step in steps:
+        node = child(node, step)
+    return node
+
+
 def mark_of(root: Node, steps: Steps, of_key: bool = False) -> Mark:
     """Return the place of a path, or of the nearest thing above it that exists.
 

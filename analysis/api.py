@@ -1,0 +1,245 @@
+"""ballplate from Python: what the commands do, with results in place of text.
+
+Wherever an experiment is taken, so is the path of a file with one. Values in results are in metres, radians and ratios.
+Every function raises `ballplate.ExperimentError` for a file or an experiment that is wrong.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from .simulator.experiment.load import load as load_file
+from .simulator.experiment.messages import ExperimentError, Message
+from .simulator.experiment.model import Experiment
+from .simulator.settings import hint
+
+if TYPE_CHECKING:
+    import pandas
+
+    from .montecarlo.trials import Progress
+    from .planning.campaign import Campaign
+    from .planning.criteria import CriterionName
+    from .reach.search import Reach
+    from .reach.unknowns import UnknownName
+    from .reliability.study import Reliability
+    from .study import Fit, Plan
+
+PathLike = str | os.PathLike[str]
+
+
+def load(path: PathLike, variant: str | None = None) -> Experiment:
+    """The experiment of a file, or one of its variants.
+
+    :raises ExperimentError: the file is wrong, or has several variants and none was chosen.
+
+    >>> load("designs/quickstart.yaml")
+    <Experiment quickstart: 5 x 5 ball plate in six positions>
+    >>> load("designs/npl/6.1.1.yaml", variant="B").label
+    '6.1.1[B]'
+    """
+    found = load_all(path)
+    names = [str(one.name) for one in found]
+    if variant is not None:
+        if variant in names:
+            return found[names.index(variant)]
+        told = hint(variant, names) if found[0].name is not None else "the file has no variants"
+        raise ExperimentError([Message(str(path), 0, 0, "variants", f'no variant "{variant}"; {told}')])
+    if len(found) > 1:
+        text = f"the file has several variants; choose one with variant=, or load_all: {', '.join(names)}"
+        raise ExperimentError([Message(str(path), 0, 0, "variants", text)])
+    return found[0]
+
+
+def load_all(path: PathLike) -> tuple[Experiment, ...]:
+    """The experiment of a file, or all of its variants in their order.
+
+    >>> [one.name for one in load_all("designs/npl/6.1.1.yaml")]
+    ['A', 'B']
+    """
+    return load_file(path)
+
+
+def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experiment:
+    """The experiment that a mapping describes as a file would, with paths relative to a folder.
+
+    >>> sections = {
+    ...     "title": "three positions",
+    ...     "machine": {"volume": "400 mm", "repeatability": "0.5 um"},
+    ...     "error_model": {"kind": "metric"},
+    ...     "artefacts": {"plate": {"kind": "square", "count": 5, "size": "300 mm"}},
+    ...     "positions": [{"name": p, "plane": p, "level": "200 mm"} for p in ("xy", "yz", "xz")],
+    ... }
+    """
+    from .simulator.experiment.changes import written_in_python
+
+    return written_in_python(sections, Path(folder))
+
+
+def quickstart() -> Experiment:
+    """A small experiment to begin with: a plate of 5 x 5 balls in six positions.
+
+    >>> quickstart().title
+    '5 x 5 ball plate in six positions'
+    """
+    from .shipped import shipped
+
+    return load(shipped("quickstart.yaml"))
+
+
+def check(experiment: Experiment | PathLike) -> Plan:
+    """Whether a design determines everything it asks for and, if not, what it leaves open.
+
+    >>> check("designs/quickstart.yaml").verdict.deficiency
+    0
+    """
+    from . import study
+
+    return study.check(_experiment(experiment), with_scale=True)
+
+
+def run(
+    experiment: Experiment | PathLike,
+    trials: int | None = None,
+    until: float | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    report: Callable[[Progress], None] = lambda progress: None,
+) -> Plan:
+    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials` are asked for.
+
+    At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty as accurate as
+    `until`.
+
+    >>> run(quickstart())
+    <Plan of quickstart: full rank, U6 0.269 um on average, 0.609 um at most>
+    """
+    from dataclasses import replace
+
+    from . import study
+
+    chosen = _experiment(experiment)
+    predicted = study.plan(chosen, with_scale=True)
+    if trials is None and until is None:
+        return predicted
+    from .montecarlo import study as replicates
+    from .montecarlo.trials import MOST_TRIALS
+
+    found = replicates.trials(chosen, trials or MOST_TRIALS, seed, until, workers, report)
+    return replace(predicted, monte_carlo=found)
+
+
+def simulate(experiment: Experiment | PathLike, seed: int | None = None, exact: bool = False) -> pandas.DataFrame:
+    """Readings of the experiment's true machine, with noise from a seed, as a table that `fit` takes.
+
+    >>> list(simulate(quickstart()).columns)
+    ['position', 'ball', 'probe', 'x_mm', 'y_mm', 'z_mm']
+    """
+    import io
+
+    import pandas
+
+    from .simulator.readings import write_readings
+    from .simulator.simulated import simulated_readings
+
+    found = simulated_readings(_experiment(experiment), seed, exact)
+    stream = io.StringIO()
+    write_readings(stream, found.design, found.readings, found.x)
+    stream.seek(0)
+    names = dict.fromkeys(("position", "ball", "probe"), str)
+    return pandas.read_csv(stream, dtype=names, float_precision="round_trip", keep_default_na=False)
+
+
+def fit(
+    experiment: Experiment | PathLike,
+    readings: PathLike | pandas.DataFrame,
+    sigma: Literal["estimated", "given"] | None = None,
+    monomials: bool = False,
+) -> Fit:
+    """The estimate from readings, of a CSV file or a data frame with the same columns.
+
+    `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the coefficients of t,
+    t^2, ... on [0, 1].
+
+    >>> fit(quickstart(), simulate(quickstart())).converged
+    True
+    """
+    from . import study
+    from .simulator.layout import lay_out
+    from .simulator.readings import read_readings
+
+    chosen = _experiment(experiment)
+    observed = read_readings(Path(readings), lay_out(chosen))
+    return study.fit(chosen, observed, sigma, monomials)
+
+
+def plan(
+    experiment: Experiment | PathLike,
+    criterion: CriterionName = "U6",
+    hours: float | None = None,
+    positions: int | None = None,
+    readings: int | None = None,
+    curve: bool = False,
+    seed: int = 1,
+    workers: int = 1,
+    report: Callable[[str], None] = lambda step: None,
+) -> Campaign:
+    """Positions and certificates chosen from the experiment's pool for a budget, with the bound of any choice.
+
+    Without a budget the choice may cost what the positions of the experiment itself do.
+
+    >>> pool = {"candidates": [{"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": [{"x": "50 mm", "y": "50 mm"}]}]}
+    >>> plan(quickstart().with_(pool=pool), positions=7)
+    <Campaign of quickstart: 7 of 8 candidates, U6 0.2 um>
+    """
+    from .planning.campaign import Request, campaign
+    from .planning.constraints import HOUR, Budget
+    from .simulator.experiment.load import with_pool
+
+    budget = None
+    if (hours, positions, readings) != (None, None, None):
+        budget = Budget(None if hours is None else HOUR * hours, readings, positions)
+    request = Request(criterion, budget, curve, seed)
+    return campaign(with_pool(_experiment(experiment)), request, workers=workers, report=report)
+
+
+def reliability(
+    experiment: Experiment | PathLike,
+    false_alarm: float = 0.001,
+    power: float = 0.8,
+    sigma: Literal["estimated", "given"] | None = None,
+) -> Reliability:
+    """Which mistakes in readings and certificates residuals would show, and what those do that they would not.
+
+    >>> reliability(quickstart()).degrees_of_freedom
+    580
+    """
+    from .reliability import study
+
+    return study.reliability(_experiment(experiment), false_alarm, power, sigma)
+
+
+def reach(
+    experiment: Experiment | PathLike,
+    goal: str = "lengths",
+    unknowns: Sequence[UnknownName] | None = None,
+    target: str | None = None,
+) -> Reach:
+    """The repeatability, certificate, repeats, balls or size of the plate with which a goal is met.
+
+    `goal` is as `ballplate reach --goal` has it; `target` replaces the experiment's target, as a text with a unit.
+
+    >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
+    True
+    """
+    from .goals import parse_goal
+    from .reach.search import reach as search
+    from .reach.unknowns import NAMES
+
+    return search(_experiment(experiment), parse_goal(goal), tuple(unknowns or NAMES), target=target)
+
+
+def _experiment(given: Experiment | PathLike) -> Experiment:
+    return given if isinstance(given, Experiment) else load(given)
