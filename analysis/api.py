@@ -19,12 +19,12 @@ from .simulator.settings import hint
 if TYPE_CHECKING:
     import pandas
 
+    from .gross_errors.study import Reliability
     from .montecarlo.trials import Progress
     from .planning.campaign import Campaign
     from .planning.criteria import CriterionName
-    from .reach.search import Reach
-    from .reach.unknowns import UnknownName
-    from .reliability.study import Reliability
+    from .requirements.search import Reach
+    from .requirements.unknowns import UnknownName
     from .study import Fit, Plan
 
 PathLike = str | os.PathLike[str]
@@ -57,7 +57,7 @@ def load_all(path: PathLike) -> tuple[Experiment, ...]:
     """The experiment of a file, or all of its variants in their order.
 
     >>> [one.name for one in load_all("designs/npl/6.1.1.yaml")]
-    ['A', 'B']
+    ['A', 'B', 'C', 'D']
     """
     return load_file(path)
 
@@ -114,7 +114,7 @@ def run(
     `until`.
 
     >>> run(quickstart())
-    <Plan of quickstart: full rank, U6 0.269 um on average, 0.609 um at most>
+    <Plan of quickstart: full rank, U6 0.143 um on average, 0.325 um at most>
     """
     from dataclasses import replace
 
@@ -137,19 +137,21 @@ def simulate(experiment: Experiment | PathLike, seed: int | None = None, exact: 
     >>> list(simulate(quickstart()).columns)
     ['position', 'ball', 'probe', 'x_mm', 'y_mm', 'z_mm']
     """
-    import io
-
     import pandas
 
-    from .simulator.readings import write_readings
+    from .simulator.readings import AXES
     from .simulator.simulated import simulated_readings
 
     found = simulated_readings(_experiment(experiment), seed, exact)
-    stream = io.StringIO()
-    write_readings(stream, found.design, found.readings, found.x)
-    stream.seek(0)
-    names = dict.fromkeys(("position", "ball", "probe"), str)
-    return pandas.read_csv(stream, dtype=names, float_precision="round_trip", keep_default_na=False)
+    design, readings = found.design, found.readings
+    columns: dict[str, Any] = {
+        "position": [design.position_names[k] for k in readings.position],
+        "ball": [design.ball_names[k] for k in readings.ball],
+        "probe": [design.probe_names[k] for k in readings.probe],
+    }
+    for k, axis in enumerate(AXES[: design.dimension]):
+        columns[f"{axis}_mm"] = 1e3 * found.x[:, k]
+    return pandas.DataFrame(columns)
 
 
 def fit(
@@ -190,9 +192,10 @@ def plan(
 
     Without a budget the choice may cost what the positions of the experiment itself do.
 
-    >>> pool = {"candidates": [{"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": [{"x": "50 mm", "y": "50 mm"}]}]}
+    >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
+    >>> pool = {"candidates": [places | {"probes": ["down"]}]}
     >>> plan(quickstart().with_(pool=pool), positions=7)
-    <Campaign of quickstart: 7 of 8 candidates, U6 0.2 um>
+    <Campaign of quickstart: 7 of 8 candidates, U6 0.137 um>
     """
     from .planning.campaign import Request, campaign
     from .planning.constraints import HOUR, Budget
@@ -216,7 +219,7 @@ def reliability(
     >>> reliability(quickstart()).degrees_of_freedom
     580
     """
-    from .reliability import study
+    from .gross_errors import study
 
     return study.reliability(_experiment(experiment), false_alarm, power, sigma)
 
@@ -235,8 +238,8 @@ def reach(
     True
     """
     from .goals import parse_goal
-    from .reach.search import reach as search
-    from .reach.unknowns import NAMES
+    from .requirements.search import reach as search
+    from .requirements.unknowns import NAMES
 
     return search(_experiment(experiment), parse_goal(goal), tuple(unknowns or NAMES), target=target)
 

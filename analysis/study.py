@@ -23,10 +23,10 @@ from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import single_threaded
 
 from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
+from .gross_errors.search import diagnosis
+from .gross_errors.suspects import Diagnosis
 from .plates import PlateCoordinates, plate_coordinates
 from .rank import Verdict, verdict
-from .reliability.search import diagnosis
-from .reliability.suspects import Diagnosis
 from .result import Result
 from .scale import Scale, scale_of
 from .tasks import TaskUncertainty, task_uncertainties

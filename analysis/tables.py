@@ -312,7 +312,7 @@ def fit_lines(fit: Fit) -> list[str]:
         return lines
     lines += ["", *residual_table(fit)]
     if fit.diagnosis:
-        from .reliability.wording import diagnosis_lines
+        from .gross_errors.wording import diagnosis_lines
 
         lines += diagnosis_lines(fit.diagnosis, fit.marks)
     lines += ["", *uncertainty_table(fit.quantities), ""]
@@ -406,7 +406,7 @@ def fit_data(fit: Fit) -> dict[str, Any]:
     """A fit as plain data in metres and radians at full precision; what is undetermined is None."""
     suspected: dict[str, Any] = {}
     if fit.diagnosis:
-        from .reliability.wording import diagnosis_data
+        from .gross_errors.wording import diagnosis_data
 
         suspected = {"suspected": diagnosis_data(fit.diagnosis, fit.marks)}
     return {

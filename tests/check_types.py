@@ -1,6 +1,6 @@
 """Checks the types of the whole package: `python -m tests.check_types`.
 
-The folders `analysis` and `simulator` are parts of one package, as pyproject.toml says. A type checker that reads no
+The folders `analysis`, `simulator` and `designs` are parts of one package, as pyproject.toml says. A type checker that reads no
 package mappings finds it below build/types, where its parts are linked together.
 """
 
@@ -20,7 +20,7 @@ def main() -> int:
     shutil.rmtree(LINKED, ignore_errors=True)
     LINKED.mkdir(parents=True)
     parts = [path for path in sorted((TOP / "analysis").iterdir()) if path.name != "__pycache__"]
-    for part in [*parts, TOP / "simulator"]:
+    for part in [*parts, TOP / "simulator", TOP / "designs"]:
         _link(part, LINKED / part.name)
     return subprocess.run([sys.executable, "-m", "mypy"], cwd=TOP).returncode
 

@@ -54,9 +54,9 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.quantities import QuantityError, parse_length_function
 
     from ..goals import GoalError, parse_goal
-    from ..reach.search import reach
-    from ..reach.tables import reach_data, reach_lines
-    from ..reach.unknowns import NotVariableError
+    from ..requirements.search import reach
+    from ..requirements.tables import reach_data, reach_lines
+    from ..requirements.unknowns import NotVariableError
 
     try:
         goal = parse_goal(options.goal, options.share)

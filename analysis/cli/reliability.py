@@ -54,8 +54,8 @@ def _share(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Tell the reliability of all experiments of the files."""
-    from ..reliability.study import reliability
-    from ..reliability.tables import reliability_data, reliability_lines, write_observations
+    from ..gross_errors.study import reliability
+    from ..gross_errors.tables import reliability_data, reliability_lines, write_observations
     from .common import experiments, print_json, print_lines
 
     if options.power <= options.false_alarm:

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 from ballplate.goals import Goal, GoalError, parse_goal
-from ballplate.reach.search import Answer, reach
-from ballplate.reach.steps import at_step, round_down, round_up, step_of
-from ballplate.reach.unknowns import NotVariableError
+from ballplate.requirements.search import Answer, reach
+from ballplate.requirements.steps import at_step, round_down, round_up, step_of
+from ballplate.requirements.unknowns import NotVariableError
 from ballplate.simulator.experiment.load import load
 from ballplate.study import Plan, plan
 from scipy.optimize import brentq

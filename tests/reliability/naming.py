@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.reliability.events import Cause, cause
-from ballplate.reliability.power import noncentrality
-from ballplate.reliability.search import FAMILY, Search, diagnosis
-from ballplate.reliability.suspects import Diagnosis
+from ballplate.gross_errors.events import Cause, cause
+from ballplate.gross_errors.power import noncentrality
+from ballplate.gross_errors.search import FAMILY, Search, diagnosis
+from ballplate.gross_errors.suspects import Diagnosis
 from ballplate.simulator.design import Design, Readings
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.experiment.load import load

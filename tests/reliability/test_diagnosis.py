@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.reliability.search import diagnosis
-from ballplate.reliability.suspects import Diagnosis, Suspect
-from ballplate.reliability.wording import diagnosis_lines, unexplained_words
+from ballplate.gross_errors.search import diagnosis
+from ballplate.gross_errors.suspects import Diagnosis, Suspect
+from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate
 from ballplate.simulator.estimation.hat import whitened_residuals

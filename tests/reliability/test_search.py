@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.reliability.leftover import leftover
-from ballplate.reliability.scatter import log_chances, ratio, scatters, with_scatter
-from ballplate.reliability.search import Search
+from ballplate.gross_errors.leftover import leftover
+from ballplate.gross_errors.scatter import log_chances, ratio, scatters, with_scatter
+from ballplate.gross_errors.search import Search
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
 from ballplate.simulator.estimation.hat import whitened_residuals

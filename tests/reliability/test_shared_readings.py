@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.reliability.names import name
-from ballplate.reliability.search import diagnosis
-from ballplate.reliability.study import reliability_of
-from ballplate.reliability.tables import reliability_data, write_observations
+from ballplate.gross_errors.names import name
+from ballplate.gross_errors.search import diagnosis
+from ballplate.gross_errors.study import reliability_of
+from ballplate.gross_errors.tables import reliability_data, write_observations
 from ballplate.simulator.design import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.observations import expected_readings
