@@ -9,7 +9,7 @@ from ballplate.simulator.experiment.messages import in_one_line
 
 from .checking import CheckedDesign, CheckedFile
 from .planning.repair.tables import certificate_lines, repair_lines
-from .tables import scale_lines, target_lines, verdict_lines
+from .results.parts import scale_lines, target_lines, verdict_lines
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:

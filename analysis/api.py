@@ -19,13 +19,14 @@ from .simulator.settings import hint
 if TYPE_CHECKING:
     import pandas
 
-    from .gross_errors.study import Reliability
+    from .gross_errors.reliability import Reliability
     from .montecarlo.trials import Progress
-    from .planning.campaign import Campaign
     from .planning.criteria import CriterionName
-    from .requirements.search import Reach
+    from .planning.selection import Campaign
+    from .requirements.answers import Reach
     from .requirements.unknowns import UnknownName
-    from .study import Fit, Plan
+    from .results.fit import Fit
+    from .results.prediction import Prediction
 
 PathLike = str | os.PathLike[str]
 
@@ -73,7 +74,7 @@ def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experimen
     ...     "positions": [{"name": p, "plane": p, "level": "200 mm"} for p in ("xy", "yz", "xz")],
     ... }
     """
-    from .simulator.experiment.changes import written_in_python
+    from .simulator.experiment.load import written_in_python
 
     return written_in_python(sections, Path(folder))
 
@@ -89,7 +90,7 @@ def quickstart() -> Experiment:
     return load(shipped("quickstart.yaml"))
 
 
-def check(experiment: Experiment | PathLike) -> Plan:
+def check(experiment: Experiment | PathLike) -> Prediction:
     """Whether a design determines everything it asks for and, if not, what it leaves open.
 
     >>> check("designs/quickstart.yaml").verdict.deficiency
@@ -107,21 +108,21 @@ def run(
     seed: int | None = None,
     workers: int = 1,
     report: Callable[[Progress], None] = lambda progress: None,
-) -> Plan:
+) -> Prediction:
     """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials` are asked for.
 
     At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty as accurate as
     `until`.
 
     >>> run(quickstart())
-    <Plan of quickstart: full rank, U6 0.143 um on average, 0.325 um at most>
+    <Prediction of quickstart: full rank, U6 0.143 um on average, 0.325 um at most>
     """
     from dataclasses import replace
 
     from . import study
 
     chosen = _experiment(experiment)
-    predicted = study.plan(chosen, with_scale=True)
+    predicted = study.predict(chosen, with_scale=True)
     if trials is None and until is None:
         return predicted
     from .montecarlo import study as replicates

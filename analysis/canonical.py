@@ -9,8 +9,7 @@ that have most freedom in it, and of equal ones the first by the order of names.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design import Integers
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.rounding import comparable
 
 

@@ -14,7 +14,8 @@ from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.experiment.yamltree import Mark
 
 from .goals import Goal, GoalError, check_goal, judge
-from .study import Plan, check, worth
+from .results.prediction import Prediction
+from .study import check, worth
 
 if TYPE_CHECKING:
     from .planning.repair.scale import ScaleCertificate
@@ -29,7 +30,7 @@ class CheckedDesign:
     tell how each goal that was asked for is met, and `missed` what fails of these and of what is weak.
     """
 
-    plan: Plan
+    plan: Prediction
     place: Mark | None
     repairs: Repairs | None = None
     goals: tuple[str, ...] = ()

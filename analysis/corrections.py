@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State, probe_offsets
+from ballplate.simulator.design import Design, State, probe_offsets
 from ballplate.simulator.estimation.observations import offset_sensitivity
 from ballplate.simulator.estimation.parameters import SharedLayout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 
 def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:

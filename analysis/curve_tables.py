@@ -15,7 +15,7 @@ from ballplate.simulator.splines.read import Column
 from ballplate.simulator.spreadsheets import CsvWriter
 
 from .curve import Curve
-from .tables import aligned, number
+from .results.formatting import aligned, number
 
 ORDERS = {2: "broken line", 3: "quadratic spline", 4: "cubic spline", 5: "quartic spline", 6: "quintic spline"}
 MOST_LISTED = 12

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
 from ballplate.simulator.estimation.length_equations import (
     LENGTH_ESTIMATORS,
@@ -21,13 +21,13 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.layout import lay_out
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings import ObservedReadings, observe
 
 from .length_fits import has_all_errors
-from .study import ParameterEstimate
-from .tables import SHOWN, aligned, number
+from .results.fit import ParameterEstimate
+from .results.formatting import SHOWN, aligned, number
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 

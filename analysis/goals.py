@@ -11,8 +11,9 @@ from ballplate.simulator.quantities import QuantityError, parse_positive_angle, 
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.settings import listing
 
-from .study import Plan, Worth
-from .tables import number, percent, shown_unit, uncertainty_words
+from .results.formatting import number, percent, shown_unit, uncertainty_words
+from .results.prediction import Prediction
+from .study import Worth
 from .uncertainty import DESCRIPTIONS, Quantity
 
 FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
@@ -94,7 +95,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     return Goal("quantity", 1.0, symbol, statistic, value)  # type: ignore[arg-type]
 
 
-def check_goal(goal: Goal, plan: Plan | Worth) -> None:
+def check_goal(goal: Goal, plan: Prediction | Worth) -> None:
     """Refuse a goal about what a plan does not have.
 
     :raises GoalError: no target, no tasks, or no such quantity.
@@ -113,7 +114,7 @@ def check_goal(goal: Goal, plan: Plan | Worth) -> None:
         raise GoalError(f"the design has no {goal.symbol}; it has {listing(plan.quantities, 20)}")
 
 
-def judge(goal: Goal, plan: Plan | Worth) -> Judgement:
+def judge(goal: Goal, plan: Prediction | Worth) -> Judgement:
     """Whether a plan meets a goal that `check_goal` lets pass."""
     if goal.kind == "tasks":
         return _judge_tasks(plan)
@@ -138,7 +139,7 @@ def judge(goal: Goal, plan: Plan | Worth) -> Judgement:
     return Judgement(is_met, 1.0 - share, words, found.undetermined)
 
 
-def _judge_tasks(plan: Plan | Worth) -> Judgement:
+def _judge_tasks(plan: Prediction | Worth) -> Judgement:
     ratios = [
         task.coverage_factor * task.standard_uncertainty / task.target for task in plan.tasks if task.target is not None
     ]

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 from .annotations import advice_lines
 from .checking import CheckedDesign, CheckedFile
-from .tables import plan_lines, verdict_lines
+from .results.parts import verdict_lines
 
 # No XML document can hold these, not even as character references.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -42,7 +42,7 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
     case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
-    told = [*plan_lines(design.plan), *advice_lines(design)]
+    told = [*design.plan.lines(), *advice_lines(design)]
     if design.place is None:
         ElementTree.SubElement(case, "system-out").text = _clean("\n".join(told))
         return case

@@ -12,7 +12,7 @@ from ballplate.simulator.quantities import LengthFunction, format_length
 from ballplate.simulator.rounding import comparable
 
 from .lengths import Groups, LengthMap, Settings, length_pairs
-from .tables import aligned, finite, number, percent, uncertainty_words
+from .results.formatting import aligned, finite, number, percent, uncertainty_words
 
 AXES = "xyz"
 POINT_COLUMNS = (

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, nominal_state
+from ballplate.simulator.design import Design, nominal_state
 from ballplate.simulator.estimation.covariance import covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.quantities import LengthFunction
 from ballplate.simulator.rounding import above, comparable
 from ballplate.simulator.threads import single_threaded

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Integers
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.quantities import LengthFunction
 from ballplate.simulator.rounding import comparable
 from numpy.typing import NDArray

@@ -28,8 +28,9 @@ from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
 
 from .plates import axes_of_plates
-from .study import Fit, ParameterEstimate, fit
-from .tables import number
+from .results.fit import Fit, ParameterEstimate
+from .results.formatting import number
+from .study import fit
 
 # The first-order equations may change a result by this many of its standard uncertainties before a warning is due.
 NOTICEABLE = 0.5

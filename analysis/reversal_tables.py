@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.geometry.axes import axes_words
 
+from .results.formatting import SHOWN, aligned, number, to_uncertainty
+from .results.parts import MOST_BALLS
 from .reversal import ReversalFit
-from .tables import MOST_BALLS, SHOWN, aligned, fit_data, number, to_uncertainty
 
 
 def reversal_lines(fit: ReversalFit) -> list[str]:
@@ -88,7 +89,7 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
                 }
                 for e in fit.redundant
             },
-            **fit_data(fit.full),
+            **fit.full.to_dict(),
         },
     }
 

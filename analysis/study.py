@@ -3,104 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from ballplate.simulator.design import Design, Readings, nominal_state, probe_offsets, unknown_lengths
+from ballplate.simulator.design import Design, nominal_state, probe_offsets, unknown_lengths
 from ballplate.simulator.estimation.covariance import Covariance, covariance, shared_covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, fitted_covariance
 from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
 from ballplate.simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.yamltree import Mark
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Array, Unit
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.observation_arrays import Readings
 from ballplate.simulator.readings import ObservedReadings
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import single_threaded
 
-from .adjustments import Adjustment, adjustments, few_degrees_of_freedom
+from .adjustments import Adjustment, adjustments
 from .gross_errors.search import diagnosis
-from .gross_errors.suspects import Diagnosis
-from .plates import PlateCoordinates, plate_coordinates
-from .rank import Verdict, verdict
-from .result import Result
-from .scale import Scale, scale_of
+from .plates import plate_coordinates
+from .rank import verdict
+from .results.fit import Fit, ParameterEstimate, ParameterKind, Residual
+from .results.prediction import Prediction
+from .scale import scale_of
 from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, length_uncertainties, uncertainties
 
 if TYPE_CHECKING:
-    from .montecarlo.study import Trials
+    pass
 
 # Residuals that a fit names.
 LARGEST = 10
-
-
-@dataclass(frozen=True, repr=False)
-class Plan(Result):
-    """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they were asked for.
-
-    `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if that was asked for
-    and is determined. `monte_carlo` has replicates, if they were asked for.
-    """
-
-    label: str
-    title: str
-    design: Design
-    verdict: Verdict
-    quantities: dict[str, Quantity]
-    tasks: tuple[TaskUncertainty, ...] = ()
-    lengths: Quantity | None = None
-    scale: Scale | None = None
-    monte_carlo: Trials | None = None
-
-    def headline(self) -> str:
-        return ", ".join([rank_words(self.verdict), *_uncertainty_words(self.quantities)])
-
-    def lines(self) -> list[str]:
-        from .montecarlo.tables import trials_lines
-        from .tables import plan_lines
-
-        return plan_lines(self) + ([] if self.monte_carlo is None else ["", *trials_lines(self.monte_carlo)])
-
-    def to_dict(self) -> dict[str, Any]:
-        from .montecarlo.tables import trials_data
-        from .tables import plan_data
-
-        replicates = {} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}
-        return plan_data(self) | replicates
-
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each of U1 to U6."""
-        return [{"symbol": symbol, **quantity_row(quantity)} for symbol, quantity in self.quantities.items()]
-
-
-def rank_words(judged: Verdict) -> str:
-    """The rank in two words."""
-    return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
-
-
-def quantity_row(quantity: Quantity) -> dict[str, Any]:
-    """A quantity as the row of a table, in its own unit."""
-    return {
-        "standard uncertainty of": quantity.description,
-        "maximum": quantity.maximum,
-        "average": quantity.average,
-        "unit": quantity.unit,
-        "count": quantity.count,
-        "undetermined": quantity.undetermined,
-        "largest at": quantity.largest,
-    }
-
-
-def _uncertainty_words(quantities: dict[str, Quantity]) -> list[str]:
-    lengths = quantities.get("U6")
-    if lengths is None or np.isnan(lengths.average):
-        return []
-    return [f"U6 {1e6 * lengths.average:.3g} um on average, {1e6 * lengths.maximum:.3g} um at most"]
 
 
 @dataclass(frozen=True)
@@ -112,123 +48,14 @@ class Worth:
     tasks: tuple[TaskUncertainty, ...]
 
 
-ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "ball"]
-
-
-@dataclass(frozen=True)
-class ParameterEstimate:
-    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined.
-
-    `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a standard's length, a ball.
-    """
-
-    name: str
-    value: float
-    standard_uncertainty: float
-    unit: Unit
-    kind: ParameterKind = "machine"
-
-
-@dataclass(frozen=True)
-class Residual:
-    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties.
-
-    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the certificate's.
-    """
-
-    position: str
-    ball: str
-    probe: str
-    axis: str
-    value: float
-    standardised: float
-
-
-@dataclass(frozen=True, repr=False)
-class Fit(Result):
-    """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
-
-    `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
-    freedom, or 1 where the file says that they are given. `adjustments` are those of a three-dimensional metric.
-    `diagnosis` is what the residuals make suspect, which nothing else here heeds; `marks` tell where readings stand.
-    """
-
-    label: str
-    title: str
-    design: Design
-    solution: Solution
-    verdict: Verdict
-    sigma: float
-    sigma_is_estimated: bool
-    degrees_of_freedom: int
-    quantities: dict[str, Quantity]
-    estimates: tuple[ParameterEstimate, ...]
-    largest: tuple[Residual, ...]
-    plates: tuple[PlateCoordinates, ...] = ()
-    adjustments: tuple[Adjustment, ...] = ()
-    tasks: tuple[TaskUncertainty, ...] = ()
-    diagnosis: Diagnosis = Diagnosis()
-    marks: tuple[Mark, ...] = ()
-
-    def headline(self) -> str:
-        if not self.converged:
-            return f"the estimate has {self.solution.status}"
-        return ", ".join([rank_words(self.verdict), f"sigma {self.sigma:.3g}", *_uncertainty_words(self.quantities)])
-
-    def lines(self) -> list[str]:
-        from .tables import fit_lines
-
-        return fit_lines(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        from .tables import fit_data
-
-        return fit_data(self)
-
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each parameter."""
-        return [
-            {
-                "parameter": one.name,
-                "kind": one.kind,
-                "value": one.value,
-                "standard uncertainty": one.standard_uncertainty,
-                "unit": one.unit,
-            }
-            for one in self.estimates
-        ]
-
-    @property
-    def converged(self) -> bool:
-        return self.solution.status == "converged"
-
-    @property
-    def doubt(self) -> str:
-        """What is to be said of sigma where it comes from few degrees of freedom; otherwise empty."""
-        if not self.sigma_is_estimated:
-            return ""
-        return few_degrees_of_freedom(
-            self.degrees_of_freedom, "sigma", "--sigma given takes the uncertainties as stated"
-        )
-
-    @property
-    def too_large(self) -> bool:
-        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in a thousand."""
-        from scipy.special import chdtri
-
-        if not self.converged or self.degrees_of_freedom <= 0:
-            return False
-        return self.solution.factor.sum_of_squares > float(chdtri(self.degrees_of_freedom, 1e-3))
-
-
-def check(experiment: Experiment, design: Design | None = None, with_scale: bool = False) -> Plan:
+def check(experiment: Experiment, design: Design | None = None, with_scale: bool = False) -> Prediction:
     """Judge the rank of an experiment's design, or of what came of it, at zero machine error."""
-    return _plan(experiment, design or lay_out(experiment), False, with_scale)
+    return _predict(experiment, design or lay_out(experiment), False, with_scale)
 
 
-def plan(experiment: Experiment, with_scale: bool = False) -> Plan:
+def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
     """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
-    return _plan(experiment, lay_out(experiment), True, with_scale)
+    return _predict(experiment, lay_out(experiment), True, with_scale)
 
 
 @single_threaded
@@ -244,7 +71,7 @@ def worth(experiment: Experiment) -> Worth:
 
 
 @single_threaded
-def _plan(experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool) -> Plan:
+def _predict(experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool) -> Prediction:
     layout, state = shared_layout(design), nominal_state(design)
     factor = eliminate(design, layout, state)
     found = spectrum(factor)
@@ -261,7 +88,7 @@ def _plan(experiment: Experiment, design: Design, with_quantities: bool, with_sc
     else:
         lengths = length_uncertainties(design, layout, state, spread, experiment.target_accuracy)
     scale = scale_of(experiment, design, layout, state, spread) if with_scale else None
-    return Plan(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
+    return Prediction(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
 
 
 @single_threaded

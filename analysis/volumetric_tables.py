@@ -14,7 +14,7 @@ from ballplate.simulator.quantities import format_length
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.settings import hint, listing
 
-from .tables import SHOWN, aligned, number
+from .results.formatting import SHOWN, aligned, number
 from .volumetric import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
 CONVENTION = "errors are where the tip is, less where the scales say: corrections, to be added to readings"

@@ -6,21 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from .design import (
-    Design,
-    Integers,
-    Priors,
-    Readings,
-    State,
-    locations,
-    nominal_state,
-    probe_offsets,
-    reading_uncertainties,
-)
+from .design import Design, State, locations, nominal_state, probe_offsets, reading_uncertainties
 from .estimation.observations import distance_rows, prior_values
 from .joint_lengths import FLAT
-from .machines.protocol import Array, ErrorModel
+from .machines.protocol import Array, ErrorModel, Integers
 from .machines.truth import TrueMachine
+from .observation_arrays import Priors, Readings
 
 
 class NoReadingError(ValueError):

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .machines.protocol import Array
-from .whitening import Integers, Whitening, whitening
+from .machines.protocol import Array, Integers
+from .whitening import Whitening, whitening
 
 if TYPE_CHECKING:
-    from .design import Lengths
+    from .observation_arrays import Lengths
 
 # Displacements that change lengths by less than this, compared with what changes them most, count as changing none:
 # how straight or flat a standard is, is not known so well, and their effect is of second order.

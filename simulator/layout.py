@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import Coordinates, Design, Distances, Priors, Readings, pose_size
+from .design import Design, pose_size
 from .experiment.messages import ExperimentError
 from .experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior, RadiusCalibration
 from .experiment.yamltree import Mark
@@ -13,6 +13,7 @@ from .geometry.artefacts import BryanGaugeSettings
 from .lengths import standard_lengths
 from .machines.protocol import Array
 from .machines.settings import build_error_model
+from .observation_arrays import Coordinates, Distances, Priors, Readings
 from .rounding import comparable
 
 # Evaluation points of an experiment that names none.

@@ -8,10 +8,10 @@ from itertools import count
 
 import numpy as np
 
-from .design import Integers, Lengths, Readings
 from .experiment.model import DistanceCalibration, Experiment, RadiusCalibration
 from .geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
-from .machines.protocol import Array
+from .machines.protocol import Array, Integers
+from .observation_arrays import Lengths, Readings
 
 
 @dataclass(frozen=True)

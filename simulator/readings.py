@@ -9,13 +9,14 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from .design import Design, Integers, Lengths, Readings
+from .design import Design
 from .estimation.spheres import fit_sphere
 from .experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .experiment.tables import Row, column_names, read_table
 from .experiment.yamltree import Mark
-from .machines.protocol import Array
+from .machines.protocol import Array, Integers
 from .misreading_messages import refuse_misreadings
+from .observation_arrays import Lengths, Readings
 from .settings import hint, listing
 from .spreadsheets import CsvWriter
 

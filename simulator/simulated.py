@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .design import Design, Readings, State
+from .design import Design, State
 from .experiment.messages import ExperimentError
 from .experiment.model import Experiment
 from .generate import NoReadingError, exact_readings, noisy_readings, on_true_machine, true_artefacts
 from .layout import lay_out
 from .machines.protocol import Array, ErrorModel
 from .machines.truth import true_machine
+from .observation_arrays import Readings
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .machines.protocol import Array
-
-Integers = NDArray[np.int64]
+from .machines.protocol import Array, Integers
 
 
 @dataclass(frozen=True)

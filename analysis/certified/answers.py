@@ -11,7 +11,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.readings import read_readings
 
-from ..study import fit, plan
+from ..study import fit, predict
 from ..uncertainty import Quantity
 from .problems import CertifiedProblem
 
@@ -24,7 +24,7 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
     :raises ExperimentError: the experiment file or the readings beside the problem's file cannot be used.
     """
     experiment = load(problem.experiment_file)[0]
-    drawn = plan(experiment)
+    drawn = predict(experiment)
     found: dict[str, Any] = {
         "as_drawn": {
             "rank_deficiency": drawn.verdict.deficiency,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ..tables import aligned
+from ..results.formatting import aligned
 from .problems import CertifiedProblem
 from .score import Score
 

@@ -73,7 +73,6 @@ def run(options: Namespace) -> int:
     from ..file_patterns import matching_files
     from ..goals import GoalError, parse_goal
     from ..junit import junit_report
-    from ..tables import plan_data, plan_lines
     from .common import print_json, print_lines
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
@@ -97,7 +96,7 @@ def run(options: Namespace) -> int:
                 print(line, flush=True)
         elif options.format == "text":
             for design in checked.designs:
-                print_lines([*plan_lines(design.plan), *advice_lines(design)])
+                print_lines([*design.plan.lines(), *advice_lines(design)])
         if options.format in ("text", "json"):
             for message in checked.messages:
                 print(message, file=sys.stderr)
@@ -105,7 +104,7 @@ def run(options: Namespace) -> int:
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([plan_data(one.plan) | _asked(one, options.suggest) for one in designs])
+        print_json([one.plan.to_dict() | _asked(one, options.suggest) for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings import ObservedReadings
 
-    from ..study import Fit
+    from ..results.fit import Fit
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -84,7 +84,6 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.settings import listing
 
     from ..study import fit
-    from ..tables import fit_data, fit_lines
     from .common import print_json, print_lines, single
 
     for option, given, estimators in (
@@ -120,9 +119,9 @@ def run(options: Namespace) -> int:
         return _run_other(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
     if options.json:
-        print_json([fit_data(result)])
+        print_json([result.to_dict()])
     else:
-        print_lines(fit_lines(result))
+        print_lines(result.lines())
     if result.solution.status != "converged":
         text = "see the record of iterations, and look for wrong units, balls or probes among the readings"
         print(f"the estimate has {result.solution.status} and nothing is made of it: {text}", file=sys.stderr)

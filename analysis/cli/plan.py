@@ -26,8 +26,8 @@ from .common import (
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
-    from ..planning.campaign import Campaign
     from ..planning.schedule import RunSheet
+    from ..planning.selection import Campaign
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 SHEETS = (".html", ".md", ".csv", ".txt")
@@ -123,8 +123,6 @@ def run(options: Namespace) -> int:
     from ..planning.done import done_candidates
     from ..planning.earlier import earlier_choice
     from ..planning.offer import offer
-    from ..planning.schedule import run_sheet
-    from ..planning.tables import campaign_data, campaign_lines
     from ..processes import processors
 
     if not options.force:
@@ -160,11 +158,11 @@ def run(options: Namespace) -> int:
         budget = Budget(seconds, options.readings, options.positions)
     request = Request(options.criterion, budget, options.curve, options.seed)
     found = campaign(experiment, request, offered, earlier, options.workers or processors(), _report)
-    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
+    sheet = found.sheet
     if options.json:
-        print_json([campaign_data(found, sheet)])
+        print_json([found.to_dict()])
     else:
-        print_lines(campaign_lines(found, sheet))
+        print_lines(found.lines())
     if not _written(found, sheet, options):
         return BAD_FILE
     is_full = found.plan.verdict.deficiency == found.left_open

@@ -55,7 +55,6 @@ def run(options: Namespace) -> int:
 
     from ..goals import GoalError, parse_goal
     from ..requirements.search import reach
-    from ..requirements.tables import reach_data, reach_lines
     from ..requirements.unknowns import NotVariableError
 
     try:
@@ -68,9 +67,9 @@ def run(options: Namespace) -> int:
         print(f"ballplate reach: {error}", file=sys.stderr)
         return WRONG_USAGE
     if options.json:
-        print_json([reach_data(found)])
+        print_json([found.to_dict()])
     else:
-        print_lines(reach_lines(found))
+        print_lines(found.lines())
     if options.fail:
         return 0 if found.present.is_met else 1
     met = [one.is_met for one in found.answers]

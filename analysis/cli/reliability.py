@@ -54,8 +54,8 @@ def _share(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Tell the reliability of all experiments of the files."""
+    from ..gross_errors.reliability import write_observations
     from ..gross_errors.study import reliability
-    from ..gross_errors.tables import reliability_data, reliability_lines, write_observations
     from .common import experiments, print_json, print_lines
 
     if options.power <= options.false_alarm:
@@ -74,9 +74,9 @@ def run(options: Namespace) -> int:
     for number, experiment in enumerate(chosen):
         result = reliability(experiment, options.false_alarm, options.power, options.sigma)
         if options.json:
-            found.append(reliability_data(result))
+            found.append(result.to_dict())
         else:
-            print_lines([*([""] if number else []), *reliability_lines(result, options.all)])
+            print_lines([*([""] if number else []), *result.lines(options.all)])
         if options.csv is not None:
             try:
                 with options.csv.open("w", encoding="utf-8", newline="") as stream:

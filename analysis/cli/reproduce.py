@@ -94,9 +94,7 @@ def run(options: Namespace) -> int:
 
     trials = None if options.quick else options.trials
     try:
-        found = reproduce(
-            document, Shipped(options.designs or shipped("npl")), options.experiment, trials, report
-        )
+        found = reproduce(document, Shipped(options.designs or shipped("npl")), options.experiment, trials, report)
     finally:
         for bar in bars.values():
             bar.close()

@@ -46,8 +46,7 @@ def _trial_count(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
-    from ..study import plan
-    from ..tables import plan_data, plan_lines
+    from ..study import predict
     from .common import experiments, print_json, print_lines
 
     plans, found, interrupted = [], [], False
@@ -56,10 +55,10 @@ def run(options: Namespace) -> int:
         print("ballplate run: --seed and --workers have a meaning with --trials or --until only", file=sys.stderr)
         return WRONG_USAGE
     for experiment in experiments(options):
-        plans.append(plan(experiment, with_scale=True))
+        plans.append(predict(experiment, with_scale=True))
         if not options.json:
-            print_lines([*([""] if len(plans) > 1 else []), *plan_lines(plans[-1])])
-        data: dict[str, Any] = plan_data(plans[-1])
+            print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
+        data: dict[str, Any] = plans[-1].to_dict()
         if with_trials:
             from ..montecarlo.tables import trials_data, trials_lines
 

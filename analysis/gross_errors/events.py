@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.design import Integers
+from ballplate.simulator.machines.protocol import Integers
 
 from .patterns import Kind, Patterns
 

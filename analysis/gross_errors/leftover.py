@@ -8,13 +8,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation.covariance import Covariance, covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import as_drawn
 from ballplate.simulator.estimation.hat import hat_rows, row_places, whitened_residuals
 from ballplate.simulator.estimation.parameters import shared_layout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

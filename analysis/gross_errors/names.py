@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers
+from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Integers
 
 from .patterns import Patterns
 

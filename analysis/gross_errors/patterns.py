@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State, locations, probe_offsets
+from ballplate.simulator.design import Design, State, locations, probe_offsets
 from ballplate.simulator.estimation.hat import RowPlaces, row_places
 from ballplate.simulator.estimation.observations import (
     expected_readings,
@@ -22,7 +22,7 @@ from ballplate.simulator.estimation.observations import (
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
     from ballplate.simulator.whitening import Whitening

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation.covariance import Covariance
 from ballplate.simulator.estimation.hat import hat_rows
 from ballplate.simulator.estimation.parameters import SharedLayout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 from .patterns import Patterns
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, reading_uncertainties
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Design, reading_uncertainties
+from ballplate.simulator.machines.protocol import Array, Integers
 
 from .leftover import Leftover
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State
+from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.threads import single_threaded
 
 from .events import SLIP, Cause, cause, event_groups, whole

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State, probe_offsets
+from ballplate.simulator.design import Design, State, probe_offsets
 from ballplate.simulator.estimation.observations import length_directions, reading_weights, rotation_sensitivity
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.polynomial import legendre
 
 # Scale readings closer than this (m) count as the same place on a scale.

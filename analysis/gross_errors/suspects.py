@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers
-from ballplate.simulator.machines.protocol import Array, Unit
+from ballplate.simulator.design import Design
+from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
 from .patterns import Patterns
 from .scatter import Scatter

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import Integers
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.experiment.yamltree import Mark
+from ballplate.simulator.machines.protocol import Integers
 from ballplate.simulator.settings import listing
 
-from ..tables import SHOWN, number
+from ..results.formatting import SHOWN, number
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
 from .search import MOST

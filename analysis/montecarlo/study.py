@@ -8,7 +8,7 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from ballplate.simulator.design import Design, Priors, nominal_state
+from ballplate.simulator.design import Design, nominal_state
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.parameters import shared_layout
@@ -19,6 +19,7 @@ from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
+from ballplate.simulator.observation_arrays import Priors
 
 from .figures import Outcome, outcome, power_of_difference, power_of_misfit
 from .tally import Tally

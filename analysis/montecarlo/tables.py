@@ -7,7 +7,7 @@ from typing import Any
 
 from ballplate.simulator.settings import listing
 
-from ..tables import aligned, number, shown_unit
+from ..results.formatting import aligned, number, shown_unit
 from .figures import BEYOND, Comparison, Figure, Outcome
 from .study import Trials
 

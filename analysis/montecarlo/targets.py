@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Integers, probe_offsets
+from ballplate.simulator.design import probe_offsets
 from ballplate.simulator.estimation.covariance import Covariance, covariance
 from ballplate.simulator.estimation.observations import offset_sensitivity
 from ballplate.simulator.geometry.motions import vector_from_rotation
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.montecarlo.reference import Reference
 from ballplate.simulator.montecarlo.replicates import Deviations
 from ballplate.simulator.threads import single_threaded

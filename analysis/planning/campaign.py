@@ -5,26 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment.messages import ExperimentError, Message
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import AtMost, Candidate, Pool, with_chosen
+from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.settings import listing
 from ballplate.simulator.threads import single_threaded
 
 from ..processes import in_processes
-from ..result import Result
-from ..study import Plan, plan
+from ..study import predict
 from .bound import Bound, bound
-from .constraints import Budget, Constraints, Spent, constraints
+from .constraints import Budget, Constraints, constraints
 from .criteria import CriterionName, criterion, is_about_balls
 from .information import pool_information
 from .offer import Offer, offer, open_directions
-from .schedule import Completion, RunSheet, run_sheet
+from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
+from .selection import Campaign, CurvePoint, Gain
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -48,121 +47,6 @@ class Request:
     budget: Budget | None = None
     curve: bool = False
     seed: int = 1
-
-
-@dataclass(frozen=True)
-class Gain:
-    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something is undetermined."""
-
-    candidate: Candidate
-    without: float
-    with_: float
-
-    @property
-    def relative(self) -> float:
-        """How much larger the criterion is without it."""
-        return self.without / self.with_ - 1.0
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """The best selection found for a budget; `bound` is NaN where there is none."""
-
-    budget: Budget
-    spent: Spent
-    chosen: tuple[Candidate, ...]
-    value: float
-    bound: float
-
-
-@dataclass(frozen=True, repr=False)
-class Campaign(Result):
-    """A selection and what is to be said of it; values in metres, those of `condition` ratios.
-
-    `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
-    order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
-    `interrupted` are all that were read in part, and `left_open` counts the directions of their own poses and lengths
-    that stay undetermined where they are left so; nothing else depends on these. What has been read and is `ignored` is
-    no part of it. `value` is infinite where the
-    selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
-    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
-    the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
-    """
-
-    experiment: Experiment
-    pool: Pool
-    criterion: CriterionName
-    unit: str
-    excluded: int
-    budget: Budget
-    chosen: tuple[Candidate, ...]
-    done: tuple[Candidate, ...]
-    spent: Spent
-    value: float
-    bound: float
-    drawn: float | None
-    drawn_words: str
-    drawn_spent: Spent | None
-    target: float | None
-    gains: tuple[Gain, ...]
-    left_out: tuple[Gain, ...]
-    plan: Plan
-    curve: tuple[CurvePoint, ...] = ()
-    completed: Completion | None = None
-    interrupted: tuple[Candidate, ...] = ()
-    left_open: int = 0
-    ignored: tuple[Candidate, ...] = ()
-
-    @property
-    def label(self) -> str:  # type: ignore[override]
-        return self.plan.label
-
-    @property
-    def title(self) -> str:  # type: ignore[override]
-        return self.plan.title
-
-    @property
-    def sheet(self) -> RunSheet:
-        """The choice in the order in which it is to be read."""
-        return run_sheet(self.chosen, self.pool.changes, self.done, self.completed, self.interrupted)
-
-    def headline(self) -> str:
-        count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
-        if not self.is_determined:
-            return f"{count}; something stays undetermined"
-        value = f"{1e6 * self.value:.4g} um" if self.unit == "m" else f"{self.value:.4g}"
-        return f"{count}, {self.criterion} {value}"
-
-    def lines(self) -> list[str]:
-        from .tables import campaign_lines
-
-        return campaign_lines(self, self.sheet)
-
-    def to_dict(self) -> dict[str, Any]:
-        from .tables import campaign_data
-
-        return campaign_data(self, self.sheet)
-
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each step of the run sheet, times in seconds."""
-        from .sheet_forms import sheet_data
-
-        return list(sheet_data(self.sheet)["steps"])
-
-    @property
-    def efficiency(self) -> float:
-        """Bound over value: the selection is at most this far from the best possible."""
-        return self.bound / self.value
-
-    @property
-    def drawn_is_within(self) -> bool:
-        """Whether what it is compared with keeps to the budget; then the choice is never worse."""
-        spent, budget = self.drawn_spent, self.budget
-        return spent is None or spent.is_within(budget)
-
-    @property
-    def is_determined(self) -> bool:
-        return bool(np.isfinite(self.value))
 
 
 def campaign(
@@ -283,7 +167,7 @@ def _campaign(
         wanted.target,
         _gains(problem, best, candidates),
         _left_out(unlimited, best, candidates),
-        plan(replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)),
+        predict(replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.experiment.model import Position
-from ballplate.simulator.experiment.pool import AtMost, Candidate, ChangeTimes
+from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Position
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 

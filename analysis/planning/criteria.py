@@ -13,12 +13,11 @@ from functools import cached_property
 from typing import Literal, Protocol, get_args
 
 import numpy as np
-from ballplate.simulator.design import Integers
 from ballplate.simulator.estimation.observations import offset_sensitivity
 from ballplate.simulator.experiment.messages import ExperimentError, Message
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..tasks import task_differences, task_rows
 from .information import Information

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import Readings
 from ballplate.simulator.experiment.messages import ExperimentError, Message
-from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
-from ballplate.simulator.experiment.pool import Candidate, with_chosen
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.experiment.tables import column_names, read_table
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.observation_arrays import Readings
 from ballplate.simulator.quantities import length_text
 from ballplate.simulator.readings import AXES, read_readings
 from ballplate.simulator.settings import hint

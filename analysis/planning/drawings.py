@@ -6,8 +6,7 @@ from html import escape
 
 import numpy as np
 from ballplate.simulator.experiment.messages import in_one_line
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import Candidate
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.geometry.positions import AXIS_INDEX, ball_coordinates
 
 SIZE, MARGIN = 170.0, 22.0

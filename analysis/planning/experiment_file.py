@@ -13,8 +13,7 @@ from typing import Any
 
 import yaml
 from ballplate.simulator.experiment.messages import ExperimentError, format_path, in_one_line
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import Candidate
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.problems import Problems
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.experiment.variants import variant_trees

@@ -22,8 +22,7 @@ from ballplate.simulator.estimation.graded import Collected, Triangle
 from ballplate.simulator.estimation.graded import triangle as triangular
 from ballplate.simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
 from ballplate.simulator.experiment.messages import ExperimentError, Message
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import Candidate
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.threads import scipy_linalg, single_threaded
 

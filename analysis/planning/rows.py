@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design import Design, Integers, State, nominal_state
+from ballplate.simulator.design import Design, State, nominal_state
 from ballplate.simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
@@ -28,7 +28,7 @@ from ballplate.simulator.experiment.model import (
     RadiusCalibration,
 )
 from ballplate.simulator.layout import lay_out
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 # A micrometre: columns are scaled so that a unit step moves some point by up to this.
 STEP = 1e-6

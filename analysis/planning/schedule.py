@@ -7,8 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.experiment.model import Position
-from ballplate.simulator.experiment.pool import Candidate, ChangeTimes
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.settings import listing
 
 from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of

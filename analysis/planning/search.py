@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.design import Integers
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import scipy_linalg, single_threaded
 

@@ -12,7 +12,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.quantities import format_duration
 from ballplate.simulator.spreadsheets import CsvWriter
 
-from ..tables import aligned
+from ..results.formatting import aligned
 from .drawings import place_drawing
 from .schedule import RunSheet, Step
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..planning.campaign import Campaign, Gain
 from ..planning.constraints import HOUR, Budget, Spent
 from ..planning.criteria import DESCRIPTIONS
-from ..tables import number
+from ..planning.selection import Campaign, Gain
+from ..results.formatting import number
 from .pictures import draw_scene
 from .scene import scene
 from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, placed_axes, save

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from ballplate.simulator.spreadsheets import CsvWriter
 
-from ..tables import aligned
+from ..results.formatting import aligned
 from .tables import Block, Row, Table
 
 WIDTH = 120

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables import number
+from ..results.formatting import number
 from .measures import Measure, uncertainty_measures
 from .results import Axis, Results, criterion, partly_open
 from .tables import DIGITS, NOT_DONE, STAR, Entry

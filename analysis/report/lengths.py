@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..length_tables import target_words
 from ..lengths import LengthMap
-from ..tables import percent
+from ..results.formatting import percent
 from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
 
 if TYPE_CHECKING:

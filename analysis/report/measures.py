@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..results.formatting import shown_unit
 from ..sweeps.columns import symbol_column
-from ..tables import shown_unit
 from ..uncertainty import DESCRIPTIONS
 from .results import Results
 

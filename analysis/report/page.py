@@ -14,8 +14,8 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.settings import listing
 
+from ..results.formatting import number, percent, uncertainty_words
 from ..sweeps.store import Store
-from ..tables import number, percent, uncertainty_words
 from ..uncertainty import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps

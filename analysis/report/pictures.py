@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from ballplate.simulator.machines.protocol import Array
 
-from ..tables import number
+from ..results.formatting import number
 from .scene import Place, Scene
 from .svg import DASHES, INK, MUTED, PAPER, SERIES, WIDTH, as_svg, blank_axes, drawing, placed_axes
 from .volume import ErrorMap, Slice

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from ..montecarlo.figures import Figure
 from ..montecarlo.tables import with_error
+from ..results.formatting import number, percent
 from ..sweeps.columns import symbol_column
-from ..tables import number, percent
 from .measures import (
     Measure,
     descriptions,

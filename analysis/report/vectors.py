@@ -10,8 +10,9 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings import ObservedReadings
 
+from ..results.fit import Fit
 from ..reversal import ReversalFit
-from ..study import Fit, reading_residuals
+from ..study import reading_residuals
 from .svg import INK, MARKERS, MUTED, SERIES, WIDTH, drawing, placed_axes, round_number, save
 
 # Of the drawing's extent, the longest vector takes this part at most.

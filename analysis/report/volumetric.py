@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design import Integers
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.volumetric import meaning, symbol
 from ballplate.simulator.rounding import comparable
 
-from ..tables import SHOWN, number
+from ..results.formatting import SHOWN, number
 from ..volumetric import AlongAxis, LengthErrors, VolumetricErrors
 from .scene import box_edges, projection
 from .svg import (

@@ -14,7 +14,9 @@ from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings import ObservedReadings
 from ballplate.simulator.settings import hint
 
-from ..study import Fit, Plan, fit, plan
+from ..results.fit import Fit
+from ..results.prediction import Prediction
+from ..study import fit, predict
 from ..uncertainty import Quantity
 from .quantities import tabulated_quantities
 
@@ -25,7 +27,7 @@ class Shipped:
 
     folder: Path
     loaded: dict[str, dict[str, Experiment]] = field(default_factory=dict)
-    plans: dict[str, Plan] = field(default_factory=dict)
+    plans: dict[str, Prediction] = field(default_factory=dict)
     tabulated: dict[str, dict[str, Quantity]] = field(default_factory=dict)
 
 
@@ -57,10 +59,10 @@ def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
     return found[label]
 
 
-def planned(shipped: Shipped, label: str) -> Plan:
+def planned(shipped: Shipped, label: str) -> Prediction:
     """The plan of a shipped design, at zero machine error."""
     if label not in shipped.plans:
-        shipped.plans[label] = plan(shipped_experiment(shipped, label))
+        shipped.plans[label] = predict(shipped_experiment(shipped, label))
     return shipped.plans[label]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..tables import aligned, number
+from ..results.formatting import aligned, number
 from .compare import (
     ComparedColumn,
     ComparedErratum,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from ballplate.simulator.experiment.load import build
@@ -17,8 +17,8 @@ from ballplate.simulator.settings import listing
 from ballplate.simulator.threads import single_threaded
 
 from ..goals import Goal, Judgement, check_goal, judge
-from ..result import Result
-from ..study import Worth, plan, worth
+from ..study import Worth, predict, worth
+from .answers import Answer, Reach
 from .steps import PER_DECADE
 from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
 
@@ -41,61 +41,6 @@ class Tried:
     @property
     def is_met(self) -> bool:
         return self.judgement is not None and self.judgement.is_met
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What an unknown must be for the goal to be met, the others as they are.
-
-    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that was looked at
-    does; `none` does; nothing of this kind repairs what is `undetermined`; or the unknown cannot be `varied`. `words`
-    and `value`, in metres or a number, are the value needed, or without one that comes nearest, or the last looked at;
-    `outcome` is what the plan with it gives. `remarks` tell of the range.
-    """
-
-    name: UnknownName
-    title: str
-    status: Literal["found", "any", "none", "undetermined", "varied"]
-    present: str = ""
-    grows: bool = False
-    words: str = ""
-    value: float | None = None
-    outcome: str = ""
-    beside: str = ""
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def is_met(self) -> bool:
-        return self.status in ("found", "any")
-
-
-@dataclass(frozen=True, repr=False)
-class Reach(Result):
-    """A goal, what the design as it is makes of it, and what each unknown must be."""
-
-    label: str
-    title: str
-    goal: Goal
-    present: Judgement
-    deficiency: int
-    answers: tuple[Answer, ...]
-
-    def headline(self) -> str:
-        return self.present.words
-
-    def lines(self) -> list[str]:
-        from .tables import reach_lines
-
-        return reach_lines(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        from .tables import reach_data
-
-        return reach_data(self)
-
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each unknown."""
-        return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
 
 
 @single_threaded
@@ -201,7 +146,7 @@ class _Trials:
 
     def verified(self, step: int) -> Judgement:
         """A value judged by a plan of its own."""
-        return judge(self.searched.goal, plan(self.searched.built(self.one.tree(step))))
+        return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
 
     def is_right(self, step: int) -> bool:
         """Whether the file is right with a value, which is quicker to find out than what comes of it."""

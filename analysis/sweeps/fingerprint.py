@@ -25,7 +25,7 @@ METHODS = {
 METHOD = max(METHODS)
 
 # What says nothing about the result: names, and where things stand.
-LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "tree", "_folder")
+LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "tree", "builder", "_folder")
 
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import Integers
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..montecarlo.tally import QuantityTally, Tally
 from .fingerprint import METHOD, METHODS, method_of

@@ -19,7 +19,8 @@ from ballplate.simulator.threads import single_threaded
 from ..montecarlo.figures import Figure, Outcome
 from ..montecarlo.study import Trials, block_of_trials, combined, trials
 from ..montecarlo.tally import Tally
-from ..study import Plan, plan
+from ..results.prediction import Prediction
+from ..study import predict
 from .columns import symbol_column, unit_suffix
 from .fingerprint import fingerprint, with_method, without_method
 from .load import experiment_of
@@ -106,7 +107,7 @@ def _computed(sweep: Sweep, task: Task) -> Row:
 
 
 def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int) -> Row:
-    planned = plan(experiment)
+    planned = predict(experiment)
     figures, details = plan_figures(planned, sweep.record)
     if sweep.trials is not None:
         if task.total is not None:
@@ -148,7 +149,7 @@ def seed_of(sweep: Sweep, key: str) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
 
-def plan_figures(planned: Plan, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:
+def plan_figures(planned: Prediction, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:
     """Figures and texts of a plan."""
     judged = planned.verdict
     counted = judged.singular_values[: len(judged.singular_values) - judged.deficiency]

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, Integers, State
-from ..machines.protocol import Array
+from ..design import Design, State
+from ..machines.protocol import Array, Integers
 from ..threads import scipy_linalg, single_threaded
 from .graded import Collected, without_balls
 from .observations import (

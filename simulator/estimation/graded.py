@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Integers
-from ..machines.protocol import Array
+from ..machines.protocol import Array, Integers
 from ..threads import scipy_linalg
 
 # Rows that are collected, in multiples of the columns, before they are brought to a triangle.

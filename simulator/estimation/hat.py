@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design, Integers, State
-from ..machines.protocol import Array
+from ..design import Design, State
+from ..machines.protocol import Array, Integers
 from ..threads import single_threaded
 from .covariance import Covariance
 from .elimination import ROWS_AT_ONCE

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..design import Design, Integers, State
+from ..design import Design, State
 from ..geometry.motions import fit_motion
-from ..machines.protocol import Array
+from ..machines.protocol import Array, Integers
 from ..rounding import comparable
 from .spheres import fit_sphere
 

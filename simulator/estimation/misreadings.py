@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design import Design, Integers
+from ..design import Design
 from ..geometry.motions import fit_motion
-from ..machines.protocol import Array
+from ..machines.protocol import Array, Integers
 from .consensus import consensus_motion, distances
 from .initial import initial_state
 

@@ -11,19 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import (
-    Design,
-    Integers,
-    Readings,
-    State,
-    locations,
-    pose_size,
-    probe_offsets,
-    reading_uncertainties,
-    unknown_lengths,
-)
+from ..design import Design, State, locations, pose_size, probe_offsets, reading_uncertainties, unknown_lengths
 from ..geometry.motions import vector_from_rotation, vector_rate
-from ..machines.protocol import Array, ErrorModel
+from ..machines.protocol import Array, ErrorModel, Integers
+from ..observation_arrays import Readings
 from .parameters import SharedLayout
 
 # Metres: of the size of probe offsets.

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..design import Integers
-from ..machines.protocol import Array
+from ..machines.protocol import Array, Integers
 from ..threads import scipy_linalg
 from .elimination import Factor
 

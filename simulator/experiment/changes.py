@@ -5,28 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence as AnySequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .messages import ExperimentError, Message
+from .messages import ExperimentError
 from .variants import override, removed
 from .yamltree import Mapping, Mark, Node, Scalar, Sequence
 
-if TYPE_CHECKING:
-    from .model import Experiment
 
+def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
+    """What was written in a file, with new values at some paths; None removes what stands there.
 
-def changed(experiment: Experiment, changes: AnyMapping[str, Any]) -> Experiment:
-    """The experiment with new values at some paths of what was written; None removes what stands there.
-
-    :raises ExperimentError: a path that does not exist, a value that no file could hold, or an experiment that is
-        wrong so.
+    :raises ExperimentError: a path that does not exist, or a value that no file could hold.
     """
-    from .load import build
-
-    mark = Mark(f"{experiment.source} as changed", 0, 0)
-    tree, messages = experiment.tree, []
+    mark = Mark(f"{file} as changed", 0, 0)
+    messages = []
     for path, value in changes.items():
         try:
             tree = removed(tree, path) if value is None else override(tree, path, node_of(value, mark), mark)
@@ -34,32 +28,7 @@ def changed(experiment: Experiment, changes: AnyMapping[str, Any]) -> Experiment
             messages.append(mark.message(path, str(error)))
     if messages:
         raise ExperimentError(messages)
-    found, messages = build(tree, experiment.source, experiment.name, experiment.pool is not None)
-    if found is None:
-        raise ExperimentError(sorted(messages))
-    return found
-
-
-def written_in_python(sections: AnyMapping[str, Any], folder: Path, planning: bool = False) -> Experiment:
-    """The experiment of a mapping that holds what a file would, with paths relative to a folder.
-
-    :raises ExperimentError: it is wrong; holds everything that was found.
-    """
-    from .load import build
-
-    source = folder / "experiment.yaml"
-    mark = Mark("experiment", 0, 0)
-    try:
-        tree = node_of(sections, mark)
-    except ValueError as error:
-        raise ExperimentError([mark.message("", str(error))]) from None
-    if "variants" in sections:
-        text = "are for files; make one experiment of each with with_()"
-        raise ExperimentError([Message(mark.file, 0, 0, "variants", text)])
-    found, messages = build(tree, source, None, planning)
-    if found is None:
-        raise ExperimentError(sorted(messages))
-    return found
+    return tree
 
 
 def node_of(value: object, mark: Mark) -> Node:

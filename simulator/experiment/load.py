@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
+from .changes import node_of
 from .checks import (
     check_calibration_read,
     check_error_model,
@@ -30,7 +34,7 @@ from .problems import Problems, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
 from .variants import in_variants, variant_trees
-from .yamltree import Mapping, Node, mark_of, read_tree
+from .yamltree import Mapping, Mark, Node, mark_of, read_tree
 
 
 def load(path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True) -> tuple[Experiment, ...]:
@@ -79,10 +83,35 @@ def with_pool(experiment: Experiment) -> Experiment:
 
     :raises ExperimentError: what a plan may choose from is wrong.
     """
-    found, messages = build(experiment.tree, experiment.source, experiment.name, planning=True)
+    found = _built(experiment.tree, experiment.source, experiment.name, planning=True)
+    return replace(found, mark=experiment.mark)
+
+
+def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experiment:
+    """The experiment of a mapping that holds what a file would, with paths relative to a folder.
+
+    :raises ExperimentError: it is wrong; holds everything that was found.
+    """
+    mark = Mark("experiment", 0, 0)
+    if "variants" in sections:
+        text = "are for files; change an experiment with its method with_()"
+        raise ExperimentError([mark.message("variants", text)])
+    try:
+        tree = node_of(sections, mark)
+    except ValueError as error:
+        raise ExperimentError([mark.message("", str(error))]) from None
+    return _built(tree, folder / "experiment", None, False)
+
+
+def _built(root: Node, source: Path, name: str | None, planning: bool) -> Experiment:
+    """The experiment of a tree.
+
+    :raises ExperimentError: it is wrong.
+    """
+    found, messages = build(root, source, name, planning)
     if found is None:
         raise ExperimentError(sorted(messages))
-    return replace(found, mark=experiment.mark)
+    return found
 
 
 def build(
@@ -158,6 +187,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         seed=sections.get("seed"),
         tree=root,
         mark=mark_of(root, ("positions",), of_key=True),
+        builder=partial(_built, source=source, name=name, planning=planning),
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         offset_uncertainties=offset_uncertainties,

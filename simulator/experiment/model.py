@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..quantities import LengthFunction, Target
+from .changes import changed_tree
 from .messages import Message, Steps, format_path
 from .yamltree import Mark, Node, mark_of, written
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
-    from .pool import Pool
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -176,6 +176,64 @@ class Evaluation:
     tasks: tuple[Task, ...] = ()
 
 
+@dataclass(frozen=True)
+class ChangeTimes:
+    """Seconds that go between positions: for another probe, and for another plane or artefact."""
+
+    probe: float
+    plane: float
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A position, or a calibration item, that a plan may choose.
+
+    `seconds` is what it takes by itself: set-up, readings and changes of probe within it, or the price of a
+    calibration item. `plane` names the axis that the artefact stands across, empty where the pose is free and for a
+    calibration item. `group` is the entry of the pool that it comes from, empty for positions that are `drawn`, in the
+    experiment's own list. `settings` is what an experiment file says of it. `reading_seconds` is what a reading takes.
+    """
+
+    name: str
+    item: Position | Calibration
+    seconds: float
+    plane: str
+    group: str
+    drawn: bool
+    settings: Mapping[str, Any]
+    reading_seconds: float = 0.0
+
+    @property
+    def readings(self) -> int:
+        """Readings that it takes, every repeat counted."""
+        if not isinstance(self.item, Position):
+            return 0
+        return sum(len(group.probes) * len(group.balls) * group.repeats for group in self.item.readings)
+
+
+@dataclass(frozen=True)
+class AtMost:
+    """A limit: of `members`, indices of candidates, no more than `count`."""
+
+    members: tuple[int, ...]
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Candidates in order, positions of the experiment itself first, and the limits on choosing them.
+
+    `must` are the indices of what has to be chosen. `dropped` tells how many candidates were generated but
+    cannot be read, or stand there twice, by the reason.
+    """
+
+    candidates: tuple[Candidate, ...]
+    changes: ChangeTimes
+    must: tuple[int, ...]
+    at_most: tuple[AtMost, ...]
+    dropped: Mapping[str, int]
+
+
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """A complete experiment, or one variant of it.
@@ -186,7 +244,7 @@ class Experiment:
     ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
     by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
     may choose from. ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
-    without variants, and ``mark``: where the experiment itself stands.
+    without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an experiment of a tree.
     """
 
     title: str
@@ -206,8 +264,9 @@ class Experiment:
     sigma: Literal["estimated", "given"]
     expected_rank_deficiency: int | None
     seed: int
-    tree: Node = field(repr=False)
-    mark: Mark = field(repr=False)
+    tree: Node
+    mark: Mark
+    builder: Callable[[Node], Experiment]
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
@@ -244,6 +303,4 @@ class Experiment:
 
         :raises ExperimentError: a path that does not exist, or an experiment that is wrong so.
         """
-        from .changes import changed
-
-        return changed(self, {**(changes or {}), **sections})
+        return self.builder(changed_tree(self.tree, str(self.source), {**(changes or {}), **sections}))

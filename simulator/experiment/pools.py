@@ -17,9 +17,8 @@ from ..settings import hint, listing
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
 from .messages import Steps, format_path
-from .model import Calibration, Floats, Machine, Position, RadiusCalibration
+from .model import AtMost, Calibration, Candidate, ChangeTimes, Floats, Machine, Pool, Position, RadiusCalibration
 from .placements import resolve_position
-from .pool import AtMost, Candidate, ChangeTimes, Pool
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (
     LimitsSettings,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, Integers, State, nominal_state, probe_offsets
+from ..design import Design, State, nominal_state, probe_offsets
 from ..estimation.covariance import Spectrum, spectrum
 from ..estimation.elimination import Factor, eliminate
 from ..estimation.gauss_newton import gauss_newton
@@ -19,7 +19,7 @@ from ..estimation.observations import (
 )
 from ..estimation.parameters import shared_layout
 from ..generate import scale_readings, true_lengths, true_priors
-from ..machines.protocol import Array, ErrorModel
+from ..machines.protocol import Array, ErrorModel, Integers
 from ..threads import single_threaded
 from .expansion import Direct, LocalModel, expand
 

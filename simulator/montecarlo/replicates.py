@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Integers, Lengths
 from ..estimation.elimination import Factor
 from ..estimation.observations import length_values
 from ..estimation.parameters import SharedLayout
 from ..estimation.substitution import solve_balls, solve_kept, solve_shared
-from ..machines.protocol import Array
+from ..machines.protocol import Array, Integers
+from ..observation_arrays import Lengths
 from ..threads import single_threaded
 from .expansion import Single
 from .reference import Group, Reference

@@ -25,7 +25,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.quantities import LengthFunction
-from ballplate.study import plan
+from ballplate.study import predict
 
 from tests.reference import dense
 
@@ -59,7 +59,7 @@ def settings(**changes: object) -> Settings:
 
 
 def test_the_whole_is_what_run_tells_of_the_same_points(experiment: Experiment) -> None:
-    expected = plan(experiment).quantities["U6"]
+    expected = predict(experiment).quantities["U6"]
     found = length_map(experiment, settings()).whole
     np.testing.assert_array_equal(grid_points(lay_out(experiment), GRID), experiment.evaluation.points)
     assert found.count[0] == expected.count == 153

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.plates import axes_of_plates, plate_coordinates
+from ballplate.results.fit import Fit
 from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.covariance import covariance
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
@@ -21,7 +22,7 @@ from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings import ObservedReadings
-from ballplate.study import Fit, fit
+from ballplate.study import fit
 from numpy.typing import NDArray
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")

@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 from ballplate.goals import Goal, GoalError, parse_goal
-from ballplate.requirements.search import Answer, reach
+from ballplate.requirements.answers import Answer
+from ballplate.requirements.search import reach
 from ballplate.requirements.steps import at_step, round_down, round_up, step_of
 from ballplate.requirements.unknowns import NotVariableError
+from ballplate.results.prediction import Prediction
 from ballplate.simulator.experiment.load import load
-from ballplate.study import Plan, plan
+from ballplate.study import predict
 from scipy.optimize import brentq
 
 TEXT = (
@@ -39,8 +41,8 @@ def written(folder: Path, text: str, *changes: tuple[str, str]) -> Path:
     return file
 
 
-def planned(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> Plan:
-    return plan(load(written(folder, text, *changes))[0])
+def planned(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> Prediction:
+    return predict(load(written(folder, text, *changes))[0])
 
 
 def average(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> float:
@@ -178,7 +180,7 @@ def test_shares_and_tasks(tmp_path: Path) -> None:
     tasks = "  tasks: [{name: edge, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}]\n\ntarget"
     with_task = TEXT.replace(*target).replace("\ntarget", tasks)
     found = answer(tmp_path, "tasks", "repeatability", with_task)
-    told = plan(load(written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}")))[0])
+    told = predict(load(written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}")))[0])
     assert told.tasks[0].is_within and told.tasks[0].standard_uncertainty > 0.985 * 0.15e-6
 
 

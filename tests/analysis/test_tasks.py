@@ -12,8 +12,7 @@ from ballplate.simulator.estimation.parameters import SharedLayout, shared_layou
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
-from ballplate.study import plan
-from ballplate.tables import plan_data, plan_lines
+from ballplate.study import predict
 from ballplate.tasks import share_within, task_differences, task_rows
 
 from tests.analysis.test_invariants import judged, small_design
@@ -38,9 +37,9 @@ def with_tasks(tmp_path: Path, tasks: str = TASKS, text: str = QUICKSTART) -> Ex
 
 
 def test_a_task_is_as_uncertain_as_the_distance_between_the_same_points(tmp_path: Path) -> None:
-    found = plan(with_tasks(tmp_path)).tasks[0]
+    found = predict(with_tasks(tmp_path)).tasks[0]
     points = "evaluation:\n  points: [[100 mm, 200 mm, 0 mm], [600 mm, 200 mm, 50 mm]]\n  probe: down\n"
-    expected = plan(with_tasks(tmp_path, points)).quantities["U6"]
+    expected = predict(with_tasks(tmp_path, points)).quantities["U6"]
     assert expected.count == 1
     assert found.standard_uncertainty == pytest.approx(expected.maximum, rel=1e-9)
     assert found.length == pytest.approx(np.hypot(0.5, 0.05))
@@ -48,7 +47,7 @@ def test_a_task_is_as_uncertain_as_the_distance_between_the_same_points(tmp_path
 
 
 def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path) -> None:
-    planned = plan(with_tasks(tmp_path))
+    planned = predict(with_tasks(tmp_path))
     bore, side, height = planned.tasks
     assert bore.target == 1e-7 and bore.is_within is False
     assert side.length == pytest.approx(np.linalg.norm([0.9 - 0.1, 0.1, 0.05]))
@@ -58,10 +57,10 @@ def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path
     assert (told.count, told.largest) == (3, planned.tasks[int(np.argmax(values))].name)
     assert told.average == pytest.approx(np.mean(values)) and told.maximum == max(values)
     assert told.within_target == pytest.approx(2 / 3)
-    data = plan_data(planned)
+    data = planned.to_dict()
     assert data["tasks"]["height"]["standard_uncertainty"] == height.standard_uncertainty
     assert data["tasks"]["bore distance"]["within_target"] is False
-    lines = plan_lines(planned)
+    lines = planned.lines()
     assert any(line.startswith("bore distance") and line.endswith("no") for line in lines)
     assert len(planned.design.points) == 200
 
@@ -113,7 +112,7 @@ def test_undetermined_tasks_are_told_as_such() -> None:
 
 
 def test_share_within_counts_only_tasks_with_a_target(tmp_path: Path) -> None:
-    tasks = plan(with_tasks(tmp_path)).tasks
+    tasks = predict(with_tasks(tmp_path)).tasks
     assert share_within(tasks[:1]) == 0.0
     assert share_within([replace(one, target=None) for one in tasks]) is None
     assert share_within([replace(tasks[0], standard_uncertainty=float("nan")), tasks[1]]) == 0.5

@@ -16,7 +16,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.threads import single_threaded
-from ballplate.study import plan
+from ballplate.study import predict
 
 POOL = Path("designs/planning/plate-pool.yaml")
 ROUNDS = 5
@@ -76,7 +76,7 @@ def test_one_exchange(tmp_path: Path, balls: int) -> None:
         found = []
         for k in some:
             members = [information.candidates[m] for m in (*left, int(k))]
-            found.append(plan(with_chosen(experiment, members)).quantities["U6"].average)
+            found.append(predict(with_chosen(experiment, members)).quantities["U6"].average)
         return found
 
     def anew() -> list[float]:

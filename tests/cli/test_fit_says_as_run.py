@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.fit import Fit
+from ballplate.results.prediction import Prediction
 from ballplate.simulator.design import State
 from ballplate.simulator.estimation.gauss_newton import fitted_covariance
 from ballplate.simulator.experiment.load import load
@@ -15,7 +17,7 @@ from ballplate.simulator.generate import exact_readings, noisy_readings, on_true
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings import observe
-from ballplate.study import Fit, Plan, fit, plan
+from ballplate.study import fit, predict
 
 from tests.reference.random_experiments import random_experiment
 
@@ -38,7 +40,7 @@ evaluation: {points: {random: 20, seed: 1}, probe: right}
 OFF = 6.0
 
 
-def told(of: Plan | Fit) -> tuple[object, ...]:
+def told(of: Prediction | Fit) -> tuple[object, ...]:
     """Deficiency, directions, and what of each quantity is undetermined."""
     counts = {symbol: (one.count, one.undetermined) for symbol, one in of.quantities.items()}
     tasks = [task.name for task in of.tasks if np.isnan(task.standard_uncertainty)]
@@ -60,7 +62,7 @@ def fitted(experiment: Experiment, seed: int | None) -> tuple[Fit, State]:
 
 
 def assert_says_as_run(experiment: Experiment, seed: int) -> None:
-    planned = plan(experiment)
+    planned = predict(experiment)
     for noise in (seed, None):
         found, truth = fitted(experiment, noise)
         assert found.converged
@@ -81,7 +83,7 @@ def test_a_plate_upright_in_one_position(tmp_path: Path) -> None:
     path = tmp_path / "upright.yaml"
     path.write_text(UPRIGHT)
     experiment = load(path)[0]
-    found = plan(experiment)
+    found = predict(experiment)
     assert found.verdict.deficiency == 3 and found.quantities["U1"].undetermined == 0
     assert found.quantities["U5"].undetermined == 0
     assert_says_as_run(experiment, 1)
@@ -103,7 +105,7 @@ def test_many_experiments_drawn_at_random(tmp_path: Path) -> None:
             assert_says_as_run(experiment, seed)
             continue
         slow.append(seed)
-        assert told(found)[:2] == told(plan(experiment))[:2]
+        assert told(found)[:2] == told(predict(experiment))[:2]
         assert found.solution.iterations[-1].step < 1e-6
     assert len(slow) < 0.01 * 300, slow
 
@@ -114,7 +116,7 @@ def test_fewer_readings_than_planned_are_judged_as_they_are(tmp_path: Path) -> N
     path.write_text(Path("designs/quickstart.yaml").read_text())
     experiment = load(path)[0]
     some = replace(experiment, positions=tuple(one for one in experiment.positions if "y" not in one.name))
-    expected = plan(some).verdict.deficiency
+    expected = predict(some).verdict.deficiency
     design = lay_out(experiment)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.pairs import all_pairs
-from ballplate.simulator.design import Design, Lengths, Readings, State, nominal_state
+from ballplate.simulator.design import Design, State, nominal_state
 from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.observations import expected_readings
 from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.observation_arrays import Lengths, Readings
 from ballplate.uncertainty import point_pairs, uncertainties
 from numpy.typing import NDArray
 

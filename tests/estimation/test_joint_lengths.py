@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.montecarlo.study import trials
-from ballplate.simulator.design import Design, Lengths, State, nominal_state
+from ballplate.simulator.design import Design, State, nominal_state
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
@@ -28,7 +28,8 @@ from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.study import plan
+from ballplate.simulator.observation_arrays import Lengths
+from ballplate.study import predict
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import compare, in_reference_basis
@@ -272,7 +273,7 @@ def physical(made: Experiment, generator: np.random.Generator) -> tuple[Design, 
 def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[str, Any], tmp_path: Path) -> None:
     """Over 80 data sets each parameter scatters by its uncertainty, and S^2 about its degrees of freedom."""
     made = experiment(tmp_path, standard, known, **COARSE, **TRUE_METRIC)
-    uncertainty = {name: one.maximum for name, one in plan(made).quantities.items()}
+    uncertainty = {name: one.maximum for name, one in predict(made).quantities.items()}
     generator, errors, squares = np.random.default_rng(4), [], []
     count = 80
     for _ in range(count):
@@ -365,7 +366,7 @@ def test_a_ball_a_little_off_the_line_counts_as_in_line(tmp_path: Path) -> None:
     """What it would add to first order is less than what nobody knows of its place."""
     crooked = bar(3)
     crooked["coordinates"]["b1"][1] = "0.003 mm"
-    found = [plan(experiment(tmp_path, one, ALL)).quantities["U6"].average for one in (bar(3), crooked)]
+    found = [predict(experiment(tmp_path, one, ALL)).quantities["U6"].average for one in (bar(3), crooked)]
     assert found[1] == pytest.approx(found[0], rel=1e-4)
 
 
@@ -375,7 +376,7 @@ def test_lengths_that_follow_from_others_tell_nothing_of_the_machine(tmp_path: P
     every = experiment(tmp_path, bar(3), {"pairs": "all"} | exact)
     two = experiment(tmp_path, bar(3), {"pairs": [["b0", "b1"], ["b1", "b2"]]} | exact)
     for symbol in ("U4", "U5", "U6"):
-        found = [plan(one).quantities[symbol].maximum for one in (every, two)]
+        found = [predict(one).quantities[symbol].maximum for one in (every, two)]
         assert found[0] == pytest.approx(found[1], rel=1e-9)
     assert lay_out(every).observations == lay_out(two).observations
 

@@ -13,7 +13,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.generate import noisy_certificate
 from ballplate.simulator.layout import lay_out
-from ballplate.study import plan
+from ballplate.study import predict
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 
@@ -47,7 +47,7 @@ def with_bar(tmp_path: Path, positions: int, uncertainty: str, repeatability: st
 def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions: int) -> None:
     """The scale cannot be known better than the one certified length, and far from its noise just as well."""
     experiment = with_bar(tmp_path, positions, "20 um")
-    found = plan(experiment)
+    found = predict(experiment)
     assert found.verdict.deficiency == 0
     design = lay_out(experiment)
     plate = design.balls[design.is_plate[design.ball_artefact]]
@@ -56,7 +56,7 @@ def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions:
 
 
 def test_ignoring_the_repeatability_counts_each_position_anew(tmp_path: Path) -> None:
-    one, four = (plan(with_bar(tmp_path, k, "20 um", "ignored")).quantities["U5"].maximum for k in (1, 4))
+    one, four = (predict(with_bar(tmp_path, k, "20 um", "ignored")).quantities["U5"].maximum for k in (1, 4))
     assert four == pytest.approx(one / 2, rel=0.01)
 
 

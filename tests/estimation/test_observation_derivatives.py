@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design import Design, Lengths, State, nominal_state
+from ballplate.simulator.design import Design, State, nominal_state
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.observations import (
     coordinate_rows,
@@ -18,6 +18,7 @@ from ballplate.simulator.estimation.observations import (
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.observation_arrays import Lengths
 
 from tests.reference.derivatives import assert_derivative, central_difference
 from tests.reference.designs import corner_sides, plate_design, six_positions, square

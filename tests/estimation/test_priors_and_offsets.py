@@ -27,7 +27,7 @@ from ballplate.simulator.generate import exact_readings, noisy_certificate, nois
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.truth import true_parameters
 from ballplate.simulator.readings import read_readings, write_readings
-from ballplate.study import check, fit, plan
+from ballplate.study import check, fit, predict
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 PRIORS = """\
@@ -205,9 +205,9 @@ def test_unknown_offsets_need_the_sphere(written: Callable[[str], Path]) -> None
 
 
 def test_offsets_cost_accuracy_and_qualification_gives_it_back(written: Callable[[str], Path]) -> None:
-    known = plan(load("designs/quickstart.yaml")[0]).quantities["U6"].average
-    qualified = plan(load(written(SPHERE))[0]).quantities["U6"].average
-    often = plan(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0]).quantities["U6"].average
+    known = predict(load("designs/quickstart.yaml")[0]).quantities["U6"].average
+    qualified = predict(load(written(SPHERE))[0]).quantities["U6"].average
+    often = predict(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0]).quantities["U6"].average
     assert known < often < qualified
 
 

@@ -13,7 +13,7 @@ from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.generate import exact_readings, noisy_readings
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.readings import read_readings, write_readings
-from ballplate.study import fit, plan
+from ballplate.study import fit, predict
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
@@ -27,7 +27,7 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def averages(path: Path) -> np.ndarray:
-    found = plan(load(path)[0]).quantities
+    found = predict(load(path)[0]).quantities
     return np.array([found[symbol].average for symbol in SYMBOLS])
 
 

@@ -9,10 +9,10 @@ import sys
 import pytest
 
 PROGRAM = """
-from ballplate.study import plan
+from ballplate.study import predict
 from ballplate.simulator.experiment.load import load
 (experiment,) = load("designs/quickstart.yaml")
-found = plan(experiment)
+found = predict(experiment)
 print([(q.maximum.hex(), q.average.hex()) for q in found.quantities.values()], found.verdict.singular_values.tobytes())
 """
 

@@ -8,10 +8,11 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from ballplate.simulator.design import Coordinates, Design, Distances, Priors, nominal_state
+from ballplate.simulator.design import Design, nominal_state
 from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.observation_arrays import Coordinates, Distances, Priors
 from ballplate.uncertainty import point_pairs
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from ballplate.simulator.experiment import Experiment, ExperimentError, Position, load
 from ballplate.simulator.experiment.checks import excess
-from ballplate.simulator.experiment.pool import AtMost, Candidate, Pool, placed_only
+from ballplate.simulator.experiment.model import AtMost, Candidate, Pool
+from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.quantities import length_text, parse_length
 from ballplate.study import check

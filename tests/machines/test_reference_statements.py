@@ -19,7 +19,7 @@ from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.machines.terms import Radial, sums
 from ballplate.simulator.machines.true_machine_settings import CoefficientSettings
 from ballplate.simulator.machines.truth import TruthError, true_parameters
-from ballplate.study import plan
+from ballplate.study import predict
 from scipy.spatial.transform import Rotation
 
 LOWER, UPPER = (-0.2, 0.1, 0.3), (0.8, 0.7, 1.3)
@@ -177,7 +177,7 @@ def test_priors_of_poses_free_nothing(tmp_path: Path) -> None:
 def test_u2_leaves_offsets_out(tmp_path: Path) -> None:
     certificate = "calibration: [{kind: coordinates, balls: all, standard_uncertainty: 0.2 um}]\n"
     (experiment,) = load(written(tmp_path, certificate))
-    quantities = plan(experiment).quantities
+    quantities = predict(experiment).quantities
     assert quantities["U2"].count == 18
     assert quantities["U2 offsets"].count == 3
     assert quantities["U2"].count == quantities["U2 lengths"].count + quantities["U2 angles"].count

@@ -22,7 +22,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.montecarlo.reference import Reference, reference
 from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
-from ballplate.study import plan
+from ballplate.study import predict
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:
@@ -62,7 +62,7 @@ def test_residuals_are_those_of_a_right_model() -> None:
 
 
 def test_linearised_uncertainties_are_those_of_the_plan() -> None:
-    planned = plan(shipped("quickstart.yaml")).quantities
+    planned = predict(shipped("quickstart.yaml")).quantities
     found = two_thousand().comparisons
     for symbol in ("U1", "U2", "U4", "U5"):
         assert found[symbol].linear_average == pytest.approx(planned[symbol].average, rel=1e-3), symbol

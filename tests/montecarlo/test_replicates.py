@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design import Coordinates, Design, Lengths, Priors, Readings, State, nominal_state
+from ballplate.simulator.design import Design, State, nominal_state
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
 from ballplate.simulator.montecarlo.expansion import Direct, Expansion
 from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
 from ballplate.simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
+from ballplate.simulator.observation_arrays import Coordinates, Lengths, Priors, Readings
 
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 

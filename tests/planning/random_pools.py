@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.planning.campaign import Campaign, Request, campaign
+from ballplate.planning.campaign import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.criteria import NAMES, CriterionName
 from ballplate.planning.done import SetUp, done_candidates
 from ballplate.planning.offer import offer
+from ballplate.planning.selection import Campaign
 from ballplate.simulator.design import nominal_state
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment, Position

@@ -22,7 +22,7 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.study import plan
+from ballplate.study import predict
 
 from .small_pool import TEXT
 
@@ -75,7 +75,7 @@ def first(path: Path) -> Experiment:
 
 def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
     found = campaign(first(drawn), Request("U6"))
-    reference = plan(load(drawn)[0])
+    reference = predict(load(drawn)[0])
     assert found.drawn == pytest.approx(reference.quantities["U6"].average, rel=1e-9)
     assert found.value <= found.drawn
     assert found.drawn_spent is not None
@@ -92,7 +92,7 @@ def test_an_interrupted_campaign_never_does_worse_than_its_remainder(drawn: Path
     done = done_candidates(readings_of(drawn, read), experiment)
     assert len(done) == read
     found = campaign(experiment, Request("U6"), offer(experiment.pool, done))
-    reference = plan(load(drawn)[0])
+    reference = predict(load(drawn)[0])
     assert found.value <= reference.quantities["U6"].average * (1 + 1e-12)
     names = [candidate.name for candidate in found.chosen]
     assert {one.name for one in done} <= set(names)
@@ -110,7 +110,7 @@ def test_what_was_read_in_part_counts_as_it_was_read(drawn: Path) -> None:
     done = done_candidates(path, experiment)
     assert sum(one.read.readings for one in done) == len(lines) - 1 - 7
     partly = campaign(experiment, Request("U6"), offer(experiment.pool, done))
-    full = plan(with_chosen(experiment, partly.chosen))
+    full = predict(with_chosen(experiment, partly.chosen))
     assert partly.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
 
 

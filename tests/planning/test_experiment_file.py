@@ -15,8 +15,8 @@ from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import run_sheet
 from ballplate.simulator.design import Design
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import Candidate, with_chosen
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.layout import lay_out
 
 FOLDER = Path("designs/planning")

@@ -10,22 +10,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.planning.campaign import TINY_POOL, Campaign
+from ballplate.planning.campaign import TINY_POOL
 from ballplate.planning.constraints import Spent
 from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.planning.selection import Campaign
 from ballplate.simulator.design import nominal_state
 from ballplate.simulator.estimation.covariance import covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.messages import ExperimentError
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import Candidate, with_chosen
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.readings import read_readings
-from ballplate.study import plan, worth
+from ballplate.study import predict, worth
 
 from .random_pools import RandomPool, random_pool, write_some
 
@@ -37,7 +38,7 @@ def by_run(experiment: Experiment, name: CriterionName) -> float:
     """The criterion by what `run` computes, infinite where something that it is about is undetermined."""
     kind, _, largest = name.partition("-")
     if kind in ("U6", "U5", "tasks"):
-        found = plan(experiment).quantities[kind]
+        found = predict(experiment).quantities[kind]
         return np.inf if found.undetermined else getattr(found, "maximum" if largest else "average")
     design = lay_out(experiment)
     layout = shared_layout(design)

@@ -18,8 +18,7 @@ from ballplate.planning.repair.screening import rank_of, seen_by
 from ballplate.planning.repair.search import Repair, Repairs, repairs
 from ballplate.planning.repair.tables import repair_lines
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import AtMost, Candidate, ChangeTimes, Pool
+from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Experiment, Pool, Position
 from ballplate.simulator.layout import lay_out
 from ballplate.study import check
 from hypothesis import HealthCheck, given, settings

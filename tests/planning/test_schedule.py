@@ -12,8 +12,7 @@ import pytest
 from ballplate.planning.changeover import MOST_EXACT, Kind, changeover, cheapest
 from ballplate.planning.schedule import ordered, run_sheet
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Position, ReadingGroup
-from ballplate.simulator.experiment.pool import Candidate, ChangeTimes
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import Pose
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -19,8 +19,7 @@ from ballplate.planning.information import pool_information
 from ballplate.planning.search import Losses, Problem, improve, starts, value
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.messages import ExperimentError
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import AtMost
+from ballplate.simulator.experiment.model import AtMost, Experiment
 from ballplate.simulator.machines.protocol import Array
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st

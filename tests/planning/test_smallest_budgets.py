@@ -16,8 +16,8 @@ from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
 from ballplate.planning.search import LARGE, SMALL_POOL, Losses, Problem, full_root, value
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import Candidate, with_chosen
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.layout import lay_out
 
 from tests.reference import dense

@@ -18,12 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.fit import Fit
 from ballplate.reversal import ReversalFit, fit_reversal
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.readings import read_readings
-from ballplate.study import Fit, fit
+from ballplate.study import fit
 
 FOLDER = Path("designs/hocken_borchardt")
 INCH = 0.0254

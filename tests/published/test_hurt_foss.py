@@ -20,7 +20,7 @@ from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, para
 from ballplate.simulator.montecarlo.reference import Truth, reference
 from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.simulator.readings import read_readings
-from ballplate.study import fit, plan
+from ballplate.study import fit, predict
 
 FOLDER = Path("designs/hurt_foss")
 NAMES = ("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")
@@ -95,7 +95,7 @@ def test_the_general_estimator_is_unbiased_over_a_thousand_campaigns(file: str, 
     assert len(errors) >= COUNT and all(one.converged.all() for one in batches)
     stated = np.sqrt((shared.spectrum.root[shared.factor.layout.model] ** 2).sum(axis=1))
     assert_unbiased(errors / stated)
-    assert stated.max() == pytest.approx(plan(experiment).quantities["U3"].maximum, rel=1e-3)
+    assert stated.max() == pytest.approx(predict(experiment).quantities["U3"].maximum, rel=1e-3)
 
 
 def assert_unbiased(z: np.ndarray) -> None:
@@ -113,7 +113,7 @@ def test_the_joint_length_equations_are_unbiased_over_a_thousand_campaigns(file:
     errors, stated = campaigns(design, truth, "length-equations", COUNT)
     assert np.abs(errors.mean(axis=0) / (errors.std(axis=0, ddof=1) / np.sqrt(COUNT))).max() < 4.0
     # With weights that are all the same, equal lengths and equal noise, they lose nothing against the general one.
-    found = plan(experiment)
+    found = predict(experiment)
     assert errors.std(axis=0, ddof=1)[3:].max() == pytest.approx(found.quantities["U3 angles"].maximum, rel=0.1)
     # Student's distribution for the few degrees of freedom that the scatter is estimated with; squareness only, as the
     # certificate's error is one of scale.

@@ -14,8 +14,9 @@ import pytest
 from ballplate.reproduction.compare import compare_progress
 from ballplate.reproduction.published import npl
 from ballplate.reproduction.shipped import Shipped, fitted_exactly, shipped_experiment, sums_of_squares
+from ballplate.results.fit import Fit
 from ballplate.simulator.experiment.load import load
-from ballplate.study import Fit, check
+from ballplate.study import check
 
 
 @cache

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design import Coordinates, Design, Distances, Lengths, Readings
+from ballplate.simulator.design import Design
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.observation_arrays import Coordinates, Distances, Lengths, Readings
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]

@@ -17,7 +17,7 @@ from ballplate.gross_errors.events import Cause, cause
 from ballplate.gross_errors.power import noncentrality
 from ballplate.gross_errors.search import FAMILY, Search, diagnosis
 from ballplate.gross_errors.suspects import Diagnosis
-from ballplate.simulator.design import Design, Readings
+from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
@@ -26,6 +26,7 @@ from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import TrueMachine, true_machine
+from ballplate.simulator.observation_arrays import Readings
 from ballplate.simulator.readings import observe
 from numpy.typing import NDArray
 

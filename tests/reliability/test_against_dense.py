@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.gross_errors.patterns import Patterns, patterns
-from ballplate.gross_errors.study import Reliability, reliability_of
+from ballplate.gross_errors.reliability import Reliability
+from ballplate.gross_errors.study import reliability_of
 from ballplate.simulator.design import Design, State, nominal_state, probe_offsets
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
 from ballplate.simulator.estimation.hat import row_places, whitened_residuals

@@ -10,8 +10,9 @@ import pytest
 from ballplate.gross_errors.leftover import Columns, leftover
 from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentrality
+from ballplate.gross_errors.reliability import Reliability
 from ballplate.gross_errors.search import diagnosis
-from ballplate.gross_errors.study import Reliability, reliability_of
+from ballplate.gross_errors.study import reliability_of
 from ballplate.simulator.design import Design, nominal_state
 from ballplate.simulator.estimation.covariance import covariance, spectrum
 from ballplate.simulator.estimation.elimination import eliminate

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.gross_errors.names import name
+from ballplate.gross_errors.reliability import write_observations
 from ballplate.gross_errors.search import diagnosis
 from ballplate.gross_errors.study import reliability_of
-from ballplate.gross_errors.tables import reliability_data, write_observations
 from ballplate.simulator.design import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.observations import expected_readings
@@ -120,7 +120,7 @@ def test_tables_hold_the_readings_of_standards(tmp_path: Path) -> None:
     stream = io.StringIO()
     write_observations(stream, result)
     rows = [row for row in csv.DictReader(io.StringIO(stream.getvalue())) if row["kind"] == "end"]
-    told = [one for one in reliability_data(result)["observations_by_name"] if one["kind"] == "end"]
+    told = [one for one in result.to_dict()["observations_by_name"] if one["kind"] == "end"]
     ends = result.patterns.of_kind("end")
     assert len(rows) == len(told) == len(ends) == 15
     for row, one, k in zip(rows, told, ends.tolist(), strict=True):

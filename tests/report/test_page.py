@@ -16,7 +16,7 @@ from ballplate.report.results import read_results
 from ballplate.report.verdicts import ranks
 from ballplate.report.volume import error_map
 from ballplate.simulator.experiment.load import load
-from ballplate.study import plan
+from ballplate.study import predict
 from ballplate.sweeps.frame import frame
 from ballplate.sweeps.store import open_store
 
@@ -214,7 +214,7 @@ def test_the_error_map_is_u4_on_a_grid() -> None:
     corners = [one.values for one in found.slices]
     # All errors are zero at the lower corner, as far as the probe does not turn.
     assert corners[0][0, 0] < 1e-9
-    average = plan(experiment).quantities["U4"].average
+    average = predict(experiment).quantities["U4"].average
     assert 0.5 * average < sum(values.mean() for values in corners) / 3 < 2.0 * average
     assert found.within is not None and 0.99 < found.within <= 1.0
 

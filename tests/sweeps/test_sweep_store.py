@@ -14,7 +14,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.montecarlo.study import trials
 from ballplate.simulator.experiment.load import load
-from ballplate.study import plan
+from ballplate.study import predict
 from ballplate.sweeps.fingerprint import fingerprint
 from ballplate.sweeps.load import experiment_of, load_sweep
 from ballplate.sweeps.model import Sweep
@@ -41,7 +41,7 @@ def test_figures_are_those_of_the_experiments(tmp_path: Path, capsys: pytest.Cap
     assert table["status"].tolist() == ["done"] * 6 + ["failed"] * 2
     for k in (0, 5):
         experiment = experiment_of(loaded, k)
-        expected = plan(experiment).quantities
+        expected = predict(experiment).quantities
         assert table["U4_maximum_m"][k] == expected["U4"].maximum
         assert table["U5_average_m"][k] == expected["U5"].average
         outcome = trials(experiment, 64, int(table["data_set_seed"][k])).outcome

@@ -7,9 +7,10 @@ from functools import partial
 
 from ballplate.simulator.experiment.model import (
     Experiment,
+    Pool,
     Position,
 )
-from ballplate.simulator.experiment.pool import Pool, placed_only
+from ballplate.simulator.experiment.pool import placed_only
 
 from .certificates import better_certificates, certificates
 from .changes import (

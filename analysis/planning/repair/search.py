@@ -17,7 +17,8 @@ from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import single_threaded
 
 from ...rank import independent_mixture
-from ...study import Plan, plan
+from ...results.prediction import Prediction
+from ...study import predict
 from .changes import EFFORT, Change, Kind, apply_all, go_together, is_inside
 from .covering import covering_pairs, covering_set, different
 from .judging import Examined, Judged, examine, judge, removed, work
@@ -56,7 +57,7 @@ class Repair:
     worst: float
     smallest: float
     is_faint: bool
-    plan: Plan | None
+    plan: Prediction | None
     edits: tuple[Edit, ...]
 
 
@@ -305,7 +306,7 @@ class _Search:
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)
         after = self.judge(changes)
-        planned = plan(placed_only(changed)) if removes is None else None
+        planned = predict(placed_only(changed)) if removes is None else None
         if planned is not None and planned.verdict.deficiency != after.deficiency:
             raise AssertionError("two computations of one design's rank differ")
         gone = tuple(range(self.before.deficiency)) if removes is None else removes

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...bar_cures import listed
 from ...rank import Direction, Verdict, length
-from ...tables import finite, number
+from ...results.formatting import finite, number
 from .changes import KINDS
 
 if TYPE_CHECKING:

@@ -12,8 +12,13 @@ if TYPE_CHECKING:
 class Result:
     """A result with a label and a title. Numbers in data and frames are in metres, radians and ratios."""
 
-    label: str
-    title: str
+    if TYPE_CHECKING:
+
+        @property
+        def label(self) -> str: ...
+
+        @property
+        def title(self) -> str: ...
 
     def headline(self) -> str:
         """The result in a few words."""

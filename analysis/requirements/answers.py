@@ -1,14 +1,68 @@
-"""What is needed for a goal, as text for people and as plain data for programs."""
+"""What is needed for a goal, and how it is told."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
-from ..tables import aligned
-from .search import Answer, Reach
+from ..goals import Goal, Judgement
+from ..results.formatting import aligned
+from ..results.result import Result
+from .unknowns import UnknownName
 
 
-def reach_lines(found: Reach) -> list[str]:
+@dataclass(frozen=True)
+class Answer:
+    """What an unknown must be for the goal to be met, the others as they are.
+
+    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that was looked at
+    does; `none` does; nothing of this kind repairs what is `undetermined`; or the unknown cannot be `varied`. `words`
+    and `value`, in metres or a number, are the value needed, or without one that comes nearest, or the last looked at;
+    `outcome` is what the plan with it gives. `remarks` tell of the range.
+    """
+
+    name: UnknownName
+    title: str
+    status: Literal["found", "any", "none", "undetermined", "varied"]
+    present: str = ""
+    grows: bool = False
+    words: str = ""
+    value: float | None = None
+    outcome: str = ""
+    beside: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def is_met(self) -> bool:
+        return self.status in ("found", "any")
+
+
+@dataclass(frozen=True, repr=False)
+class Reach(Result):
+    """A goal, what the design as it is makes of it, and what each unknown must be."""
+
+    label: str
+    title: str
+    goal: Goal
+    present: Judgement
+    deficiency: int
+    answers: tuple[Answer, ...]
+
+    def headline(self) -> str:
+        return self.present.words
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each unknown."""
+        return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
+
+
+def _lines(found: Reach) -> list[str]:
     """The goal, what the design makes of it, and a row for each unknown."""
     now = "met" if found.present.is_met else "not met"
     lines = [f"{found.label}: {found.title}", f"goal: {found.goal}", f"as drawn: {now}; {found.present.words}"]
@@ -45,7 +99,7 @@ def _outcome(one: Answer) -> str:
     return one.outcome
 
 
-def reach_data(found: Reach) -> dict[str, Any]:
+def _data(found: Reach) -> dict[str, Any]:
     """The same as plain data, values in metres or as numbers."""
     goal = found.goal
     told: dict[str, Any] = {"kind": goal.kind}

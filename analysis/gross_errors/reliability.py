@@ -1,22 +1,27 @@
-"""Reliability as text for people, as plain data for programs, and as a table for spreadsheets."""
+"""Reliability of a design, as text for people, plain data for programs, and a table for spreadsheets."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.simulator.design import Integers
+from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.spreadsheets import CsvWriter
 
-from ..tables import SHOWN, aligned, finite, number
+from ..results.formatting import SHOWN, aligned, finite, number
+from ..results.result import Result
 from .effects import MOST_PLACES, SYMBOLS
 from .names import name
-from .patterns import SINGLE, Kind
-from .study import Reliability
+from .patterns import SINGLE, Kind, Patterns
+
+# An effect below this share of the bias, in metres per unit, counts as none.
+NO_EFFECT = 1e-6
 
 # Observations of a kind that a table names.
 MOST = 5
@@ -34,7 +39,97 @@ EVENTS: tuple[tuple[Kind, ...], ...] = (
 ITEMS: tuple[Kind, ...] = ("length", "end", "prior", "coordinate", "distance")
 
 
-def reliability_lines(result: Reliability, with_all: bool = False) -> list[str]:
+@dataclass(frozen=True)
+class Effects:
+    """Largest changes `change` (k,) of one kind of function by a unit of each pattern's bias, and where.
+
+    `first` and `second` (k,) are the places of the function that changes most, -1 where none is determined;
+    `uncertainty` (k,) is its standard uncertainty.
+    """
+
+    change: Array
+    first: Integers
+    second: Integers
+    uncertainty: Array
+
+
+@dataclass(frozen=True, repr=False)
+class Reliability(Result):
+    """What a design notices of biases, for each of its patterns.
+
+    `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands for the mean of its
+    repeats, which have `among_repeats` degrees of freedom more among themselves. `left` (k,) is that of each pattern:
+    of a single observation its redundancy number, otherwise the share of its square that is left in the residuals.
+    `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is
+    nil. `effects` are by symbol, U4 to U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
+    being known or estimated from the observations, less the one suspected, and `fit_noncentrality` to each of all those
+    tests that a fit makes.
+    """
+
+    label: str
+    title: str
+    design: Design
+    patterns: Patterns
+    redundancy: Array
+    left: Array
+    among_repeats: int
+    information: Array
+    effects: dict[str, Effects]
+    degrees_of_freedom: int
+    deficiency: int
+    sigma_is_estimated: bool
+    false_alarm: float
+    power: float
+    noncentrality: float
+    fit_noncentrality: float
+
+    def headline(self) -> str:
+        observations = self.design.observations
+        mean = (float(self.redundancy.sum()) + self.among_repeats) / observations
+        return f"redundancy {mean:.3g} of an observation on average; {len(self.patterns)} biases judged"
+
+    def lines(self, with_all: bool = False) -> list[str]:
+        """As lines of text; `with_all` lists every event, not only the worst of each position or probe."""
+        return _lines(self, with_all)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each bias: of an observation, a probe, a position, a certificate."""
+        data = self.to_dict()
+        rows = []
+        for one in (*data["observations_by_name"], *data["events"]):
+            changes = {symbol: effect.get("change") for symbol, effect in one["effects"].items()}
+            names = ("name", "kind", "redundancy", "minimal_detectable", "found_by_fit", "unit")
+            rows.append({name.replace("_", " "): one.get(name) for name in names} | changes)
+        return rows
+
+    @property
+    def found_by_fit(self) -> Array:
+        """The same of the tests that `fit` makes, which are many together."""
+        return self._biases(self.fit_noncentrality)
+
+    @property
+    def detectable(self) -> Array:
+        """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can be detected."""
+        return self._biases(self.noncentrality)
+
+    def _biases(self, noncentrality: float) -> Array:
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.where(self.information > 0.0, noncentrality / np.sqrt(self.information), np.inf))
+
+    def is_harmless(self, k: int) -> bool:
+        """Whether a bias changes no distance, between balls or between corrected points."""
+        return all(self.effects[symbol].change[k] <= NO_EFFECT * self.size(k) for symbol in ("U5", "U6"))
+
+    def size(self, k: int) -> float:
+        """About how far, in metres, a unit of a bias moves what it is about."""
+        extent = float(np.ptp(self.design.balls, axis=0).max(initial=0.0))
+        return 1.0 if self.patterns.unit(k) == "m" else max(extent, 1e-3)
+
+
+def _lines(result: Reliability, with_all: bool) -> list[str]:
     """Reliability as lines of text; `with_all` lists every event, not only the worst of each position or probe."""
     lines = [*_heading(result), "", *_positions(result)]
     readings = result.patterns.of_kind("reading")
@@ -234,7 +329,7 @@ def _where(result: Reliability, symbol: str, k: int) -> str:
     return f"point {first + 1} to point {second + 1}"
 
 
-def reliability_data(result: Reliability) -> dict[str, Any]:
+def _data(result: Reliability) -> dict[str, Any]:
     """Reliability as plain data in metres, radians and ratios; None where nothing can be detected or determined."""
     is_single = np.isin(result.patterns.kind, [*SINGLE, "end"])
     return {

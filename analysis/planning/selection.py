@@ -1,23 +1,137 @@
-"""A plan of a campaign as lines of text and as data."""
+"""A selection of positions and certificates: what was chosen, what each gains, and how it is told."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
-from ..tables import aligned, finite, number, plan_data, plan_lines
-from .campaign import Campaign, CurvePoint, Gain
+import numpy as np
+from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
+
+from ..results.formatting import aligned, finite, number
+from ..results.prediction import Prediction
+from ..results.result import Result
 from .constraints import HOUR, Budget, Spent
-from .criteria import DESCRIPTIONS
+from .criteria import DESCRIPTIONS, CriterionName
 from .done import base_name
-from .schedule import RunSheet
+from .schedule import Completion, RunSheet, run_sheet
 from .sheet_forms import sheet_data, sheet_lines
 
 # Candidates left out, and reasons for leaving candidates out of the pool, that are told.
 TOLD = 5
 
 
-def campaign_lines(found: Campaign, sheet: RunSheet) -> list[str]:
+@dataclass(frozen=True)
+class Gain:
+    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something is undetermined."""
+
+    candidate: Candidate
+    without: float
+    with_: float
+
+    @property
+    def relative(self) -> float:
+        """How much larger the criterion is without it."""
+        return self.without / self.with_ - 1.0
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The best selection found for a budget; `bound` is NaN where there is none."""
+
+    budget: Budget
+    spent: Spent
+    chosen: tuple[Candidate, ...]
+    value: float
+    bound: float
+
+
+@dataclass(frozen=True, repr=False)
+class Campaign(Result):
+    """A selection and what is to be said of it; values in metres, those of `condition` ratios.
+
+    `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
+    order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
+    `interrupted` are all that were read in part, and `left_open` counts the directions of their own poses and lengths
+    that stay undetermined where they are left so; nothing else depends on these. What has been read and is `ignored` is
+    no part of it. `value` is infinite where the
+    selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
+    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
+    the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
+    """
+
+    experiment: Experiment
+    pool: Pool
+    criterion: CriterionName
+    unit: str
+    excluded: int
+    budget: Budget
+    chosen: tuple[Candidate, ...]
+    done: tuple[Candidate, ...]
+    spent: Spent
+    value: float
+    bound: float
+    drawn: float | None
+    drawn_words: str
+    drawn_spent: Spent | None
+    target: float | None
+    gains: tuple[Gain, ...]
+    left_out: tuple[Gain, ...]
+    plan: Prediction
+    curve: tuple[CurvePoint, ...] = ()
+    completed: Completion | None = None
+    interrupted: tuple[Candidate, ...] = ()
+    left_open: int = 0
+    ignored: tuple[Candidate, ...] = ()
+
+    @property
+    def label(self) -> str:
+        return self.plan.label
+
+    @property
+    def title(self) -> str:
+        return self.plan.title
+
+    @property
+    def sheet(self) -> RunSheet:
+        """The choice in the order in which it is to be read."""
+        return run_sheet(self.chosen, self.pool.changes, self.done, self.completed, self.interrupted)
+
+    def headline(self) -> str:
+        count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
+        if not self.is_determined:
+            return f"{count}; something stays undetermined"
+        value = f"{1e6 * self.value:.4g} um" if self.unit == "m" else f"{self.value:.4g}"
+        return f"{count}, {self.criterion} {value}"
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each step of the run sheet, times in seconds."""
+        return list(sheet_data(self.sheet)["steps"])
+
+    @property
+    def efficiency(self) -> float:
+        """Bound over value: the selection is at most this far from the best possible."""
+        return self.bound / self.value
+
+    @property
+    def drawn_is_within(self) -> bool:
+        """Whether what it is compared with keeps to the budget; then the choice is never worse."""
+        spent, budget = self.drawn_spent, self.budget
+        return spent is None or spent.is_within(budget)
+
+    @property
+    def is_determined(self) -> bool:
+        return bool(np.isfinite(self.value))
+
+
+def _lines(found: Campaign) -> list[str]:
     """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the run sheet."""
     lines = [
         f"{found.plan.label}: {found.plan.title}",
@@ -39,7 +153,7 @@ def campaign_lines(found: Campaign, sheet: RunSheet) -> list[str]:
         lines += ["", *_gain_table(found)]
     if found.curve:
         lines += ["", *_curve_table(found)]
-    return [*lines, "", *plan_lines(found.plan)[1:], "", *sheet_lines(sheet)]
+    return [*lines, "", *found.plan.lines()[1:], "", *sheet_lines(found.sheet)]
 
 
 def _interrupted(found: Campaign) -> list[str]:
@@ -121,7 +235,7 @@ def _curve_table(found: Campaign) -> list[str]:
     return aligned(rows, [False, True, False, True, True, True, True])
 
 
-def campaign_data(found: Campaign, sheet: RunSheet) -> dict[str, Any]:
+def _data(found: Campaign) -> dict[str, Any]:
     """A campaign as data for JSON, in metres and seconds."""
     return {
         "experiment": found.plan.label,
@@ -146,8 +260,8 @@ def campaign_data(found: Campaign, sheet: RunSheet) -> dict[str, Any]:
         "gains": [_gain_data(gain) for gain in found.gains],
         "left_out": [_gain_data(gain) for gain in found.left_out],
         "curve": [_point_data(point) for point in found.curve],
-        "run_sheet": sheet_data(sheet),
-        "plan": plan_data(found.plan),
+        "run_sheet": sheet_data(found.sheet),
+        "plan": found.plan.to_dict(),
     }
 
 

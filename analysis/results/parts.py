@@ -1,104 +1,23 @@
-"""Results as text for people, and as plain data for programs."""
+"""Parts of results as text for people, and as plain data for programs."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 from ballplate.simulator.rounding import printable
 
-from .adjustments import ARCSECOND, Adjustment, freedom_words
-from .plates import PlateCoordinates
-from .rank import GREAT, Verdict
-from .scale import Scale
-from .study import Fit, Plan
-from .tasks import TaskUncertainty, is_determined
-from .uncertainty import Quantity
-
-# Small lengths and angles are shown in these; the factor takes metres and radians there.
-SHOWN = {"m": "um", "rad": "urad", "1": "ppm"}
-
-
-# Steps of an iteration below this, in metres and radians, are told as rounding.
-LEAST_STEP = 1e-10
+from ..adjustments import ARCSECOND, Adjustment
+from ..plates import PlateCoordinates
+from ..rank import GREAT, Verdict
+from ..scale import Scale
+from ..tasks import TaskUncertainty, is_determined
+from ..uncertainty import Quantity
+from .formatting import aligned, finite, number, percent, shown_unit, to_uncertainty, uncertainty_words
 
 # Balls of a plate that a table has room for.
 MOST_BALLS = 100
-
-
-def shown_unit(unit: str) -> str:
-    """Unit in which tables show values of a unit.
-
-    >>> shown_unit("m, rad")
-    'um, urad'
-    """
-    return ", ".join(SHOWN[part] for part in unit.split(", "))
-
-
-def number(value: float, digits: int = 4) -> str:
-    """A number with significant digits, and a dash for what is undetermined.
-
-    >>> number(0.123456), number(12345.678), number(float("nan"))
-    ('0.1235', '12350', '-')
-    """
-    if math.isnan(value):
-        return "-"
-    if math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    if value == 0:
-        return "0"
-    value = printable(value, digits + 5)
-    decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
-    magnitude = round(value, digits - 1 - math.floor(math.log10(abs(value))))
-    return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
-
-
-def percent(share: float) -> str:
-    """A share in words, never rounded up.
-
-    >>> percent(0.99999), percent(0.125)
-    ('99.99 %', '12.5 %')
-    """
-    return f"{math.floor(1e4 * share + 1e-9) / 100:g} %"
-
-
-def uncertainty_words(coverage_factor: float) -> str:
-    """The uncertainty that a target is compared with.
-
-    >>> uncertainty_words(1.0), uncertainty_words(2.0)
-    ('standard uncertainty u', 'expanded uncertainty U = 2 u')
-    """
-    return "standard uncertainty u" if coverage_factor == 1.0 else f"expanded uncertainty U = {coverage_factor:g} u"
-
-
-def to_uncertainty(value: float, uncertainty: float) -> str:
-    """A value to the third digit of its standard uncertainty.
-
-    >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597), to_uncertainty(12.0, float("nan"))
-    ('50000.213', '-0.042', '12.0000')
-    """
-    if math.isnan(value) or not uncertainty > 0.0:
-        return number(value, 6)
-    return f"{value:.{max(2 - math.floor(math.log10(uncertainty)), 0)}f}"
-
-
-def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
-    """Rows of cells as lines of text with aligned columns.
-
-    >>> aligned([["a", "1"], ["bb", "22"]], [False, True])
-    ['a    1', 'bb  22']
-    """
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [
-            cell.rjust(width) if to_right else cell.ljust(width)
-            for cell, width, to_right in zip(row, widths, right, strict=True)
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return lines
 
 
 def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
@@ -281,61 +200,6 @@ def _border(judged: Verdict) -> str:
     return f", then {printable(first):.3g} and below (gap {printable(judged.gap):.2g})"
 
 
-def plan_lines(plan: Plan) -> list[str]:
-    """A plan as lines of text: title, verdict and table."""
-    lines = [f"{plan.label}: {plan.title}", *verdict_lines(plan.verdict, with_values=True, lengths=plan.lengths)]
-    lines += [] if plan.quantities else target_lines(plan.lengths)
-    lines += scale_lines(plan.scale)
-    lines += ["", *uncertainty_table(plan.quantities)] if plan.quantities else []
-    return lines + ["", *task_table(plan.tasks)] if plan.tasks else lines
-
-
-def _step(step: float) -> str:
-    """The length of an iteration's step, in metres and radians; a last one may be mere rounding."""
-    return f"{step:.1e}" if not step < LEAST_STEP else f"below {LEAST_STEP:.0e}"
-
-
-def fit_lines(fit: Fit) -> list[str]:
-    """A fit as lines of text: iterations, verdict, U1 to U6 and the machine's parameters."""
-    record = fit.solution.iterations
-    verdict = verdict_lines(fit.verdict, with_values=True, lengths=fit.quantities.get("U6"))
-    lines = [f"{fit.label}: {fit.title}", *verdict]
-    how = "estimated from the residuals" if fit.sigma_is_estimated else "as given"
-    summary = f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
-    if fit.converged:
-        summary += f" with {freedom_words(fit.degrees_of_freedom)}; sigma = {fit.sigma:.4g} times the stated "
-        summary += f"uncertainties ({how})"
-    rows = [["iteration", "step", "S^2"]]
-    rows += [[str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
-    lines += [summary, "", *aligned(rows, [True, True, True])]
-    if not fit.converged:
-        return lines
-    lines += ["", *residual_table(fit)]
-    if fit.diagnosis:
-        from .gross_errors.wording import diagnosis_lines
-
-        lines += diagnosis_lines(fit.diagnosis, fit.marks)
-    lines += ["", *uncertainty_table(fit.quantities), ""]
-    lines += [*task_table(fit.tasks), ""] if fit.tasks else []
-    rows = [["parameter", "value", "standard uncertainty", "unit"]]
-    for estimate in (one for one in fit.estimates if one.kind not in ("origin", "ball")):
-        rows.append(
-            [
-                estimate.name,
-                to_uncertainty(1e6 * estimate.value, 1e6 * estimate.standard_uncertainty),
-                number(1e6 * estimate.standard_uncertainty, 3),
-                SHOWN[estimate.unit],
-            ]
-        )
-    lines += aligned(rows, [False, True, True, False])
-    lines.append("(origins of positions and co-ordinates of balls are among the estimates of --json)")
-    if fit.adjustments:
-        lines += ["", *adjustment_lines(fit.adjustments)]
-    for plate in fit.plates:
-        lines += ["", *plate_table(plate, named=len(fit.plates) > 1)]
-    return lines
-
-
 def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_BALLS) -> list[str]:
     """A plate's co-ordinates in its own axes as lines of text, for the first balls of a large one."""
     title = "co-ordinates of the balls in the plate's own axes"
@@ -378,84 +242,6 @@ def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
     }
 
 
-def residual_table(fit: Fit, count: int = 3) -> list[str]:
-    """The largest residuals as lines of text."""
-    rows = [["largest residuals", "", "", "", "um", "standard uncertainties"]]
-    for one in fit.largest[:count]:
-        rows.append(
-            [one.position, one.ball, one.probe, one.axis, number(1e6 * one.value), number(one.standardised / fit.sigma)]
-        )
-    return aligned(rows, [False, False, False, False, True, True])
-
-
-def plan_data(plan: Plan) -> dict[str, Any]:
-    """A plan as plain data in metres and radians at full precision; what is undetermined is None."""
-    return {
-        "experiment": plan.label,
-        "title": plan.title,
-        **_verdict_data(plan.verdict),
-        "sigma": 1.0,
-        "quantities": _quantities_data(plan.quantities),
-        **({} if plan.quantities or plan.lengths is None else {"lengths": _quantity_data(plan.lengths)}),
-        **({"tasks": task_data(plan.tasks)} if plan.tasks else {}),
-        "scale": scale_data(plan.scale),
-    }
-
-
-def fit_data(fit: Fit) -> dict[str, Any]:
-    """A fit as plain data in metres and radians at full precision; what is undetermined is None."""
-    suspected: dict[str, Any] = {}
-    if fit.diagnosis:
-        from .gross_errors.wording import diagnosis_data
-
-        suspected = {"suspected": diagnosis_data(fit.diagnosis, fit.marks)}
-    return {
-        "experiment": fit.label,
-        "title": fit.title,
-        **_verdict_data(fit.verdict),
-        "status": fit.solution.status,
-        "sigma": fit.sigma,
-        "sigma_is_estimated": fit.sigma_is_estimated,
-        "degrees_of_freedom": fit.degrees_of_freedom,
-        "too_large": fit.too_large,
-        "sum_of_squares": finite(fit.solution.factor.sum_of_squares),
-        "iterations": [
-            {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)} for it in fit.solution.iterations
-        ],
-        "quantities": _quantities_data(fit.quantities),
-        **({"tasks": task_data(fit.tasks)} if fit.tasks else {}),
-        "largest_residuals": [
-            {
-                "position": one.position,
-                "ball": one.ball,
-                "probe": one.probe,
-                "axis": one.axis,
-                "value": one.value,
-                "unit": "m",
-                "standard_uncertainties": one.standardised / fit.sigma,
-            }
-            for one in fit.largest
-        ],
-        **suspected,
-        "estimates": _estimates_data(fit),
-        **({"plates": {plate.artefact: plate_data(plate) for plate in fit.plates}} if fit.plates else {}),
-        **({"adjustments": adjustment_data(fit.adjustments)} if fit.adjustments else {}),
-    }
-
-
-def _estimates_data(fit: Fit) -> dict[str, Any]:
-    """Estimates by name; by kind and name where a model gives a parameter the name that another kind has."""
-    times = Counter(one.name for one in fit.estimates)
-    return {
-        one.name if times[one.name] == 1 else f"{one.kind}: {one.name}": {
-            "value": finite(one.value),
-            "standard_uncertainty": finite(one.standard_uncertainty),
-            "unit": one.unit,
-        }
-        for one in fit.estimates
-    }
-
-
 def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
     """A plate's co-ordinates in its own axes as plain data in metres; what is undetermined is None."""
     axes = plate.axes
@@ -473,16 +259,11 @@ def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
     }
 
 
-def finite(value: float) -> float | None:
-    """A value as JSON can have it; None for what is undetermined."""
-    return value if math.isfinite(value) else None
+def quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
+    return {symbol: quantity_data(quantity) for symbol, quantity in quantities.items()}
 
 
-def _quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
-    return {symbol: _quantity_data(quantity) for symbol, quantity in quantities.items()}
-
-
-def _quantity_data(q: Quantity) -> dict[str, Any]:
+def quantity_data(q: Quantity) -> dict[str, Any]:
     compared: dict[str, Any] = {}
     if q.within_target is not None:
         compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
@@ -499,7 +280,7 @@ def _quantity_data(q: Quantity) -> dict[str, Any]:
     }
 
 
-def _verdict_data(judged: Verdict) -> dict[str, Any]:
+def verdict_data(judged: Verdict) -> dict[str, Any]:
     return {
         "parameters": judged.parameters,
         "observations": judged.observations,
