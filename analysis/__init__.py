@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         reliability,
         run,
         simulate,
-        sweep,
     )
     from .simulator.experiment.messages import ExperimentError
     from .simulator.experiment.model import Experiment
@@ -39,7 +38,6 @@ __all__ = [
     "reliability",
     "run",
     "simulate",
-    "sweep",
 ]
 
 _PLACES = {
