@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_state
-from ballplate.simulator.estimation.covariance import covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Array, Integers
@@ -155,17 +153,14 @@ def length_pairs(experiment: Experiment, settings: Settings) -> tuple[Array, lis
 
 def _tiles(design: Design, points: Array, settings: Settings) -> tuple[int, Iterator[PairTile]]:
     """Rank deficiency, and the tiles of all pairs of points."""
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    found = spectrum(factor)
-    spread = covariance(design, factor, found)
+    at = linearise(design)
     probes = np.full(len(points), design.probe_names.index(settings.probe))
-    rows = correction_rows(design, layout, state, points, probes)
+    rows = correction_rows(design, at.layout, at.state, points, probes)
     own = np.zeros((len(points), design.dimension, design.dimension))
     if settings.with_repeatability:
         own[:] = np.diag(design.repeatability)
-    places = corrected_points(design, state, points, probes)
-    return found.deficiency, pair_tiles(places, rows @ spread.shared, own, rows @ spread.shared_null)
+    places = corrected_points(design, at.state, points, probes)
+    return at.deficiency, pair_tiles(places, rows @ at.shared, own, rows @ at.shared_null)
 
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:

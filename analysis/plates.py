@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.covariance import Covariance, blank
+from ballplate.simulator.estimation.covariance import MICROMETRE, blank
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes, plate_axes
 from ballplate.simulator.machines.protocol import Array
@@ -44,9 +44,7 @@ def axes_of_plates(experiment: Experiment) -> Mapping[str, PlateAxes]:
     return {name: axes for name, axes in found.items() if axes is not None}
 
 
-def plate_coordinates(
-    experiment: Experiment, design: Design, state: State, spread: Covariance, sigma: float = 1.0
-) -> tuple[PlateCoordinates, ...]:
+def plate_coordinates(experiment: Experiment, at: Linearisation, sigma: float = 1.0) -> tuple[PlateCoordinates, ...]:
     """The balls of every plate of a two-dimensional experiment in the plate's own axes.
 
     With c the co-ordinates there, Q the rotation into the axes and the x axis fixed by ball b, to first order
@@ -55,18 +53,17 @@ def plate_coordinates(
 
     and for the y axis likewise, of opposite sign. `sigma` multiplies all stated uncertainties.
     """
-    found = []
+    design, found = at.design, []
     for artefact, axes in axes_of_plates(experiment).items():
         balls = np.flatnonzero(design.ball_artefact == design.artefact_names.index(artefact))
-        coordinates, rotation = in_plate_axes(state.balls[balls], axes)
+        coordinates, rotation = in_plate_axes(at.state.balls[balls], axes)
         across = 1 - axes.axis
         n = len(balls)
         weights = _weights(coordinates, axes)
-        common, own = rotation @ spread.ball[balls], rotation @ spread.ball_own[balls]
+        common, own = rotation @ at.balls.common[balls], rotation @ at.balls.own[balls]
         moved = common + sum(weight @ common[k] for k, weight in weights.items())
-        drawn = state if spread.drawn is None else spread.drawn
-        as_drawn, turn = in_plate_axes(drawn.balls[balls], axes)
-        null = turn @ spread.ball_null[balls]
+        as_drawn, turn = in_plate_axes(at.as_drawn.state.balls[balls], axes)
+        null = turn @ at.ball_null[balls]
         opened = null + sum(weight @ null[k] for k, weight in _weights(as_drawn, axes).items())
         variance = (moved**2).sum(axis=2)
         for k, weight in weights.items():
@@ -75,7 +72,7 @@ def plate_coordinates(
             variance += ((weight + np.eye(2) * alone[:, None, None]) @ own[k]) ** 2 @ np.ones(2)
         others = ~np.isin(np.arange(n), list(weights))
         variance[others] += (own[others] ** 2).sum(axis=2)
-        uncertainty = blank(np.sqrt(variance), opened, np.full(variance.shape, spread.ball_scale))
+        uncertainty = blank(np.sqrt(variance), opened, np.full(variance.shape, MICROMETRE))
         uncertainty[axes.origin] = uncertainty[axes.ball, across] = 0.0
         names = tuple(design.ball_names[ball] for ball in balls)
         values = np.where(np.isnan(uncertainty), np.nan, coordinates)

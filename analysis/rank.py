@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.covariance import Covariance, Spectrum
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array, HasLines
@@ -145,18 +145,14 @@ class Verdict:
         return "" if self.as_expected else rank_complaint(self.deficiency, self.expected)
 
 
-def verdict(
-    design: Design,
-    layout: SharedLayout,
-    found: Spectrum,
-    spread: Covariance,
-    expected: int | None = None,
-    target: Target | None = None,
-) -> Verdict:
-    """Judge a design from its spectrum; `spread` supplies how the balls follow the undetermined directions."""
-    weak, effect = _weak_roots(design, layout, found, target)
+def verdict(at: Linearisation, expected: int | None = None, target: Target | None = None) -> Verdict:
+    """Judge a design from its spectrum; how the balls follow the undetermined directions is asked for where there are
+    any.
+    """
+    design, layout, found = at.design, at.layout, at.spectrum
+    weak, effect = _weak_roots(at, target)
     limit = weak_limit(design, target)
-    open_ = np.concatenate([spread.shared_null, weak], axis=1)
+    open_ = np.concatenate([at.shared_null, weak], axis=1)
     return Verdict(
         design.parameter_count,
         design.observations,
@@ -164,51 +160,52 @@ def verdict(
         expected,
         found.values,
         found.gap if np.isinf(found.gap) else min(found.gap, GREAT),
-        null_directions(design, layout, spread),
+        null_directions(at),
         _weak_directions(design, layout, weak, effect, limit),
         reasons(design, layout, open_),
     )
 
 
-def null_directions(design: Design, layout: SharedLayout, spread: Covariance) -> tuple[Direction, ...]:
+def null_directions(at: Linearisation) -> tuple[Direction, ...]:
     """The undetermined directions, in a basis in which each involves as little as possible."""
     found = []
-    for mixture in independent_mixture(spread).T:
-        shared, balls = spread.shared_null @ mixture, spread.ball_null @ mixture
-        moved = np.abs(shared / layout.scale).max(initial=0.0)
+    for mixture in independent_mixture(at).T:
+        shared, balls = at.shared_null @ mixture, at.ball_null @ mixture
+        moved = np.abs(shared / at.layout.scale).max(initial=0.0)
         size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
-        found.append(_describe(design, layout, shared / size, balls / size))
+        found.append(_describe(at.design, at.layout, shared / size, balls / size))
     return tuple(found)
 
 
-def independent_mixture(spread: Covariance) -> Array:
+def independent_mixture(at: Linearisation) -> Array:
     """Mixtures (k, k) of the null directions in which they are told: each involves as little as possible."""
-    return elementary_mixture(spread.shared_null / spread.scale[:, None])
+    return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])
 
 
-def _weak_roots(design: Design, layout: SharedLayout, found: Spectrum, target: Target | None) -> tuple[Array, Array]:
+def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
     """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to corrected points."""
-    root, effect = _principal(design, layout, found)
-    columns = np.flatnonzero(above(effect, weak_limit(design, target)))[::-1]
+    root, effect = _principal(at)
+    columns = np.flatnonzero(above(effect, weak_limit(at.design, target)))[::-1]
     return root[:, columns], effect[columns]
 
 
-def effects(design: Design, layout: SharedLayout, found: Spectrum) -> Array:
+def effects(at: Linearisation) -> Array:
     """What one standard deviation along each determined direction adds to corrected points, in metres, (rank,).
 
     Relative to one another, that is, as the root mean square over the points; empty where the design has none.
     """
-    return _principal(design, layout, found)[1]
+    return _principal(at)[1]
 
 
-def _principal(design: Design, layout: SharedLayout, found: Spectrum) -> tuple[Array, Array]:
+def _principal(at: Linearisation) -> tuple[Array, Array]:
     """Determined directions (s, rank), one standard deviation long, and the effect of each on corrected points."""
+    design, layout, found = at.design, at.layout, at.spectrum
     if not len(design.points) or found.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
-    change = _changes(design, layout, found.root)
+    change = _changes(design, layout, at.shared)
     # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
     effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
-    return principal_directions(found.values[: found.rank], found.root, effect, found.scale)
+    return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
 
 
 def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:

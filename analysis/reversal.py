@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.gauss_newton import fitted_covariance
+from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
 from ballplate.simulator.experiment.messages import ExperimentError, Message, Steps
@@ -270,14 +270,14 @@ def _chance(three: Reversal, five: Reversal) -> float:
 
 def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEstimate, ...]:
     """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the first, `k`."""
-    layout, state = full.solution.factor.layout, full.solution.state
-    spread = fitted_covariance(design, full.solution)
+    at = linearised_fit(design, full.solution)
+    layout, state = at.layout, at.state
     own = np.eye(len(layout))
     # Exact derivatives, as imaginary steps leave the real part alone.
     by_shared = [_relation(design, layout, state, k, m, 1e-30j * row).imag / 1e-30 for row in own]
     rows = np.concatenate([np.transpose(by_shared), own[layout.model]])
     values = np.concatenate([_relation(design, layout, state, k, m, 0.0 * own[0]), state.a])
-    uncertainties = full.sigma * spread.of_shared(rows)
+    uncertainties = full.sigma * at.of_shared(rows)
     names = ("beta", "offset x", "offset y", *(parameter.name for parameter in design.model.parameters))
     found = dict(zip(names, zip(values.tolist(), uncertainties.tolist(), strict=True), strict=True))
     return tuple(ParameterEstimate(name, *found[name], unit) for name, unit in PARAMETERS if name in found)

@@ -11,10 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.design import Design, State, nominal_state, probe_offsets
-from ballplate.simulator.estimation.covariance import Covariance, shared_covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.design import Design, State, probe_offsets
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
@@ -77,15 +75,12 @@ class Scale:
     loosened: Loosened | None = None
 
 
-def scale_of(
-    experiment: Experiment, design: Design, layout: SharedLayout, state: State, spread: Covariance
-) -> Scale | None:
+def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
     """What carries the scale of a design; None where it is undetermined or the design is evaluated nowhere."""
-    row = scale_row(design, layout, state)
-    uncertainty = float(spread.of_shared(row[None])[0])
+    uncertainty = float(at.of_shared(scale_row(at)[None])[0])
     if np.isnan(uncertainty):
         return None
-    stretches = can_stretch(design, state)
+    stretches = can_stretch(at.design, at.state)
     groups = list(_groups(experiment))
     if len(groups) == 1 and stretches:
         # Nothing else can: readings alone do not tell the scale.
@@ -95,7 +90,7 @@ def scale_of(
         some = [one for one in found if one[0] > CARRIES * uncertainty] or (found if stretches else [])
         carriers = [Carrier(words, without) for without, words in some]
     rests = any(one.words == EXACT_OFFSETS and (one.without or 0.0) > RESTS * uncertainty for one in carriers)
-    loosened = _loosened(experiment, design, layout, state, spread) if rests else None
+    loosened = _loosened(experiment, at) if rests else None
     if not stretches:
         carriers.append(Carrier(OWN_SCALES, None))
     return Scale(uncertainty, tuple(carriers), rests, loosened)
@@ -137,22 +132,21 @@ def with_offsets(experiment: Experiment, uncertainty: float) -> Experiment:
 
 def scale_uncertainty(experiment: Experiment) -> float:
     """Relative standard uncertainty of an experiment's scale; infinite where it is undetermined."""
-    found = _solved(experiment)
-    if found is None:
+    at = _linearised(experiment)
+    if at is None:
         return float("inf")
-    design, layout, state, spread = found
-    value = float(spread.of_shared(scale_row(design, layout, state)[None])[0])
+    value = float(at.of_shared(scale_row(at)[None])[0])
     return float("inf") if np.isnan(value) else value
 
 
-def scale_row(design: Design, layout: SharedLayout, state: State) -> Array:
+def scale_row(at: Linearisation) -> Array:
     """Derivative (s,) of the scale by the shared parameters: of the mean relative change of distances.
 
     Distances between the evaluation points or, where there is but one or none, between the corners of the volume, are
     weighted by their squares; the sum over all pairs is one over all points, less their centroid.
     """
-    points = _points(design)
-    rows = correction_rows(design, layout, state, points, np.full(len(points), design.point_probe))
+    points = _points(at.design)
+    rows = correction_rows(at.design, at.layout, at.state, points, np.full(len(points), at.design.point_probe))
     centred = points - points.mean(axis=0)
     return np.asarray(np.einsum("nd,nds->s", centred, rows) / (centred**2).sum())
 
@@ -178,32 +172,27 @@ def _points(design: Design) -> Array:
     return np.array(list(product(*zip(design.lower, design.upper, strict=True))))
 
 
-def _solved(experiment: Experiment) -> tuple[Design, SharedLayout, State, Covariance] | None:
-    """The design with the covariance of what is shared; None where it cannot be laid out."""
+def _linearised(experiment: Experiment) -> Linearisation | None:
+    """The linearised design; None where it cannot be laid out."""
     try:
-        design = lay_out(experiment)
+        return linearise(lay_out(experiment))
     except ExperimentError:
         return None
-    layout, state = shared_layout(design), nominal_state(design)
-    found = spectrum(eliminate(design, layout, state))
-    return design, layout, state, shared_covariance(design, found)
 
 
-def _loosened(
-    experiment: Experiment, design: Design, layout: SharedLayout, state: State, spread: Covariance
-) -> Loosened | None:
+def _loosened(experiment: Experiment, at: Linearisation) -> Loosened | None:
     """What becomes of U6 once the exact offsets have an uncertainty; None where something of it is undetermined."""
     after = lengths_with_offsets(experiment, OFFSET_TRIAL)
     if after is None:
         return None
-    before = point_pairs(design, layout, state, spread)[1]
+    before = point_pairs(at)[1]
     return Loosened(OFFSET_TRIAL, after.total / after.count, after.maximum, before.total / before.count)
 
 
 def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSummary | None:
     """U6 where exact offsets, but for one, have an uncertainty in metres; None where something of it is open."""
-    found = _solved(with_offsets(experiment, uncertainty))
-    if found is None or not len(found[0].points):
+    at = _linearised(with_offsets(experiment, uncertainty))
+    if at is None or not len(at.design.points):
         return None
-    pairs = point_pairs(*found)[1]
+    pairs = point_pairs(at)[1]
     return None if pairs.undetermined or not pairs.count else pairs

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_state, probe_offsets, unknown_lengths
-from ballplate.simulator.estimation.covariance import Covariance, covariance, shared_covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.gauss_newton import Solution, estimate, fitted_covariance
+from ballplate.simulator.design import Design, probe_offsets, unknown_lengths
+from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
-from ballplate.simulator.estimation.parameters import SharedLayout, pose_parameter_names, shared_layout
+from ballplate.simulator.estimation.parameters import pose_parameter_names
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.layout import lay_out
@@ -31,9 +30,6 @@ from .results.prediction import Prediction
 from .scale import scale_of
 from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, length_uncertainties, uncertainties
-
-if TYPE_CHECKING:
-    pass
 
 # Residuals that a fit names.
 LARGEST = 10
@@ -61,33 +57,23 @@ def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
 @single_threaded
 def worth(experiment: Experiment) -> Worth:
     """What `plan` finds, less the explanation of the rank, which takes most of its time."""
-    design = lay_out(experiment)
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    found = spectrum(factor)
-    spread = covariance(design, factor, found)
-    quantities = uncertainties(design, layout, state, spread, target=experiment.target_accuracy)
-    return Worth(found.deficiency, quantities, task_uncertainties(design, layout, state, spread))
+    at = linearise(lay_out(experiment))
+    return Worth(at.deficiency, uncertainties(at, target=experiment.target_accuracy), task_uncertainties(at))
 
 
 @single_threaded
 def _predict(experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool) -> Prediction:
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    found = spectrum(factor)
-    spread = (
-        covariance(design, factor, found) if with_quantities or found.deficiency else shared_covariance(design, found)
-    )
-    judged = verdict(design, layout, found, spread, experiment.expected_rank_deficiency, experiment.target_accuracy)
+    at, target = linearise(design), experiment.target_accuracy
+    judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities: dict[str, Quantity] = {}
     tasks: tuple[TaskUncertainty, ...] = ()
     if with_quantities:
-        quantities = uncertainties(design, layout, state, spread, target=experiment.target_accuracy)
-        tasks = task_uncertainties(design, layout, state, spread)
+        quantities = uncertainties(at, target=target)
+        tasks = task_uncertainties(at)
         lengths = quantities.get("U6")
     else:
-        lengths = length_uncertainties(design, layout, state, spread, experiment.target_accuracy)
-    scale = scale_of(experiment, design, layout, state, spread) if with_scale else None
+        lengths = length_uncertainties(at, target)
+    scale = scale_of(experiment, at) if with_scale else None
     return Prediction(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
 
 
@@ -104,15 +90,12 @@ def fit(
     coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
     """
     design = observed.design
-    layout = shared_layout(design)
     solution = estimate(design, observed.x)
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         return Fit(experiment.label, experiment.title, design, solution, judged, 1.0, False, 0, {}, (), ())
-    spread = fitted_covariance(design, solution)
-    judged = verdict(
-        design, layout, solution.spectrum, spread, experiment.expected_rank_deficiency, experiment.target_accuracy
-    )
+    at = linearised_fit(design, solution)
+    judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_accuracy)
     freedom = design.observations - design.parameter_count + judged.deficiency
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
@@ -125,13 +108,13 @@ def fit(
         scale,
         estimated,
         freedom,
-        uncertainties(design, layout, solution.state, spread, scale, experiment.target_accuracy),
-        _estimates(design, layout, solution, spread, scale, monomials),
+        uncertainties(at, scale, experiment.target_accuracy),
+        _estimates(at, scale, monomials),
         _largest(design, solution, observed.x),
-        plate_coordinates(experiment, design, solution.state, spread, scale),
-        _adjustments(design, layout, solution, spread, scale, freedom if estimated else np.inf),
-        task_uncertainties(design, layout, solution.state, spread, scale),
-        diagnosis(design, solution, observed.x, freedom, estimated),
+        plate_coordinates(experiment, at, scale),
+        _adjustments(at, scale, freedom if estimated else np.inf),
+        task_uncertainties(at, scale),
+        diagnosis(at, observed.x, freedom, estimated),
         observed.marks,
     )
 
@@ -144,13 +127,11 @@ def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Rea
     return readings, standardised / reading_weights(design, readings), standardised
 
 
-def _adjustments(
-    design: Design, layout: SharedLayout, solution: Solution, spread: Covariance, sigma: float, freedom: float
-) -> tuple[Adjustment, ...]:
-    if not isinstance(design.model, SpatialMetricModel):
+def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjustment, ...]:
+    if not isinstance(at.design.model, SpatialMetricModel):
         return ()
-    of_model = layout.model
-    return adjustments(solution.state.a, sigma * spread.shared[of_model], spread.shared_null[of_model], freedom)
+    of_model = at.layout.model
+    return adjustments(at.state.a, sigma * at.shared[of_model], at.shared_null[of_model], freedom)
 
 
 def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
@@ -186,26 +167,24 @@ def _ball(design: Design, reading: int) -> str:
     return design.ball_names[design.readings.ball[reading]]
 
 
-def _estimates(
-    design: Design, layout: SharedLayout, solution: Solution, spread: Covariance, sigma: float, monomials: bool
-) -> tuple[ParameterEstimate, ...]:
+def _estimates(at: Linearisation, sigma: float, monomials: bool) -> tuple[ParameterEstimate, ...]:
+    design, layout, state = at.design, at.layout, at.state
     found: list[ParameterEstimate] = []
 
     def add(kind: ParameterKind, name: str, value: float, uncertainty: float, unit: Unit) -> None:
         known = not np.isnan(uncertainty)
         found.append(ParameterEstimate(name, float(value) if known else np.nan, float(sigma * uncertainty), unit, kind))
 
-    state = solution.state
     own = np.eye(len(layout))
     matrix, names, units = own[layout.model], [p.name for p in design.model.parameters], None
     if monomials:
         reported = design.model.reported()
         matrix, names, units = reported.matrix @ matrix, list(reported.names), reported.units
     values = (reported.matrix if monomials else np.eye(len(state.a))) @ state.a
-    for k, uncertainty in enumerate(spread.of_shared(matrix)):
+    for k, uncertainty in enumerate(at.of_shared(matrix)):
         add("machine", names[k], values[k], uncertainty, units[k] if units else design.model.parameters[k].unit)
 
-    of_poses = spread.of_shared(own[layout.poses])
+    of_poses = at.of_shared(own[layout.poses])
     turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
     poses = np.concatenate([state.origins, turned], axis=1)
     words = pose_parameter_names(design.dimension)
@@ -216,17 +195,17 @@ def _estimates(
                 unit: Unit = "m" if kind == "origin" else "rad"
                 add(kind, f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
 
-    of_offsets = spread.of_shared(own[layout.offsets])
+    of_offsets = at.of_shared(own[layout.offsets])
     for probe, axis in np.argwhere(layout.offset_columns >= 0):
         column = layout.offset_columns[probe, axis]
         value = probe_offsets(design, state)[probe, axis]
         add("offset", layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
 
-    of_lengths = spread.of_shared(own[layout.lengths])
+    of_lengths = at.of_shared(own[layout.lengths])
     for name, value, uncertainty in zip(design.length_names, unknown_lengths(design, state), of_lengths, strict=True):
         add("length", name, value, uncertainty, "m")
 
-    of_balls = spread.of_balls()
+    of_balls = at.of_balls()
     for ball in design.plate_balls:
         for axis, letter in enumerate(("x", "y", "z")[: design.dimension]):
             name = f"{design.ball_label(ball)}: {letter}"

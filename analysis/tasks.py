@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.covariance import Covariance
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Array
 
@@ -71,18 +71,17 @@ def task_rows(design: Design, layout: SharedLayout, state: State) -> Array:
     return np.asarray(np.einsum("td,tds->ts", direction, second - first))
 
 
-def task_uncertainties(
-    design: Design, layout: SharedLayout, state: State, found: Covariance, sigma: float = 1.0
-) -> tuple[TaskUncertainty, ...]:
+def task_uncertainties(at: Linearisation, sigma: float = 1.0) -> tuple[TaskUncertainty, ...]:
     """Standard uncertainties of the design's tasks, as U6 is that of all pairs of points; none without tasks.
 
     `sigma` multiplies all stated uncertainties.
     """
+    design, layout = at.design, at.layout
     if not design.task_names:
         return ()
-    lengths = np.linalg.norm(task_differences(design, state), axis=1)
-    drawn = None if found.drawn is None else task_rows(design, layout, found.drawn)
-    values = sigma * found.of_shared(task_rows(design, layout, state), drawn)
+    lengths = np.linalg.norm(task_differences(design, at.state), axis=1)
+    drawn = None if at.drawn is None else task_rows(design, layout, at.drawn.state)
+    values = sigma * at.of_shared(task_rows(design, layout, at.state), drawn)
     told = zip(design.task_names, lengths.tolist(), values.tolist(), design.task_targets, strict=True)
     return tuple(
         TaskUncertainty(name, length, value, None)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.covariance import Covariance, blank
-from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.covariance import blank
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.quantities import LengthFunction, Target
 from ballplate.simulator.rounding import comparable
@@ -63,21 +63,15 @@ class Quantity:
 
 
 @single_threaded
-def uncertainties(
-    design: Design,
-    layout: SharedLayout,
-    state: State,
-    found: Covariance,
-    sigma: float = 1.0,
-    target: Target | None = None,
-) -> dict[str, Quantity]:
-    """U1 to U6 for a design at `state` and those of its tasks, with U2 and U3 also split into lengths and angles.
+def uncertainties(at: Linearisation, sigma: float = 1.0, target: Target | None = None) -> dict[str, Quantity]:
+    """U1 to U6 of a linearised design and those of its tasks, with U2 and U3 also split into lengths and angles.
 
     `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a fit. U3 is quoted for
     the model's reported parameters, monomials on [0, 1] for a kinematic model, less those that are zero in any
     machine of the model. U5 runs over all pairs of balls of an artefact, U6 over all pairs of evaluation points,
     compared with the `target` accuracy if there is one; measuring tasks are compared with their own.
     """
+    design, layout = at.design, at.layout
     result: dict[str, Quantity] = {}
 
     def add(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> None:
@@ -86,13 +80,13 @@ def uncertainties(
 
     balls = design.plate_balls
     axes = ("x", "y", "z")[: design.dimension]
-    of_balls = found.of_balls()[balls]
+    of_balls = at.of_balls()[balls]
     labels = [f"ball {design.ball_label(b)} {axis}" for b in balls for axis in axes]
     add("U1", of_balls.ravel(), "m", labels)
 
     poses = layout.poses
     names = [p.name for p in layout.parameters[poses]]
-    of_poses = found.of_shared(np.eye(len(layout))[poses])
+    of_poses = at.of_shared(np.eye(len(layout))[poses])
     angle = layout.is_angle[poses]
     add("U2", of_poses, "m, rad", names)
     add("U2 lengths", of_poses[~angle], "m", [n for n, a in zip(names, angle, strict=True) if not a])
@@ -100,13 +94,13 @@ def uncertainties(
 
     offsets = layout.offsets
     names = [p.name for p in layout.parameters[offsets]]
-    add("U2 offsets", found.of_shared(np.eye(len(layout))[offsets]), "m", names)
+    add("U2 offsets", at.of_shared(np.eye(len(layout))[offsets]), "m", names)
 
     reported = design.model.reported()
     quoted = np.flatnonzero(reported.matrix.any(axis=1))
     matrix = np.zeros((len(quoted), len(layout)))
     matrix[:, layout.model] = reported.matrix[quoted]
-    of_model = found.of_shared(matrix)
+    of_model = at.of_shared(matrix)
     units = np.array(reported.units)[quoted]
     quoted_names = [reported.names[i] for i in quoted]
     present = [u for u in ("m", "rad", "1") if (units == u).any()]
@@ -115,12 +109,12 @@ def uncertainties(
         chosen = np.flatnonzero(units == unit)
         add(f"U3 {word}", of_model[chosen], unit, [quoted_names[i] for i in chosen])
 
-    pairs = ball_pairs(design, state, found)
+    pairs = ball_pairs(at)
     if pairs.count:
         result["U5"] = _of_pairs("U5", pairs, sigma, lambda i: f"ball {design.ball_label(i)}")
 
     if len(design.points):
-        of_points, lengths = _of_points(design, layout, state, found, sigma, target)
+        of_points, lengths = _of_points(at, sigma, target)
         point_names = [f"point {i + 1} {axis}" for i in range(len(design.points)) for axis in axes]
         add("U4", of_points.ravel(), "m", point_names)
         if (top := result["U4"].largest) != "":
@@ -128,7 +122,7 @@ def uncertainties(
             result["U4"] = replace(result["U4"], places=(_point(design, i),))
         if lengths is not None:
             result["U6"] = lengths
-    tasks = task_uncertainties(design, layout, state, found, sigma)
+    tasks = task_uncertainties(at, sigma)
     if tasks:
         values = np.array([task.standard_uncertainty for task in tasks])
         quantity = summarise("tasks", values, "m", design.task_names)
@@ -138,26 +132,22 @@ def uncertainties(
 
 
 @single_threaded
-def length_uncertainties(
-    design: Design, layout: SharedLayout, state: State, found: Covariance, target: Target | None = None
-) -> Quantity | None:
+def length_uncertainties(at: Linearisation, target: Target | None = None) -> Quantity | None:
     """U6 alone, as `uncertainties` has it; None where there are no two evaluation points."""
-    return _of_points(design, layout, state, found, 1.0, target)[1] if len(design.points) else None
+    return _of_points(at, 1.0, target)[1] if len(at.design.points) else None
 
 
-def _of_points(
-    design: Design, layout: SharedLayout, state: State, found: Covariance, sigma: float, target: Target | None
-) -> tuple[Array, Quantity | None]:
+def _of_points(at: Linearisation, sigma: float, target: Target | None) -> tuple[Array, Quantity | None]:
     """U4 (points, d), not multiplied by sigma, and U6."""
     # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
     limit = None if target is None else Target(target.standard, sigma).standard
-    of_points, pairs = point_pairs(design, layout, state, found, limit)
+    of_points, pairs = point_pairs(at, limit)
     if not pairs.count:
         return of_points, None
     share = None if target is None else pairs.within / pairs.count
     lengths = _of_pairs("U6", pairs, sigma, lambda i: f"point {i + 1}", share)
     if lengths.largest:
-        lengths = replace(lengths, places=tuple(_point(design, i) for i in pairs.where))
+        lengths = replace(lengths, places=tuple(_point(at.design, i) for i in pairs.where))
     return of_points, lengths if target is None else replace(lengths, coverage_factor=target.coverage_factor)
 
 
@@ -190,41 +180,36 @@ def _of_pairs(
     return Quantity(symbol, sigma * pairs.maximum, average, "m", pairs.count, pairs.undetermined, where, within_target)
 
 
-def ball_pairs(design: Design, state: State, found: Covariance) -> PairSummary:
+def ball_pairs(at: Linearisation) -> PairSummary:
     """U5: distances between all pairs of balls of each artefact, in tiles of bounded size."""
     summary = PairSummary()
-    for artefact in np.flatnonzero(design.is_plate):
-        balls = np.flatnonzero(design.ball_artefact == artefact)
+    for artefact in np.flatnonzero(at.design.is_plate):
+        balls = np.flatnonzero(at.design.ball_artefact == artefact)
         summary = summary + all_pairs(
-            state.balls[balls],
-            found.ball[balls],
-            found.ball_own[balls],
-            found.ball_null[balls],
+            at.state.balls[balls],
+            at.balls.common[balls],
+            at.balls.own[balls],
+            at.ball_null[balls],
             balls,
-            drawn=None if found.drawn is None else found.drawn.balls[balls],
+            drawn=at.as_drawn.state.balls[balls],
         )
     return summary
 
 
-def point_pairs(
-    design: Design,
-    layout: SharedLayout,
-    state: State,
-    found: Covariance,
-    limit: LengthFunction | None = None,
-) -> tuple[Array, PairSummary]:
+def point_pairs(at: Linearisation, limit: LengthFunction | None = None) -> tuple[Array, PairSummary]:
     """U4 (points, d) and U6 at the design's evaluation points."""
+    design = at.design
     probes = np.full(len(design.points), design.point_probe)
-    of_shared = correction_rows(design, layout, state, design.points, probes)
-    spread = of_shared @ found.shared
+    of_shared = correction_rows(design, at.layout, at.state, design.points, probes)
+    spread = of_shared @ at.shared
     values = np.sqrt((spread**2).sum(axis=2))
     drawn = None
-    if found.drawn is not None:
-        of_shared = correction_rows(design, layout, found.drawn, design.points, probes)
-        drawn = corrected_points(design, found.drawn, design.points, probes)
-    null = of_shared @ found.shared_null
-    size = np.sqrt(((of_shared * found.scale) ** 2).sum(axis=2))
-    corrected = corrected_points(design, state, design.points, probes)
+    if at.drawn is not None:
+        of_shared = correction_rows(design, at.layout, at.drawn.state, design.points, probes)
+        drawn = corrected_points(design, at.drawn.state, design.points, probes)
+    null = of_shared @ at.shared_null
+    size = np.sqrt(((of_shared * at.spectrum.scale) ** 2).sum(axis=2))
+    corrected = corrected_points(design, at.state, design.points, probes)
     n, d = design.points.shape
     pairs = all_pairs(corrected, spread, np.zeros((n, d, d)), null, np.arange(n), limit, drawn)
     return blank(values, null, size), pairs

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.covariance import Covariance, blank
-from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.estimation.covariance import blank
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.rounding import comparable
@@ -81,17 +80,18 @@ class Functions:
         return np.asarray(-(self.operator @ moved))
 
 
-def error_functions(design: Design, layout: SharedLayout, state: State, found: Covariance) -> Functions:
+def error_functions(at: Linearisation) -> Functions:
     """U4: each component of the error function at the evaluation points that is determined."""
     from scipy.sparse import csr_array, eye
 
+    design = at.design
     probes = np.full(len(design.points), design.point_probe)
-    rates = correction_rows(design, layout, state, design.points, probes)
-    spread = _points(rates, found)
-    if found.drawn is not None:
-        rates = correction_rows(design, layout, found.drawn, design.points, probes)
-    null = rates @ found.shared_null
-    size = np.sqrt(((rates * found.scale) ** 2).sum(axis=2))
+    rates = correction_rows(design, at.layout, at.state, design.points, probes)
+    spread = _points(rates, at)
+    if at.drawn is not None:
+        rates = correction_rows(design, at.layout, at.drawn.state, design.points, probes)
+    null = rates @ at.shared_null
+    size = np.sqrt(((rates * at.spectrum.scale) ** 2).sum(axis=2))
     uncertainty = blank(np.sqrt((spread**2).sum(axis=2)), null, size).ravel()
     known = np.flatnonzero(~np.isnan(uncertainty))
     operator = csr_array(eye(len(uncertainty), format="csr"))[known]
@@ -99,34 +99,33 @@ def error_functions(design: Design, layout: SharedLayout, state: State, found: C
     return Functions(operator, spread.reshape(len(uncertainty), spread.shape[2]), None, uncertainty[known], point, axis)
 
 
-def point_distances(design: Design, layout: SharedLayout, state: State, found: Covariance) -> Functions:
+def point_distances(at: Linearisation) -> Functions:
     """U6: distances between corrected points, of at most `MOST_PLACES` of them."""
+    design, drawn = at.design, at.as_drawn.state
     chosen = evenly(len(design.points))
     points, probes = design.points[chosen], np.full(len(chosen), design.point_probe)
-    spread = _points(correction_rows(design, layout, state, points, probes), found)
-    corrected = corrected_points(design, state, points, probes)
+    spread = _points(correction_rows(design, at.layout, at.state, points, probes), at)
+    corrected = corrected_points(design, at.state, points, probes)
     first, second = np.triu_indices(len(points), 1)
-    drawn = state if found.drawn is None else found.drawn
-    null = correction_rows(design, layout, drawn, points, probes) @ found.shared_null
+    null = correction_rows(design, at.layout, drawn, points, probes) @ at.shared_null
     as_drawn = corrected_points(design, drawn, points, probes)
     return _distances(corrected, spread, null, None, first, second, chosen, as_drawn)
 
 
-def ball_distances(design: Design, state: State, found: Covariance) -> Callable[[Integers], Functions]:
+def ball_distances(at: Linearisation) -> Callable[[Integers], Functions]:
     """U5: distances between balls of each artefact; of large ones, those that end at some or the asked balls."""
     from scipy.sparse import coo_array
 
-    n, d = design.balls.shape
-    common, null = np.zeros_like(found.ball), np.zeros_like(found.ball_null)
-    drawn = (state if found.drawn is None else found.drawn).balls
+    design, places, drawn = at.design, at.state.balls, at.as_drawn.state.balls
+    n, d = places.shape
+    common, null = np.zeros_like(at.balls.common), np.zeros_like(at.ball_null)
     for artefact in np.flatnonzero(design.is_plate):
         mine = np.flatnonzero(design.ball_artefact == artefact)
-        centred = state.balls[mine] - state.balls[mine].mean(axis=0)
-        common[mine] = without_rigid_motion(centred, found.ball[mine])
-        null[mine] = without_rigid_motion(drawn[mine] - drawn[mine].mean(axis=0), found.ball_null[mine])
-    at = d * np.arange(n)[:, None, None] + np.zeros((d, d), np.int64)
-    row, column = at + np.arange(d)[:, None], at + np.arange(d)
-    own = coo_array((found.ball_own.ravel(), (row.ravel(), column.ravel())), shape=(n * d, n * d)).tocsr()
+        common[mine] = without_rigid_motion(places[mine] - places[mine].mean(axis=0), at.balls.common[mine])
+        null[mine] = without_rigid_motion(drawn[mine] - drawn[mine].mean(axis=0), at.ball_null[mine])
+    first = d * np.arange(n)[:, None, None] + np.zeros((d, d), np.int64)
+    row, column = first + np.arange(d)[:, None], first + np.arange(d)
+    own = coo_array((at.balls.own.ravel(), (row.ravel(), column.ravel())), shape=(n * d, n * d)).tocsr()
     own.eliminate_zeros()
     kept: dict[bytes, Functions] = {}
 
@@ -142,7 +141,7 @@ def ball_distances(design: Design, state: State, found: Covariance) -> Callable[
         key = first.tobytes()
         if key not in kept:
             kept.clear()
-            kept[key] = _distances(state.balls, common, null, own, first, second, np.arange(n), drawn)
+            kept[key] = _distances(places, common, null, own, first, second, np.arange(n), drawn)
         return kept[key]
 
     return among
@@ -159,10 +158,10 @@ def evenly(count: int) -> Integers:
     return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
 
 
-def _points(rates: Array, found: Covariance) -> Array:
+def _points(rates: Array, at: Linearisation) -> Array:
     """Spread (p, d, r) of points, as wide as that of balls."""
-    spread = np.zeros((*rates.shape[:2], found.ball.shape[2]))
-    spread[:, :, : found.shared.shape[1]] = rates @ found.shared
+    spread = np.zeros((*rates.shape[:2], at.balls.common.shape[2]))
+    spread[:, :, : at.rank] = rates @ at.shared
     return spread
 
 

@@ -8,12 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.covariance import Covariance, covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.gauss_newton import as_drawn
 from ballplate.simulator.estimation.hat import hat_rows, row_places, whitened_residuals
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
@@ -72,20 +68,14 @@ def orthonormal(left: Array, size: Array) -> Array:
     return np.asarray(u[:, values**2 > HIDDEN])
 
 
-def leftover(design: Design, state: State, x: Array | None, freedom: int, spread: Covariance | None = None) -> Leftover:
-    """What an estimate at `state` from scale readings x (readings, d), or error-free ones, leaves, to first order.
-
-    `spread` is the covariance there if it is known.
-    """
-    layout = shared_layout(design)
-    if spread is None:
-        factor = eliminate(design, layout, state, x)
-        spread = covariance(design, factor, spectrum(factor, None if x is None else as_drawn(design)))
+def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
+    """What an estimate from scale readings x (readings, d), or error-free ones, leaves, to first order."""
+    design = at.design
     n, d = len(row_places(design)), design.dimension
-    common, own, ball = np.zeros((n, spread.ball.shape[2])), np.zeros((n, d)), np.full(n, -1)
-    for some in hat_rows(design, layout, state, x, spread):
+    common, own, ball = np.zeros((n, at.balls.common.shape[2])), np.zeros((n, d)), np.full(n, -1)
+    for some in hat_rows(at, x):
         common[some.rows], own[some.rows], ball[some.rows] = some.common, some.own, some.ball
-    residual = whitened_residuals(design, layout, state, x)
+    residual = whitened_residuals(design, at.layout, at.state, x)
     found = Leftover(residual, common, own, ball, len(design.balls), freedom)
     return replace(found, residual=found.of(residual[:, None])[:, 0])
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.covariance import Covariance
 from ballplate.simulator.estimation.hat import hat_rows
-from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .patterns import Patterns
@@ -44,24 +42,23 @@ class Response:
         return np.where(left > NIL * self.square, left, 0.0)
 
 
-def responses(
-    design: Design, layout: SharedLayout, state: State, x: Array | None, found: Covariance, given: Patterns
-) -> Iterator[Response]:
+def responses(at: Linearisation, x: Array | None, given: Patterns) -> Iterator[Response]:
     """Responses of all patterns, some at a time."""
     from scipy.sparse import csr_array
 
     matrix = given.matrix.tocsr()
-    n, d = design.balls.shape
+    n, d = at.design.balls.shape
     square = np.asarray(given.matrix.power(2).sum(axis=0)).ravel()
     wide = np.flatnonzero(~given.is_local)
     first_row = given.matrix.indices[np.minimum(given.matrix.indptr[:-1], given.matrix.nnz - 1)]
-    common, own = np.zeros((len(wide), found.ball.shape[2])), csr_array((len(wide), n * d))
-    for some in hat_rows(design, layout, state, x, found):
+    common, own = np.zeros((len(wide), at.balls.common.shape[2])), csr_array((len(wide), n * d))
+    for some in hat_rows(at, x):
         hat = (some.common**2).sum(axis=1) + (some.own**2).sum(axis=1)
         of_ball = some.ball >= 0
-        at = np.flatnonzero(of_ball)
-        columns = d * some.ball[at][:, None] + np.arange(d)
-        private = csr_array((some.own[at].ravel(), (np.repeat(at, d), columns.ravel())), shape=(len(some.rows), n * d))
+        rows = np.flatnonzero(of_ball)
+        columns = d * some.ball[rows][:, None] + np.arange(d)
+        entries = (some.own[rows].ravel(), (np.repeat(rows, d), columns.ravel()))
+        private = csr_array(entries, shape=(len(some.rows), n * d))
         here = np.zeros(matrix.shape[0], bool)
         here[some.rows] = True
         local = np.flatnonzero(given.is_local & here[first_row])

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.estimation.gauss_newton import as_drawn
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.threads import single_threaded
 
@@ -55,8 +55,8 @@ WEIGHINGS = 4
 
 
 @single_threaded
-def diagnosis(design: Design, solution: Solution, x: Array, freedom: int, sigma_is_estimated: bool) -> Diagnosis:
-    """What is suspected of the observations that a solution was found from; the estimate itself stays what it is.
+def diagnosis(at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> Diagnosis:
+    """What is suspected of the observations behind a linearised fit; the estimate itself stays what it is.
 
     Causes are spaces of biases, tested to first order by what they explain of the residuals: by chi-squared where sigma
     is given and what they leave is as stated, otherwise by Fisher's F. The limits are Bonferroni's for `FAMILY`. A
@@ -64,9 +64,9 @@ def diagnosis(design: Design, solution: Solution, x: Array, freedom: int, sigma_
     searched anew; if what is left at the end shows smooth errors, no mistake is named at all, unless all that is left
     is less than `HARMLESS` of what is stated.
     """
-    if freedom < 3 or solution.factor.sum_of_squares <= ROUNDING**2 * freedom:
+    if freedom < 3 or at.factor.sum_of_squares <= ROUNDING**2 * freedom:
         return Diagnosis()
-    return Search(design, solution.state, x, freedom, sigma_is_estimated).found()
+    return Search(at, x, freedom, sigma_is_estimated).found()
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ class _Chosen:
 class Search:
     """All tests of a fit's residuals, less what the causes found so far explain."""
 
-    def __init__(self, design: Design, state: State, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
-        self.design, self.state, self.x, self.estimated = design, state, x, sigma_is_estimated
-        left = leftover(design, state, x, freedom)
+    def __init__(self, at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
+        self.design, self.state, self.x, self.estimated = at.design, at.state, x, sigma_is_estimated
+        left = leftover(at, x, freedom)
         self.sum_of_squares, self.freedom = left.sum_of_squares, freedom
         self._begin(left)
 
@@ -216,7 +216,8 @@ class Search:
         for _ in range(WEIGHINGS):
             times *= ratio(left, one.rows)
             self.design = with_scatter(plain, one, times)
-            left = leftover(self.design, self.state, self.x, self.start.freedom)
+            at = linearise(self.design, self.state, self.x, as_drawn(self.design))
+            left = leftover(at, self.x, self.start.freedom)
         self._begin(left)
         return times
 

@@ -6,11 +6,9 @@ import math
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_state
-from ballplate.simulator.estimation.covariance import covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.hat import row_places
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Integers
@@ -49,20 +47,14 @@ def reliability_of(
     experiment: Experiment | None = None,
 ) -> Reliability:
     """Reliability of a design at zero machine error, where sigma is known or estimated."""
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    found_rank = spectrum(factor)
-    spread = covariance(design, factor, found_rank)
-    given = patterns(design, state, None)
-    functions = {
-        "U4": error_functions(design, layout, state, spread),
-        "U6": point_distances(design, layout, state, spread),
-    }
-    balls_of = ball_distances(design, state, spread)
+    at = linearise(design)
+    given = patterns(design, at.state, None)
+    functions = {"U4": error_functions(at), "U6": point_distances(at)}
+    balls_of = ball_distances(at)
     places = row_places(design)
     redundancy, left, information = np.zeros(len(places)), np.zeros(len(given)), np.zeros(len(given))
     effects = {symbol: _nothing(len(given)) for symbol in SYMBOLS}
-    for one in responses(design, layout, state, None, spread, given):
+    for one in responses(at, None, given):
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information
         left[one.index] = one.information / np.where(one.square > 0.0, one.square, 1.0)
@@ -80,10 +72,10 @@ def reliability_of(
         own = np.flatnonzero(given.kind == kind)
         left[own] = redundancy[rows][: len(own)]
     repeats = design.readings.repeats[design.plate_readings]
-    every = patterns(design, state, None, every_start=True)
-    tests = Columns(every.matrix, event_groups(every), leftover(design, state, None, 1, spread)).tests()
+    every = patterns(design, at.state, None, every_start=True)
+    tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
     limit = 0.5 * FAMILY / max(tests, 1)
-    freedom = design.observations - design.parameter_count + found_rank.deficiency
+    freedom = design.observations - design.parameter_count + at.deficiency
     return Reliability(
         experiment.label if experiment else "",
         experiment.title if experiment else "",
@@ -95,7 +87,7 @@ def reliability_of(
         information,
         effects,
         freedom,
-        found_rank.deficiency,
+        at.deficiency,
         sigma_is_estimated,
         false_alarm,
         power,

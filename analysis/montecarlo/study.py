@@ -8,10 +8,8 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_state
-from ballplate.simulator.estimation.covariance import spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.generate import NoReadingError, on_true_machine
@@ -133,8 +131,7 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     design = shared.design
     # Neither model need contain the other: what the true one's functions add is the rank of both together.
     both = replace(design, model=JoinedModel(design.model, shared.truth.model), priors=_widened(design, shared.truth))
-    found = spectrum(eliminate(both, shared_layout(both), nominal_state(both)))
-    more = both.parameter_count - found.deficiency - design.parameter_count
+    more = both.parameter_count - linearise(both).deficiency - design.parameter_count
     if more == 0:
         return Optimism(power, None)
     return Optimism(power, OwnModel(more, misfit, power_of_difference(more, misfit)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design import probe_offsets
-from ballplate.simulator.estimation.covariance import Covariance, covariance
+from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.estimation.observations import offset_sensitivity
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
@@ -40,7 +40,7 @@ class Target:
 def targets(shared: Reference) -> tuple[Target, ...]:
     """The quantities of U1 to U6 that a design has; U3 only where the true machine is one of the fitted model's."""
     design, start, truth = shared.design, shared.start, shared.truth
-    found = covariance(design, shared.factor, shared.spectrum)
+    found = shared.linearisation
     result = [_balls(shared, found), _poses(shared, found)]
     if truth.model == design.model:
         result.append(_parameters(shared, found))
@@ -95,7 +95,7 @@ def _uncertain(target: Target) -> Target | None:
     return Target(target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled)
 
 
-def _balls(shared: Reference, found: Covariance) -> Target:
+def _balls(shared: Reference, found: Linearisation) -> Target:
     balls = shared.design.plate_balls
     base = (shared.start.balls - shared.truth.state.balls)[balls].ravel()
     values = found.of_balls()[balls].ravel()
@@ -106,7 +106,7 @@ def _balls(shared: Reference, found: Covariance) -> Target:
     return Target("U1", base, values, ("m",) * len(base), change)
 
 
-def _poses(shared: Reference, found: Covariance) -> Target:
+def _poses(shared: Reference, found: Linearisation) -> Target:
     layout, start, real, d = shared.factor.layout, shared.start, shared.truth.state, shared.design.dimension
     position, place = np.nonzero(layout.pose_columns >= 0)
     turn = vector_from_rotation(start.rotations @ real.rotations.transpose(0, 2, 1))
@@ -120,7 +120,7 @@ def _poses(shared: Reference, found: Covariance) -> Target:
     return Target("U2", base, found.of_shared(rows), units, change)
 
 
-def _parameters(shared: Reference, found: Covariance) -> Target:
+def _parameters(shared: Reference, found: Linearisation) -> Target:
     layout, reported = shared.factor.layout, shared.design.model.reported()
     quoted = np.flatnonzero(reported.matrix.any(axis=1))
     matrix = reported.matrix[quoted]
@@ -131,10 +131,10 @@ def _parameters(shared: Reference, found: Covariance) -> Target:
     return Target("U3", base, found.of_shared(rows), units, lambda replicates: replicates.a @ matrix.T)
 
 
-def _ball_distances(shared: Reference, found: Covariance, own: Integers) -> Target:
+def _ball_distances(shared: Reference, found: Linearisation, own: Integers) -> Target:
     start, real = shared.start.balls[own], shared.truth.state.balls[own]
     return _distances(
-        "U5", start, real, found.ball[own], found.ball_own[own], lambda replicates: replicates.balls[:, :, own]
+        "U5", start, real, found.balls.common[own], found.balls.own[own], lambda replicates: replicates.balls[:, :, own]
     )
 
 

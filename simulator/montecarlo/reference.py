@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, State, nominal_state, probe_offsets
-from ..estimation.covariance import Spectrum, spectrum
-from ..estimation.elimination import Factor, eliminate
+from ..design import Design, State, probe_offsets
+from ..estimation.covariance import Spectrum
+from ..estimation.elimination import Factor
 from ..estimation.gauss_newton import gauss_newton
 from ..estimation.initial import initial_state
+from ..estimation.linearisation import Linearisation, linearise
 from ..estimation.observations import (
     prior_rows,
     reading_blocks,
     reading_weights,
 )
-from ..estimation.parameters import shared_layout
 from ..generate import scale_readings, true_lengths, true_priors
 from ..machines.protocol import Array, ErrorModel, Integers
 from ..threads import single_threaded
@@ -98,6 +98,11 @@ class Reference:
         return self.factor.sum_of_squares
 
     @property
+    def linearisation(self) -> Linearisation:
+        """The linearisation at the reference."""
+        return Linearisation(self.design, self.factor.layout, self.start, self.factor, self.spectrum)
+
+    @property
     def degrees_of_freedom(self) -> int:
         return self.design.observations - self.design.parameter_count
 
@@ -112,9 +117,9 @@ def reference(design: Design, truth: Truth) -> Reference:
     """
     observed = _observed(design)
     # As drawn, because a small machine error makes a direction that is open merely all but open.
-    drawn = spectrum(eliminate(observed, shared_layout(observed), nominal_state(observed)))
-    if drawn.deficiency:
-        raise NoReferenceError(f"the design is rank deficient by {drawn.deficiency}")
+    deficiency = linearise(observed).deficiency
+    if deficiency:
+        raise NoReferenceError(f"the design is rank deficient by {deficiency}")
     readings = observed.readings
     p = probe_offsets(observed, truth.state)[readings.probe]
     turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])

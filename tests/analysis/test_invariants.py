@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.simulator.design import Design, State, nominal_state
-from ballplate.simulator.estimation.covariance import Covariance, covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.quantities import LengthFunction, Target
@@ -40,11 +39,9 @@ def small_design(seed: int = 0, calibration: str = "sides") -> Design:
     return replace(design, points=np.random.default_rng(seed).random((12, 3)))
 
 
-def judged(design: Design, sigma: float = 1.0) -> tuple[dict[str, Quantity], Covariance, SharedLayout]:
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    spread = covariance(design, factor, spectrum(factor))
-    return uncertainties(design, layout, state, spread, sigma), spread, layout
+def judged(design: Design, sigma: float = 1.0) -> tuple[dict[str, Quantity], Linearisation, SharedLayout]:
+    at = linearise(design)
+    return uncertainties(at, sigma), at, at.layout
 
 
 def assert_same(found: Quantity, expected: Quantity, relative: float = 1e-9) -> None:
@@ -208,17 +205,15 @@ def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> No
 def test_share_of_distances_within_the_target() -> None:
     """Against a count over single pairs."""
     design = small_design(7)
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    spread = covariance(design, factor, spectrum(factor))
+    at = linearise(design)
     values = []
     for i, j in itertools.combinations(range(len(design.points)), 2):
         pair = replace(design, points=design.points[[i, j]])
         length = float(np.linalg.norm(design.points[i] - design.points[j]))
-        values.append((uncertainties(pair, layout, state, spread)["U6"].maximum, length))
+        values.append((uncertainties(replace(at, design=pair))["U6"].maximum, length))
     cases = ((2e-7, 0.0, 1.0, 1.0), (1e-7, 2e-7, 1.0, 1.0), (1e-7, 2e-7, 1.7, 1.0), (3e-7, 4e-7, 1.2, 2.0))
     for constant, slope, sigma, k in cases:
         target = Target(LengthFunction(constant, slope), k)
-        found = uncertainties(design, layout, state, spread, sigma, target)["U6"].within_target
+        found = uncertainties(at, sigma, target)["U6"].within_target
         assert found == np.mean([k * sigma * u <= constant + slope * length for u, length in values])
         assert found is not None and 0 < found < 1

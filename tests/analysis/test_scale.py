@@ -19,7 +19,7 @@ from ballplate.scale import (
     with_offsets,
 )
 from ballplate.simulator.design import nominal_state
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
@@ -106,8 +106,8 @@ def test_offsets_with_an_uncertainty_are_what_generalised_least_squares_makes_of
 def test_scale_is_the_mean_relative_change_of_distances(tmp_path: Path) -> None:
     """Counted pair by pair, for a change of the machine's parameters."""
     design = lay_out(experiment_of(tmp_path, SMALL))
-    layout, state = shared_layout(design), nominal_state(design)
-    row = scale_row(design, layout, state)
+    at = linearise(design)
+    layout, state, row = at.layout, at.state, scale_row(at)
     step = 1e-6 * np.random.default_rng(3).normal(size=len(state.a))
     points = design.points
     offsets = np.broadcast_to(design.probes[design.point_probe], points.shape)

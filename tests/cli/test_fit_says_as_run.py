@@ -10,7 +10,7 @@ import pytest
 from ballplate.results.fit import Fit
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.design import State
-from ballplate.simulator.estimation.gauss_newton import fitted_covariance
+from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.generate import exact_readings, noisy_readings, on_true_machine, true_artefacts
@@ -69,7 +69,7 @@ def assert_says_as_run(experiment: Experiment, seed: int) -> None:
         assert told(found) == told(planned)
     # What counts as determined is estimated as well as it says.
     found, truth = fitted(experiment, seed)
-    spread = fitted_covariance(found.design, found.solution)
+    spread = linearised_fit(found.design, found.solution)
     layout, state = found.solution.factor.layout, found.solution.state
     for stated, off in (
         (spread.of_balls()[found.design.plate_balls], (state.balls - truth.balls)[found.design.plate_balls]),

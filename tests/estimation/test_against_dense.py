@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from ballplate.pairs import all_pairs
 from ballplate.simulator.design import Design, State, nominal_state
-from ballplate.simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import newton_step
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import expected_readings
-from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.observation_arrays import Lengths, Readings
 from ballplate.uncertainty import point_pairs, uncertainties
@@ -210,13 +209,6 @@ def deficient_grid_of_seven() -> Design:
     return plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=10)
 
 
-def solved(design: Design, state: State, x: Real | None = None) -> tuple[SharedLayout, Spectrum, Covariance]:
-    layout = shared_layout(design)
-    factor = eliminate(design, layout, state, x)
-    found = spectrum(factor)
-    return layout, found, covariance(design, factor, found)
-
-
 def pair_values(places: Real, common: Real, own: Real, null: Real) -> Real:
     """The uncertainty of every single pair, NaN where open, each from a call with two places."""
     values = []
@@ -227,8 +219,9 @@ def pair_values(places: Real, common: Real, own: Real, null: Real) -> Real:
     return np.array(values)
 
 
-def individual(design: Design, layout: SharedLayout, state: State, found: Covariance) -> dict[str, Real]:
+def individual(found: Linearisation) -> dict[str, Real]:
     """All that stands behind U1 to U6, in the order of the dense reference."""
+    design, layout, state = found.design, found.layout, found.state
     reported = np.zeros((len(design.model.reported().names), len(layout)))
     reported[:, layout.model] = design.model.reported().matrix
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
@@ -240,10 +233,12 @@ def individual(design: Design, layout: SharedLayout, state: State, found: Covari
         "U1": found.of_balls()[design.plate_balls].ravel(),
         "U2": found.of_shared(np.eye(len(layout))[layout.poses]),
         "U3": found.of_shared(reported),
-        "U4": point_pairs(design, layout, state, found)[0].ravel(),
+        "U4": point_pairs(found)[0].ravel(),
         "U5": np.concatenate(
             [
-                pair_values(state.balls[chosen], found.ball[chosen], found.ball_own[chosen], found.ball_null[chosen])
+                pair_values(
+                    state.balls[chosen], found.balls.common[chosen], found.balls.own[chosen], found.ball_null[chosen]
+                )
                 for chosen in (
                     np.flatnonzero(design.ball_artefact == plate) for plate in np.flatnonzero(design.is_plate)
                 )
@@ -255,14 +250,14 @@ def individual(design: Design, layout: SharedLayout, state: State, found: Covari
 
 def compare(design: Design, state: State, problem: dense.Problem, x: Real | None = None) -> int:
     """Check all uncertainties; returns the rank deficiency that both found."""
-    layout, found, spread = solved(design, state, x)
+    found = linearise(design, state, x)
     reference = dense.linearised(problem)
     assert found.deficiency == reference.deficiency
-    assert len(layout) + 3 * len(design.plate_balls) == problem.parameters
+    assert len(found.layout) + 3 * len(design.plate_balls) == problem.parameters
     assert list(design.model.reported().names) == dense.monomial_names(problem)
     expected = dense.standard_uncertainties(problem, reference)
-    summary = uncertainties(design, layout, state, spread)
-    for symbol, values in individual(design, layout, state, spread).items():
+    summary = uncertainties(found)
+    for symbol, values in individual(found).items():
         np.testing.assert_array_equal(np.isnan(values), np.isnan(expected[symbol]), err_msg=symbol)
         np.testing.assert_allclose(values, expected[symbol], rtol=RELATIVE, atol=0, err_msg=symbol)
         quantity, open_ = summary[symbol], np.isnan(expected[symbol])
@@ -337,13 +332,13 @@ def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], 
     assert compare(design, state, problem, x) == 0
 
     layout = shared_layout(design)
-    factor = eliminate(design, layout, state, x)
-    shared, balls = newton_step(design, factor, spectrum(factor))
+    found = linearise(design, state, x)
+    shared, balls = newton_step(design, found.factor, found.spectrum)
     expected, squares = dense.least_squares_step(problem)
     n, poses = 3 * len(design.plate_balls), len(problem.free_poses)
     expected_a = in_reference_basis(problem, design, shared[layout.model])
     ours = np.concatenate([balls[design.plate_balls].ravel(), shared[layout.poses], expected_a])
-    assert factor.sum_of_squares == pytest.approx(squares, rel=RELATIVE)
+    assert found.factor.sum_of_squares == pytest.approx(squares, rel=RELATIVE)
     for part in (slice(0, n), slice(n, n + poses), slice(n + poses, None)):
         assert np.abs(ours[part] - expected[part]).max() < 1e-8 * np.abs(expected[part]).max()
 

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.simulator.design import Design, State, nominal_state
-from ballplate.simulator.estimation.covariance import covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit, moved
 from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
@@ -120,12 +119,12 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     size = np.concatenate([np.minimum(layout.scale, 1.0), np.ones(3 * len(members))]) * 1e-4
     columns = [(residual(s) - residual(-s)) / (2 * h) for s, h in zip(np.diag(size), size, strict=True)]
     dense = np.stack(columns, axis=1)
-    factor = eliminate(design, layout, state, x)
+    at = linearise(design, state, x)
     now = residual(np.zeros(len(size)))
-    assert factor.sum_of_squares == pytest.approx(now @ now, rel=1e-12)
+    assert at.factor.sum_of_squares == pytest.approx(now @ now, rel=1e-12)
     scaled = dense * size
     expected = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)))[:count] * size[:count]
-    found = covariance(design, factor, spectrum(factor)).of_shared(np.eye(count))
+    found = at.of_shared(np.eye(count))
     np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
@@ -253,7 +252,7 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
         assert found.status == "converged"
         sums.append(found.factor.sum_of_squares)
         layout = shared_layout(design)
-        spread = covariance(design, found.factor, found.spectrum).of_shared(np.eye(len(layout)))
+        spread = linearised_fit(design, found).of_shared(np.eye(len(layout)))
         columns = layout.offset_columns[1:]
         assert found.state.probes is not None
         deviations.append((found.state.probes - drawn.probes)[1:] / spread[columns])

@@ -16,10 +16,7 @@ from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.planning.selection import Campaign
-from ballplate.simulator.design import nominal_state
-from ballplate.simulator.estimation.covariance import covariance, spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
@@ -41,13 +38,12 @@ def by_run(experiment: Experiment, name: CriterionName) -> float:
         found = predict(experiment).quantities[kind]
         return np.inf if found.undetermined else getattr(found, "maximum" if largest else "average")
     design = lay_out(experiment)
-    layout = shared_layout(design)
-    factor = eliminate(design, layout, nominal_state(design))
-    spread = covariance(design, factor, spectrum(factor))
+    at = linearise(design)
+    layout = at.layout
     scaled = np.eye(len(layout))[layout.model] / layout.scale[layout.model, None]
-    if np.isnan(spread.of_shared(scaled)).any():
+    if np.isnan(at.of_shared(scaled)).any():
         return np.inf
-    variances = np.linalg.eigvalsh(scaled @ spread.shared @ spread.shared.T @ scaled.T)
+    variances = np.linalg.eigvalsh(scaled @ at.shared @ at.shared.T @ scaled.T)
     return {
         "A": np.sqrt(variances.mean()),
         "D": np.exp(0.5 * np.log(variances).mean()),

@@ -18,7 +18,7 @@ from ballplate.gross_errors.power import noncentrality
 from ballplate.gross_errors.search import FAMILY, Search, diagnosis
 from ballplate.gross_errors.suspects import Diagnosis
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.layout import lay_out
@@ -55,7 +55,7 @@ class World:
         plain = self.drawn(self.machine(1), generator)
         solution = estimate(plain.design, plain.x)
         self.freedom = self.design.observations - self.design.parameter_count
-        self.search = Search(plain.design, solution.state, plain.x, self.freedom, True)
+        self.search = Search(linearised_fit(plain.design, solution), plain.x, self.freedom, True)
         self.least = noncentrality(0.5 * FAMILY / self.search.tests, 0.8, self.freedom - 1)
 
     def machine(self, seed: int) -> TrueMachine:
@@ -297,7 +297,7 @@ def draw_one(world: World, make: Draw, seed: int) -> tuple[DataSet, Diagnosis]:
     data = make(world, world.drawn(world.machine(seed), generator), generator)
     observed = observe(data.design, data.readings, data.x)
     solution = estimate(observed.design, observed.x)
-    return data, diagnosis(observed.design, solution, observed.x, world.freedom, True)
+    return data, diagnosis(linearised_fit(observed.design, solution), observed.x, world.freedom, True)
 
 
 def counts(world: World, kind: str, sets: int) -> Counter[str]:

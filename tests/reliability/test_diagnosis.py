@@ -11,7 +11,7 @@ from ballplate.gross_errors.search import diagnosis
 from ballplate.gross_errors.suspects import Diagnosis, Suspect
 from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.gauss_newton import Solution, estimate
+from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
@@ -40,7 +40,8 @@ def certified(name: str) -> tuple[ObservedReadings, bool]:
 
 def diagnosed(design: Design, x: Real, estimated: bool) -> tuple[Solution, Diagnosis]:
     solution = estimate(design, x)
-    return solution, diagnosis(design, solution, x, design.observations - design.parameter_count, estimated)
+    freedom = design.observations - design.parameter_count
+    return solution, diagnosis(linearised_fit(design, solution), x, freedom, estimated)
 
 
 def with_one_wrong(x: Real, reading: int, axis: int) -> Real:

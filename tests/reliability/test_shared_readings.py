@@ -14,7 +14,7 @@ from ballplate.gross_errors.reliability import write_observations
 from ballplate.gross_errors.search import diagnosis
 from ballplate.gross_errors.study import reliability_of
 from ballplate.simulator.design import Design, nominal_state
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
 from ballplate.simulator.estimation.observations import expected_readings
 from ballplate.simulator.layout import lay_out
 from numpy.typing import NDArray
@@ -108,7 +108,7 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)
     freedom = design.observations - design.parameter_count
-    (first,) = diagnosis(design, solution, x, freedom, sigma_is_estimated=False).suspects
+    (first,) = diagnosis(linearised_fit(design, solution), x, freedom, sigma_is_estimated=False).suspects
     given, k = first.patterns, first.pattern
     assert (given.kind[k], int(given.subject[k])) == ("end", wrong)
     along_x = next(i for i, column in enumerate(first.columns) if given.axis[column] == 0)
