@@ -11,15 +11,17 @@ from ballplate.simulator.quantities import QuantityError, parse_positive_angle, 
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.settings import listing
 
+from .quantities import DESCRIPTIONS, QUANTITIES
 from .results.formatting import number, percent, shown_unit, uncertainty_words
 from .results.prediction import Prediction
 from .study import Worth
-from .uncertainty import DESCRIPTIONS, Quantity
+from .uncertainty import Quantity
 
 FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
-# U2 and U3 as wholes have values of several units.
-MIXED = ("U2", "U3")
-SYMBOLS = tuple(symbol for symbol in DESCRIPTIONS if symbol not in (*MIXED, "U3 ratios"))
+# Wholes that have values of several units.
+MIXED = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.parts)
+RATIOS = tuple(f"{symbol} {kind.parts['1'][0]}" for symbol, kind in QUANTITIES.items() if "1" in kind.parts)
+SYMBOLS = tuple(symbol for symbol in DESCRIPTIONS if symbol not in (*MIXED, *RATIOS))
 PATTERN = re.compile(r"\s*(.+?)\s+(maximum|average)\s+(.+?)\s*", re.DOTALL)
 
 

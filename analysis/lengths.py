@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.functions import Points, displacements
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
@@ -16,7 +17,6 @@ from ballplate.simulator.rounding import above, comparable
 from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
 
-from .corrections import corrected_points, correction_rows
 from .pairs import PairTile, pair_tiles
 
 # Points of a grid: twelve million lengths.
@@ -155,12 +155,10 @@ def _tiles(design: Design, points: Array, settings: Settings) -> tuple[int, Iter
     """Rank deficiency, and the tiles of all pairs of points."""
     at = linearise(design)
     probes = np.full(len(points), design.probe_names.index(settings.probe))
-    rows = correction_rows(design, at.layout, at.state, points, probes)
-    own = np.zeros((len(points), design.dimension, design.dimension))
+    moved = displacements(at, Points(points, probes))
     if settings.with_repeatability:
-        own[:] = np.diag(design.repeatability)
-    places = corrected_points(design, at.state, points, probes)
-    return at.deficiency, pair_tiles(places, rows @ at.shared, own, rows @ at.shared_null)
+        moved.own[:] = np.diag(design.repeatability)
+    return at.deficiency, pair_tiles(moved)
 
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.quantities import LengthFunction
@@ -58,37 +59,53 @@ class PairTile:
     is_open: NDArray[np.bool_]
 
 
-def all_pairs(
-    places: Array,
-    common: Array,
-    own: Array,
-    null: Array,
-    labels: Integers,
-    limit: LengthFunction | None = None,
-    drawn: Array | None = None,
-) -> PairSummary:
-    """Standard uncertainty of the distances between all pairs of `places` (n, d), as `pair_tiles` gives them.
+def all_pairs(moved: Displacements, labels: Integers, limit: LengthFunction | None = None) -> PairSummary:
+    """Standard uncertainty of the distances between all pairs of n places, as `pair_tiles` gives them.
 
     `labels` (n,) name the places in the result.
     """
-    found = (_summary(tile, labels, limit) for tile in pair_tiles(places, common, own, null, drawn))
-    return sum(found, PairSummary())
+    return sum((_summary(tile, labels, limit) for tile in pair_tiles(moved)), PairSummary())
 
 
-def pair_tiles(places: Array, common: Array, own: Array, null: Array, drawn: Array | None = None) -> Iterator[PairTile]:
-    """Standard uncertainties of the distances between all pairs of `places` (n, d), a tile of pairs at a time.
+def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
+    """Standard uncertainties of the distances between all pairs of places, a tile of pairs at a time.
 
-    The places' errors are `common` (n, d, r) times r shared standard normal variables plus `own` (n, d, d) times
-    their own; `null` (n, d, k) moves them along undetermined directions, from where they are `drawn` (n, d), which
-    is at `places` unless told. Places that coincide make no pair. Memory is that of a tile.
+    Places that coincide make no pair. Memory is that of a tile.
     """
-    places = places - places.mean(axis=0) if len(places) else places
-    drawn = places if drawn is None else drawn - drawn.mean(axis=0)
-    common = without_rigid_motion(places, common)
-    null = without_rigid_motion(drawn, null)
-    single = common @ common.transpose(0, 2, 1) + own @ own.transpose(0, 2, 1)
+    places, common, null, drawn = _relative(moved)
+    single = common @ common.transpose(0, 2, 1) + moved.own @ moved.own.transpose(0, 2, 1)
     for rows, columns in _tiles(len(places)):
         yield _tile(places, common, single, null, drawn, rows, columns)
+
+
+def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
+    """Standard uncertainties of the distances between some pairs (m, 2) of places that are apart."""
+    places, common, null, drawn = _relative(moved)
+    lengths, variance = np.zeros(len(pairs)), np.zeros(len(pairs))
+    change = np.zeros((len(pairs), null.shape[2]))
+    # A slice of the pairs at a time: the products of all would take far more memory than the pairs.
+    for start in range(0, len(pairs), 2 * TILE):
+        part = slice(start, start + 2 * TILE)
+        i, j = pairs[part].T
+        apart = places[i] - places[j]
+        lengths[part] = np.sqrt((apart**2).sum(axis=1))
+        unit = apart / lengths[part, None]
+        variance[part] = (np.einsum("md,mdr->mr", unit, common[i] - common[j]) ** 2).sum(axis=1)
+        for end in (i, j):
+            variance[part] += (np.einsum("md,mdr->mr", unit, moved.own[end]) ** 2).sum(axis=1)
+        as_drawn = drawn[i] - drawn[j]
+        as_drawn /= np.sqrt((as_drawn**2).sum(axis=1))[:, None]
+        change[part] = np.einsum("md,mdk->mk", as_drawn, null[i] - null[j])
+    open_ = np.sqrt((change**2).sum(axis=1)) > _open_above(null)
+    return PairTile(pairs[:, 0], pairs[:, 1], lengths, np.sqrt(variance), open_)
+
+
+def _relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
+    """Places, displacements, those along undetermined directions, and places as drawn, without what all do together."""
+    if not len(moved.places):
+        return moved.places, moved.common, moved.null, moved.drawn
+    places, drawn = moved.places - moved.places.mean(axis=0), moved.drawn - moved.drawn.mean(axis=0)
+    return places, without_rigid_motion(places, moved.common), without_rigid_motion(drawn, moved.null), drawn
 
 
 def _tiles(n: int) -> Iterator[tuple[slice, slice]]:

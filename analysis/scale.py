@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design import Design, State, probe_offsets
+from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.messages import ExperimentError
 from ballplate.simulator.experiment.model import Experiment
@@ -19,7 +20,6 @@ from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.settings import listing
 
-from .corrections import correction_rows
 from .pairs import PairSummary
 from .uncertainty import point_pairs
 

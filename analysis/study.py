@@ -29,7 +29,7 @@ from .results.fit import Fit, ParameterEstimate, ParameterKind, Residual
 from .results.prediction import Prediction
 from .scale import scale_of
 from .tasks import TaskUncertainty, task_uncertainties
-from .uncertainty import Quantity, length_uncertainties, uncertainties
+from .uncertainty import Quantity, uncertainties
 
 # Residuals that a fit names.
 LARGEST = 10
@@ -72,7 +72,7 @@ def _predict(experiment: Experiment, design: Design, with_quantities: bool, with
         tasks = task_uncertainties(at)
         lengths = quantities.get("U6")
     else:
-        lengths = length_uncertainties(at, target)
+        lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
     scale = scale_of(experiment, at) if with_scale else None
     return Prediction(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
 

@@ -2,37 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.covariance import blank
+from ballplate.simulator.estimation.functions import (
+    Balls,
+    Coordinates,
+    Displacements,
+    Distances,
+    Parameters,
+    Places,
+    Points,
+    coordinate_names,
+    displacements,
+)
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.quantities import LengthFunction, Target
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import single_threaded
 
-from .corrections import corrected_points, correction_rows
-from .pairs import PairSummary, all_pairs
-from .tasks import share_within, task_uncertainties
-
-DESCRIPTIONS = {
-    "U1": "ball co-ordinates",
-    "U2": "pose parameters",
-    "U2 lengths": "pose parameters: origins",
-    "U2 angles": "pose parameters: rotations",
-    "U2 offsets": "probe offsets",
-    "U3": "model parameters",
-    "U3 lengths": "model parameters: positional errors",
-    "U3 angles": "model parameters: rotational errors",
-    "U3 ratios": "model parameters: ratios",
-    "U4": "error function at the evaluation points",
-    "U5": "distances between balls",
-    "U6": "distances between corrected points",
-    "tasks": "lengths of measuring tasks",
-}
+from .pairs import PairSummary, PairTile, all_pairs, pairs_of
+from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points
 
 
 @dataclass(frozen=True)
@@ -63,101 +56,120 @@ class Quantity:
 
 
 @single_threaded
-def uncertainties(at: Linearisation, sigma: float = 1.0, target: Target | None = None) -> dict[str, Quantity]:
-    """U1 to U6 of a linearised design and those of its tasks, with U2 and U3 also split into lengths and angles.
+def uncertainties(
+    at: Linearisation, sigma: float = 1.0, target: Target | None = None, symbols: Collection[str] | None = None
+) -> dict[str, Quantity]:
+    """All quantities of a linearised design, or those of some `symbols`; those of several units also split by these.
 
-    `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a fit. U3 is quoted for
-    the model's reported parameters, monomials on [0, 1] for a kinematic model, less those that are zero in any
-    machine of the model. U5 runs over all pairs of balls of an artefact, U6 over all pairs of evaluation points,
-    compared with the `target` accuracy if there is one; measuring tasks are compared with their own.
+    `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a fit. The distances
+    between corrected points are compared with the `target` accuracy if there is one, measuring tasks with their own.
     """
-    design, layout = at.design, at.layout
-    result: dict[str, Quantity] = {}
+    found: dict[str, Quantity] = {}
+    made: dict[bytes, Displacements] = {}
 
-    def add(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> None:
-        if len(values):
-            result[symbol] = summarise(symbol, sigma * values, unit, names)
+    def displaced(places: Places) -> Displacements:
+        if isinstance(places, Balls):
+            return displacements(at, places)
+        # Co-ordinates and distances are of the same points.
+        key = places.points.tobytes() + places.probes.tobytes()
+        if key not in made:
+            made[key] = displacements(at, places)
+        return made[key]
 
-    balls = design.plate_balls
-    axes = ("x", "y", "z")[: design.dimension]
-    of_balls = at.of_balls()[balls]
-    labels = [f"ball {design.ball_label(b)} {axis}" for b in balls for axis in axes]
-    add("U1", of_balls.ravel(), "m", labels)
-
-    poses = layout.poses
-    names = [p.name for p in layout.parameters[poses]]
-    of_poses = at.of_shared(np.eye(len(layout))[poses])
-    angle = layout.is_angle[poses]
-    add("U2", of_poses, "m, rad", names)
-    add("U2 lengths", of_poses[~angle], "m", [n for n, a in zip(names, angle, strict=True) if not a])
-    add("U2 angles", of_poses[angle], "rad", [n for n, a in zip(names, angle, strict=True) if a])
-
-    offsets = layout.offsets
-    names = [p.name for p in layout.parameters[offsets]]
-    add("U2 offsets", at.of_shared(np.eye(len(layout))[offsets]), "m", names)
-
-    reported = design.model.reported()
-    quoted = np.flatnonzero(reported.matrix.any(axis=1))
-    matrix = np.zeros((len(quoted), len(layout)))
-    matrix[:, layout.model] = reported.matrix[quoted]
-    of_model = at.of_shared(matrix)
-    units = np.array(reported.units)[quoted]
-    quoted_names = [reported.names[i] for i in quoted]
-    present = [u for u in ("m", "rad", "1") if (units == u).any()]
-    add("U3", of_model, ", ".join(present), quoted_names)
-    for unit, word in (("m", "lengths"), ("rad", "angles"), ("1", "ratios")):
-        chosen = np.flatnonzero(units == unit)
-        add(f"U3 {word}", of_model[chosen], unit, [quoted_names[i] for i in chosen])
-
-    pairs = ball_pairs(at)
-    if pairs.count:
-        result["U5"] = _of_pairs("U5", pairs, sigma, lambda i: f"ball {design.ball_label(i)}")
-
-    if len(design.points):
-        of_points, lengths = _of_points(at, sigma, target)
-        point_names = [f"point {i + 1} {axis}" for i in range(len(design.points)) for axis in axes]
-        add("U4", of_points.ravel(), "m", point_names)
-        if (top := result["U4"].largest) != "":
-            i = point_names.index(top) // len(axes)
-            result["U4"] = replace(result["U4"], places=(_point(design, i),))
-        if lengths is not None:
-            result["U6"] = lengths
-    tasks = task_uncertainties(at, sigma)
-    if tasks:
-        values = np.array([task.standard_uncertainty for task in tasks])
-        quantity = summarise("tasks", values, "m", design.task_names)
-        result["tasks"] = replace(quantity, within_target=share_within(tasks), coverage_factor=tasks[0].coverage_factor)
-    order = list(DESCRIPTIONS)
-    return dict(sorted(result.items(), key=lambda item: order.index(item[0])))
+    for symbol, kind in QUANTITIES.items():
+        functions = kind.functions(at.design, at.layout) if symbols is None or symbol in symbols else ()
+        if not functions:
+            continue
+        first = functions[0]
+        if isinstance(first, Parameters):
+            found |= _of_parameters(at, symbol, first, sigma)
+        elif isinstance(first, Coordinates):
+            found[symbol] = _of_coordinates(at, symbol, first.places, displaced, sigma)
+        elif first.pairs is not None:
+            found[symbol] = _of_named(symbol, first, pairs_of(displaced(first.places), first.pairs), sigma)
+        else:
+            groups = [(one.places, displaced(one.places)) for one in functions if isinstance(one, Distances)]
+            lengths = _of_pairs(at.design, symbol, groups, sigma, target if kind.has_target else None)
+            found |= {} if lengths is None else {symbol: lengths}
+    return found
 
 
-@single_threaded
-def length_uncertainties(at: Linearisation, target: Target | None = None) -> Quantity | None:
-    """U6 alone, as `uncertainties` has it; None where there are no two evaluation points."""
-    return _of_points(at, 1.0, target)[1] if len(at.design.points) else None
+def _of_parameters(at: Linearisation, symbol: str, given: Parameters, sigma: float) -> dict[str, Quantity]:
+    values, kind = sigma * at.of_shared(given.rows), QUANTITIES[symbol]
+    unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in given.units)
+    found = {symbol: summarise(symbol, values, unit, given.names)}
+    for part, (word, _) in kind.parts.items():
+        chosen = [i for i, unit in enumerate(given.units) if unit == part]
+        if chosen:
+            name = f"{symbol} {word}"
+            found[name] = summarise(name, values[chosen], part, [given.names[i] for i in chosen])
+    return found
 
 
-def _of_points(at: Linearisation, sigma: float, target: Target | None) -> tuple[Array, Quantity | None]:
-    """U4 (points, d), not multiplied by sigma, and U6."""
+def _of_coordinates(
+    at: Linearisation, symbol: str, places: Places, displaced: Callable[[Places], Displacements], sigma: float
+) -> Quantity:
+    if isinstance(places, Balls):
+        return summarise(symbol, sigma * at.of_balls()[places.index].ravel(), "m", coordinate_names(at.design, places))
+    names = coordinate_names(at.design, places)
+    found = summarise(symbol, sigma * displaced(places).uncertainties.ravel(), "m", names)
+    if not found.largest:
+        return found
+    return replace(found, places=(_point(places, names.index(found.largest) // at.design.dimension),))
+
+
+def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Quantity:
+    """Distances that have names, each compared with its own target."""
+    values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
+    found = summarise(symbol, values, "m", given.names)
+    judged = [
+        target.coverage_factor * value <= float(target.stated.at(length))
+        for target, length, value in zip(given.targets, tile.lengths, values, strict=False)
+        if target is not None
+    ]
+    if not judged:
+        return found
+    factor = 1.0 if given.targets[0] is None else given.targets[0].coverage_factor
+    return replace(found, within_target=sum(judged) / len(judged), coverage_factor=factor)
+
+
+def _of_pairs(
+    design: Design, symbol: str, groups: list[tuple[Places, Displacements]], sigma: float, target: Target | None
+) -> Quantity | None:
+    """Distances between all places of each group; None where all coincide."""
     # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
     limit = None if target is None else Target(target.standard, sigma).standard
-    of_points, pairs = point_pairs(at, limit)
+    pairs = sum((all_pairs(moved, places.labels, limit) for places, moved in groups), PairSummary())
     if not pairs.count:
-        return of_points, None
-    share = None if target is None else pairs.within / pairs.count
-    lengths = _of_pairs("U6", pairs, sigma, lambda i: f"point {i + 1}", share)
-    if lengths.largest:
-        lengths = replace(lengths, places=tuple(_point(at.design, i) for i in pairs.where))
-    return of_points, lengths if target is None else replace(lengths, coverage_factor=target.coverage_factor)
+        return None
+    determined = pairs.count - pairs.undetermined
+    found = Quantity(symbol, np.nan, np.nan, "m", pairs.count, pairs.undetermined)
+    places = groups[0][0]
+    if determined:
+        where = " to ".join(places.name(design, label) for label in pairs.where)
+        average = sigma * pairs.total / determined
+        found = replace(found, maximum=sigma * pairs.maximum, average=average, largest=where)
+        if isinstance(places, Points):
+            found = replace(found, places=tuple(_point(places, label) for label in pairs.where))
+    if target is None:
+        return found
+    return replace(found, within_target=pairs.within / pairs.count, coverage_factor=target.coverage_factor)
 
 
-def _point(design: Design, i: int) -> str:
-    """An evaluation point by its number from 1, as in the file, and its place."""
-    place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in design.points[i])
-    return f"point {i + 1} at ({place}) mm"
+def _point(places: Points, label: int) -> str:
+    """A point by its number from 1, as in the file, and its place."""
+    place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in places.points[label])
+    return f"point {label + 1} at ({place}) mm"
 
 
-def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[str, ...]) -> Quantity:
+def point_pairs(at: Linearisation, limit: LengthFunction | None = None) -> tuple[Array, PairSummary]:
+    """Uncertainties of the corrected evaluation points' co-ordinates (n, d), and of all distances between them."""
+    places = evaluation_points(at.design)
+    moved = displacements(at, places)
+    return moved.uncertainties, all_pairs(moved, places.labels, limit)
+
+
+def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Quantity:
     """Maximum and average of the standard uncertainties `values` (m,) that are not NaN."""
     open_ = np.isnan(values)
     if open_.all():
@@ -166,50 +178,3 @@ def summarise(symbol: str, values: Array, unit: str, names: list[str] | tuple[st
     return Quantity(
         symbol, float(np.nanmax(values)), float(np.nanmean(values)), unit, len(values), int(open_.sum()), names[top]
     )
-
-
-def _of_pairs(
-    symbol: str, pairs: PairSummary, sigma: float, name: Callable[[int], str], within_target: float | None = None
-) -> Quantity:
-    """A summary of pairs as a quantity, `name(index)` naming the two ends of the least certain distance."""
-    determined = pairs.count - pairs.undetermined
-    if not determined:
-        return Quantity(symbol, np.nan, np.nan, "m", pairs.count, pairs.undetermined, "", within_target)
-    where = f"{name(pairs.where[0])} to {name(pairs.where[1])}"
-    average = sigma * pairs.total / determined
-    return Quantity(symbol, sigma * pairs.maximum, average, "m", pairs.count, pairs.undetermined, where, within_target)
-
-
-def ball_pairs(at: Linearisation) -> PairSummary:
-    """U5: distances between all pairs of balls of each artefact, in tiles of bounded size."""
-    summary = PairSummary()
-    for artefact in np.flatnonzero(at.design.is_plate):
-        balls = np.flatnonzero(at.design.ball_artefact == artefact)
-        summary = summary + all_pairs(
-            at.state.balls[balls],
-            at.balls.common[balls],
-            at.balls.own[balls],
-            at.ball_null[balls],
-            balls,
-            drawn=at.as_drawn.state.balls[balls],
-        )
-    return summary
-
-
-def point_pairs(at: Linearisation, limit: LengthFunction | None = None) -> tuple[Array, PairSummary]:
-    """U4 (points, d) and U6 at the design's evaluation points."""
-    design = at.design
-    probes = np.full(len(design.points), design.point_probe)
-    of_shared = correction_rows(design, at.layout, at.state, design.points, probes)
-    spread = of_shared @ at.shared
-    values = np.sqrt((spread**2).sum(axis=2))
-    drawn = None
-    if at.drawn is not None:
-        of_shared = correction_rows(design, at.layout, at.drawn.state, design.points, probes)
-        drawn = corrected_points(design, at.drawn.state, design.points, probes)
-    null = of_shared @ at.shared_null
-    size = np.sqrt(((of_shared * at.spectrum.scale) ** 2).sum(axis=2))
-    corrected = corrected_points(design, at.state, design.points, probes)
-    n, d = design.points.shape
-    pairs = all_pairs(corrected, spread, np.zeros((n, d, d)), null, np.arange(n), limit, drawn)
-    return blank(values, null, size), pairs

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentTypeError, Namespace
+from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .common import (
     add_file,
@@ -47,7 +47,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         metavar="NAME",
         type=_criterion,
         default="U6",
-        help="U6 (default: average), U6-maximum, U5, U5-maximum, tasks, tasks-maximum, A, D, E or condition",
+        action=_Criterion,
     )
     budget = parser.add_argument_group("budget")
     budget.add_argument("--hours", metavar="H", type=_hours, help="of laboratory time, with changes between positions")
@@ -87,6 +87,23 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--workers", metavar="N", type=count, help="processes that share the work; default: one for each processor"
     )
     parser.set_defaults(run=run)
+
+
+class _Criterion(Action):
+    """Loads the names of all criteria only where help is printed."""
+
+    def __call__(self, parser: ArgumentParser, options: Namespace, value: Any, option: str | None = None) -> None:
+        setattr(options, self.dest, value)
+
+    @property
+    def help(self) -> str:  # type: ignore[override]
+        from ..planning.criteria import NAMES
+
+        return f"{NAMES[0]} (default: average), {', '.join(NAMES[1:-1])} or {NAMES[-1]}"
+
+    @help.setter
+    def help(self, text: str | None) -> None:
+        pass
 
 
 def _criterion(text: str) -> str:

@@ -1,4 +1,4 @@
-"""What a bias that nobody notices changes in the functions behind U4, U5 and U6, at the most."""
+"""What a bias that nobody notices changes in the quantities that do not depend on the frame, at the most."""
 
 from __future__ import annotations
 
@@ -7,13 +7,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.estimation.covariance import blank
+from ballplate.simulator.estimation.functions import (
+    Coordinates,
+    Displacements,
+    Distances,
+    Places,
+    Points,
+    displacements,
+)
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.rounding import comparable
 
-from ..corrections import corrected_points, correction_rows
+from ..quantities import QUANTITIES
 from .response import Response
 
 if TYPE_CHECKING:
@@ -25,7 +32,8 @@ MOST_PLACES = 200
 # Numbers of a product of functions and patterns that are held at once.
 AT_ONCE = 2_000_000
 
-SYMBOLS = ("U4", "U5", "U6")
+SYMBOLS = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.effect)
+LENGTHS = tuple(symbol for symbol in SYMBOLS if QUANTITIES[symbol].are_lengths)
 
 
 @dataclass(frozen=True)
@@ -41,7 +49,7 @@ class Largest:
 
 
 @dataclass(frozen=True)
-class Functions:
+class Changes:
     """Linear functions of the displacements of places: rows of `operator` (f, places d), with uncertainties (f,).
 
     The places move by `common` (places d, r) times the common part of a response and, for balls, by `own`
@@ -72,76 +80,32 @@ class Functions:
         uncertainty = self.uncertainty[where] if len(self.uncertainty) else np.full(count, np.nan)
         return Largest(change, where, uncertainty)
 
-    def changes(self, response: Response) -> Array:
-        """Changes (f, k) of all functions by a unit of each pattern's bias; the estimate moves against residuals."""
-        moved = self.common @ response.common.T
-        if self.own is not None:
-            moved += (self.own @ response.own.T).toarray()
-        return np.asarray(-(self.operator @ moved))
 
+def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[Integers], Changes]:
+    """Changes of co-ordinates, or of distances; of a large artefact, those that end at some or the asked balls."""
+    places, made = given.places, displacements(at, given.places, narrow=False)
+    if isinstance(given, Coordinates):
+        found = _coordinates(made, places)
+        return lambda asked: found
+    if isinstance(given.places, Points):
+        chosen = np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
+        pairs = np.stack(np.triu_indices(len(chosen), 1), axis=1) if given.pairs is None else given.pairs
+        of_points = _distances(made.select(chosen), None, pairs, chosen)
+        return lambda asked: of_points
+    own = _own_parts(at, made, given.places.index)
+    kept: dict[bytes, Changes] = {}
 
-def error_functions(at: Linearisation) -> Functions:
-    """U4: each component of the error function at the evaluation points that is determined."""
-    from scipy.sparse import csr_array, eye
-
-    design = at.design
-    probes = np.full(len(design.points), design.point_probe)
-    rates = correction_rows(design, at.layout, at.state, design.points, probes)
-    spread = _points(rates, at)
-    if at.drawn is not None:
-        rates = correction_rows(design, at.layout, at.drawn.state, design.points, probes)
-    null = rates @ at.shared_null
-    size = np.sqrt(((rates * at.spectrum.scale) ** 2).sum(axis=2))
-    uncertainty = blank(np.sqrt((spread**2).sum(axis=2)), null, size).ravel()
-    known = np.flatnonzero(~np.isnan(uncertainty))
-    operator = csr_array(eye(len(uncertainty), format="csr"))[known]
-    point, axis = np.divmod(known, design.dimension)
-    return Functions(operator, spread.reshape(len(uncertainty), spread.shape[2]), None, uncertainty[known], point, axis)
-
-
-def point_distances(at: Linearisation) -> Functions:
-    """U6: distances between corrected points, of at most `MOST_PLACES` of them."""
-    design, drawn = at.design, at.as_drawn.state
-    chosen = evenly(len(design.points))
-    points, probes = design.points[chosen], np.full(len(chosen), design.point_probe)
-    spread = _points(correction_rows(design, at.layout, at.state, points, probes), at)
-    corrected = corrected_points(design, at.state, points, probes)
-    first, second = np.triu_indices(len(points), 1)
-    null = correction_rows(design, at.layout, drawn, points, probes) @ at.shared_null
-    as_drawn = corrected_points(design, drawn, points, probes)
-    return _distances(corrected, spread, null, None, first, second, chosen, as_drawn)
-
-
-def ball_distances(at: Linearisation) -> Callable[[Integers], Functions]:
-    """U5: distances between balls of each artefact; of large ones, those that end at some or the asked balls."""
-    from scipy.sparse import coo_array
-
-    design, places, drawn = at.design, at.state.balls, at.as_drawn.state.balls
-    n, d = places.shape
-    common, null = np.zeros_like(at.balls.common), np.zeros_like(at.ball_null)
-    for artefact in np.flatnonzero(design.is_plate):
-        mine = np.flatnonzero(design.ball_artefact == artefact)
-        common[mine] = without_rigid_motion(places[mine] - places[mine].mean(axis=0), at.balls.common[mine])
-        null[mine] = without_rigid_motion(drawn[mine] - drawn[mine].mean(axis=0), at.ball_null[mine])
-    first = d * np.arange(n)[:, None, None] + np.zeros((d, d), np.int64)
-    row, column = first + np.arange(d)[:, None], first + np.arange(d)
-    own = coo_array((at.balls.own.ravel(), (row.ravel(), column.ravel())), shape=(n * d, n * d)).tocsr()
-    own.eliminate_zeros()
-    kept: dict[bytes, Functions] = {}
-
-    def among(asked: Integers) -> Functions:
-        pairs = []
-        for artefact in np.flatnonzero(design.is_plate):
-            mine = np.flatnonzero(design.ball_artefact == artefact)
-            some = mine[evenly(len(mine))]
-            pairs.append(some[np.stack(np.triu_indices(len(some), 1))])
-            others = np.setdiff1d(np.intersect1d(asked, mine), some)
-            pairs.append(np.stack([np.repeat(others, len(some)), np.tile(some, len(others))]))
-        first, second = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), np.int64)
-        key = first.tobytes()
+    def among(asked: Integers) -> Changes:
+        some = evenly(len(made.places))
+        others = np.setdiff1d(np.flatnonzero(np.isin(places.labels, asked)), some)
+        first, second = np.triu_indices(len(some), 1)
+        ends = np.stack([np.repeat(others, len(some)), np.tile(some, len(others))], axis=1)
+        pairs = np.concatenate([np.stack([some[first], some[second]], axis=1), ends])
+        pairs = pairs if given.pairs is None else given.pairs
+        key = pairs.tobytes()
         if key not in kept:
             kept.clear()
-            kept[key] = _distances(places, common, null, own, first, second, np.arange(n), drawn)
+            kept[key] = _distances(made, own, pairs, places.labels)
         return kept[key]
 
     return among
@@ -158,32 +122,40 @@ def evenly(count: int) -> Integers:
     return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
 
 
-def _points(rates: Array, at: Linearisation) -> Array:
-    """Spread (p, d, r) of points, as wide as that of balls."""
-    spread = np.zeros((*rates.shape[:2], at.balls.common.shape[2]))
-    spread[:, :, : at.rank] = rates @ at.shared
-    return spread
-
-
-def _distances(
-    places: Array,
-    common: Array,
-    null: Array,
-    own: csr_array | None,
-    first: Integers,
-    second: Integers,
-    labels: Integers,
-    drawn: Array,
-) -> Functions:
-    """Distances between places `first` and `second` that are determined where places are as `drawn`."""
+def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_array:
+    """The parts (places d, n d) that balls have alone, in the columns of all balls."""
     from scipy.sparse import coo_array
 
-    n, d = places.shape
-    centred = places - places.mean(axis=0) if n else places
-    if own is None:
-        common = without_rigid_motion(centred, common)
-        null = without_rigid_motion(drawn - drawn.mean(axis=0) if n else drawn, null)
-    apart = np.sqrt(((centred[first] - centred[second]) ** 2).sum(axis=1)) > 0.0
+    n, d = at.design.balls.shape
+    row = d * np.arange(len(index))[:, None, None] + np.arange(d)[:, None] + np.zeros(d, np.int64)
+    column = d * index[:, None, None] + np.zeros((d, 1), np.int64) + np.arange(d)
+    own = coo_array((made.own.ravel(), (row.ravel(), column.ravel())), shape=(len(index) * d, n * d)).tocsr()
+    own.eliminate_zeros()
+    return own
+
+
+def _coordinates(made: Displacements, places: Places) -> Changes:
+    """Co-ordinates of points that are determined."""
+    from scipy.sparse import csr_array, eye
+
+    n, d = made.places.shape
+    uncertainty = made.uncertainties.ravel()
+    known = np.flatnonzero(~np.isnan(uncertainty))
+    operator = csr_array(eye(n * d, format="csr"))[known]
+    place, axis = np.divmod(known, d)
+    common = made.common.reshape(n * d, -1)
+    return Changes(operator, common, None, uncertainty[known], places.labels[place], axis)
+
+
+def _distances(made: Displacements, own: csr_array | None, pairs: Integers, labels: Integers) -> Changes:
+    """Distances between pairs (m, 2) of places that are apart and, where they are as drawn, determined."""
+    from scipy.sparse import coo_array
+
+    n, d = made.places.shape
+    places, drawn = (where - where.mean(axis=0) if n else where for where in (made.places, made.drawn))
+    common, null = without_rigid_motion(places, made.common), without_rigid_motion(drawn, made.null)
+    first, second = pairs.T
+    apart = np.sqrt(((places[first] - places[second]) ** 2).sum(axis=1)) > 0.0
     first, second = first[apart], second[apart]
 
     def by_places(places: Array) -> csr_array:
@@ -195,7 +167,7 @@ def _distances(
         value = np.concatenate([unit, -unit], axis=1)
         return coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
 
-    operator = by_places(centred)
+    operator = by_places(places)
     change = (by_places(drawn) if null.shape[2] else operator) @ null.reshape(n * d, null.shape[2])
     limit = 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
     known = np.sqrt((change**2).sum(axis=1)) <= limit
@@ -206,4 +178,4 @@ def _distances(
         variance += ((operator @ flat[:, start : start + 100]) ** 2).sum(axis=1)
     if own is not None:
         variance += np.asarray((operator @ own).power(2).sum(axis=1)).ravel()
-    return Functions(operator, flat, own, np.sqrt(variance), labels[first], labels[second])
+    return Changes(operator, flat, own, np.sqrt(variance), labels[first], labels[second])

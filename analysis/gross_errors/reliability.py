@@ -9,14 +9,16 @@ from typing import Any, TextIO
 
 import numpy as np
 from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.functions import Functions, function_name
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.rounding import comparable
 from ballplate.simulator.spreadsheets import CsvWriter
 
+from ..quantities import QUANTITIES
 from ..results.formatting import SHOWN, aligned, finite, number
 from ..results.result import Result
-from .effects import MOST_PLACES, SYMBOLS
+from .effects import LENGTHS, MOST_PLACES, SYMBOLS
 from .names import name
 from .patterns import SINGLE, Kind, Patterns
 
@@ -41,12 +43,13 @@ ITEMS: tuple[Kind, ...] = ("length", "end", "prior", "coordinate", "distance")
 
 @dataclass(frozen=True)
 class Effects:
-    """Largest changes `change` (k,) of one kind of function by a unit of each pattern's bias, and where.
+    """Largest changes `change` (k,) of `functions` of one kind by a unit of each pattern's bias, and where.
 
     `first` and `second` (k,) are the places of the function that changes most, -1 where none is determined;
     `uncertainty` (k,) is its standard uncertainty.
     """
 
+    functions: tuple[Functions, ...]
     change: Array
     first: Integers
     second: Integers
@@ -61,7 +64,7 @@ class Reliability(Result):
     repeats, which have `among_repeats` degrees of freedom more among themselves. `left` (k,) is that of each pattern:
     of a single observation its redundancy number, otherwise the share of its square that is left in the residuals.
     `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is
-    nil. `effects` are by symbol, U4 to U6. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
+    nil. `effects` are by symbol. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
     being known or estimated from the observations, less the one suspected, and `fit_noncentrality` to each of all those
     tests that a fit makes.
     """
@@ -121,7 +124,7 @@ class Reliability(Result):
 
     def is_harmless(self, k: int) -> bool:
         """Whether a bias changes no distance, between balls or between corrected points."""
-        return all(self.effects[symbol].change[k] <= NO_EFFECT * self.size(k) for symbol in ("U5", "U6"))
+        return all(self.effects[symbol].change[k] <= NO_EFFECT * self.size(k) for symbol in LENGTHS)
 
     def size(self, k: int) -> float:
         """About how far, in metres, a unit of a bias moves what it is about."""
@@ -151,6 +154,7 @@ def _heading(result: Reliability) -> list[str]:
     rank = f"rank deficiency {result.deficiency}" if result.deficiency else "full rank"
     sigma = "estimated from the other residuals" if result.sigma_is_estimated else "as given"
     total = result.redundancy.sum() + result.among_repeats
+    effects = [f"{symbol} ({QUANTITIES[symbol].effect})" for symbol in SYMBOLS]
     lines = [
         f"{result.label}: {result.title}",
         f"{rank}; {design.parameter_count} parameters, {count} observations; redundancy {number(total)} in all, "
@@ -159,8 +163,8 @@ def _heading(result: Reliability) -> list[str]:
         f"{_percent(result.false_alarm)}, sigma {sigma}: {number(result.noncentrality)} standard deviations",
         f"by fit: found with that power by `fit`, which makes all its tests together: "
         f"{number(result.fit_noncentrality)} standard deviations",
-        "effects: the most that a bias just detectable changes in U4 (error function), U5 (distances between "
-        "balls) and U6 (distances between corrected points), with the standard uncertainty there in brackets",
+        f"effects: the most that a bias just detectable changes in {', '.join(effects[:-1])} and {effects[-1]}, "
+        "with the standard uncertainty there in brackets",
     ]
     if result.among_repeats:
         lines.append("a reading stands for the mean of its repeats")
@@ -225,7 +229,7 @@ def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundan
             cells.append("-" if math.isnan(effect) else told)
         cells.append("" if math.isinf(result.detectable[k]) else _where(result, "U6", k))
         rows.append(cells)
-    right = [False, *([True] if with_redundancy else []), True, True, False, True, True, True, False]
+    right = [False, *([True] if with_redundancy else []), True, True, False, *(True for _ in SYMBOLS), False]
     return aligned(rows, right)
 
 
@@ -284,7 +288,7 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
         unit = result.patterns.unit(k)
         parts = [
             f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} um per {SHOWN[unit]}"
-            for symbol in ("U5", "U6")
+            for symbol in LENGTHS
             if result.effects[symbol].change[k] > 0.0
         ]
         lines.append(f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes {', '.join(parts)}")
@@ -322,11 +326,7 @@ def _where(result: Reliability, symbol: str, k: int) -> str:
     first, second = int(effects.first[k]), int(effects.second[k])
     if first < 0 or result.effects[symbol].change[k] <= 1e-9 * result.size(k):
         return ""
-    if symbol == "U4":
-        return f"point {first + 1} {AXIS_NAMES[second]}"
-    if symbol == "U5":
-        return f"ball {design.ball_label(first)} to ball {design.ball_label(second)}"
-    return f"point {first + 1} to point {second + 1}"
+    return function_name(design, effects.functions[0], first, second)
 
 
 def _data(result: Reliability) -> dict[str, Any]:

@@ -7,14 +7,17 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.design import Design
+from ballplate.simulator.estimation.functions import Functions
 from ballplate.simulator.estimation.hat import row_places
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import single_threaded
 
-from .effects import SYMBOLS, Functions, Largest, ball_distances, error_functions, point_distances
+from ..quantities import QUANTITIES
+from .effects import SYMBOLS, Changes, Largest, changes_of
 from .events import event_groups
 from .leftover import Columns, leftover
 from .patterns import patterns
@@ -49,19 +52,19 @@ def reliability_of(
     """Reliability of a design at zero machine error, where sigma is known or estimated."""
     at = linearise(design)
     given = patterns(design, at.state, None)
-    functions = {"U4": error_functions(at), "U6": point_distances(at)}
-    balls_of = ball_distances(at)
+    functions = {symbol: QUANTITIES[symbol].functions(design, at.layout) for symbol in SYMBOLS}
+    changes = {symbol: [changes_of(at, group) for group in groups] for symbol, groups in functions.items()}
     places = row_places(design)
     redundancy, left, information = np.zeros(len(places)), np.zeros(len(given)), np.zeros(len(given))
-    effects = {symbol: _nothing(len(given)) for symbol in SYMBOLS}
+    effects = {symbol: _nothing(len(given), groups) for symbol, groups in functions.items()}
     for one in responses(at, None, given):
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information
         left[one.index] = one.information / np.where(one.square > 0.0, one.square, 1.0)
         asked = np.unique(one.own.indices // design.dimension) if len(one.rows) else np.zeros(0, np.int64)
-        for symbol in SYMBOLS:
-            of_symbol = balls_of(asked) if symbol == "U5" else functions[symbol]
-            _put(effects[symbol], one.index, of_symbol, of_symbol.largest(one))
+        for symbol, groups in changes.items():
+            for among in groups:
+                _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
     for kind, rows in (
         ("reading", places.readings),
         ("length", places.lengths),
@@ -96,14 +99,14 @@ def reliability_of(
     )
 
 
-def _nothing(count: int) -> Effects:
-    return Effects(np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan))
+def _nothing(count: int, groups: tuple[Functions, ...]) -> Effects:
+    return Effects(groups, np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan))
 
 
-def _put(effects: Effects, index: Integers, functions: Functions, found: Largest) -> None:
-    """Enter what patterns `index` change."""
-    effects.change[index] = found.change
-    effects.uncertainty[index] = found.uncertainty
-    known = found.function >= 0
-    effects.first[index[known]] = functions.first[found.function[known]]
-    effects.second[index[known]] = functions.second[found.function[known]]
+def _put(effects: Effects, index: Integers, changes: Changes, found: Largest) -> None:
+    """Enter what patterns `index` change, where that is more than what has been entered of other artefacts."""
+    more = comparable(found.change) > comparable(effects.change[index])
+    use = (found.function >= 0) & (more | (effects.first[index] < 0))
+    index, function = index[use], found.function[use]
+    effects.change[index], effects.uncertainty[index] = found.change[use], found.uncertainty[use]
+    effects.first[index], effects.second[index] = changes.first[function], changes.second[function]

@@ -18,7 +18,7 @@ from ..processes import in_processes
 from ..study import predict
 from .bound import Bound, bound
 from .constraints import Budget, Constraints, constraints
-from .criteria import CriterionName, criterion, is_about_balls
+from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
 from .information import pool_information
 from .offer import Offer, offer, open_directions
 from .schedule import Completion, run_sheet
@@ -73,6 +73,7 @@ def campaign(
         raise _impossible(
             experiment, "pool", "missing; add candidates to choose from, or see what check --suggest tells"
         )
+    refuse_many_points(experiment, request.criterion)
     offered = offered or offer(pool)
     refusal: ExperimentError | None = None
     found, less = None, offered.without_begun(experiment)

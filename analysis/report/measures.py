@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..quantities import DESCRIPTIONS
 from ..results.formatting import shown_unit
 from ..sweeps.columns import symbol_column
-from ..uncertainty import DESCRIPTIONS
 from .results import Results
 
 STATISTICS = ("maximum", "average")

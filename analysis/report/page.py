@@ -14,9 +14,9 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
 from ballplate.simulator.settings import listing
 
+from ..quantities import DESCRIPTIONS
 from ..results.formatting import number, percent, uncertainty_words
 from ..sweeps.store import Store
-from ..uncertainty import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words

@@ -12,6 +12,7 @@ import numpy as np
 from ballplate.simulator.quantities import QUANTITY, exact_number
 from numpy.typing import NDArray
 
+from ..quantities import RECORDED
 from ..sweeps.columns import MORE, symbol_column
 from ..sweeps.frame import frame
 from ..sweeps.store import Store, all_details, chosen_sweep, definition_of
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 Integers = NDArray[np.int64]
 
 # The quantities whose average makes one cell better than another; the first of these that is recorded.
-CRITERIA = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
+PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
+CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERRED))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.design import Design, pose_size
+from ballplate.simulator.estimation.functions import Balls, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import rotation_sensitivity
 from ballplate.simulator.estimation.parameters import SharedLayout
@@ -15,7 +16,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
 
-from ..pairs import pair_tiles
+from ..pairs import pairs_of
 from ..uncertainty import Quantity, summarise
 
 
@@ -84,13 +85,13 @@ def first_ball_lengths(at: Linearisation) -> tuple[Array, list[str]]:
 
     They are NaN where they are undetermined.
     """
-    design, balls = at.design, at.balls
+    design = at.design
     values, names = [], []
     for artefact in np.flatnonzero(design.is_plate):
         own = np.flatnonzero(design.ball_artefact == artefact)
-        for tile in pair_tiles(at.state.balls[own], balls.common[own], balls.own[own], balls.null[own]):
-            chosen = tile.first == 0
-            values.append(np.where(tile.is_open, np.nan, tile.uncertainties)[chosen])
-            for second in tile.second[chosen]:
-                names.append(f"ball {design.ball_label(own[0])} to ball {design.ball_label(own[second])}")
+        pairs = np.stack([np.zeros(len(own) - 1, np.int64), np.arange(1, len(own))], axis=1)
+        tile = pairs_of(displacements(at, Balls(own)), pairs)
+        values.append(np.where(tile.is_open, np.nan, tile.uncertainties))
+        for second in own[1:]:
+            names.append(f"ball {design.ball_label(own[0])} to ball {design.ball_label(second)}")
     return np.concatenate(values) if values else np.zeros(0), names

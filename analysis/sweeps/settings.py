@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ballplate.simulator.experiment.sections import Line, Seed
 from ballplate.simulator.geometry.artefacts import Name
 from ballplate.simulator.settings import FORM, Settings
 from pydantic import Field, Tag
 
-Quantity = Literal["U1", "U2", "U3", "U4", "U5", "U6", "tasks"]
-QUANTITIES: tuple[Quantity, ...] = ("U1", "U2", "U3", "U4", "U5", "U6")
+from ..quantities import QUANTITIES, RECORDED
+
+if TYPE_CHECKING:
+    Quantity = str
+else:
+    Quantity = Literal[tuple(symbol for symbol in QUANTITIES if " " not in symbol)]
+
+KEPT = f"{RECORDED[0]} to {RECORDED[-1]}"
 
 Path = Annotated[str, Field(min_length=1)]
 Scalar = str | int | float | bool
@@ -99,5 +105,5 @@ class SweepSettings(Settings):
     )
     seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
     record: Annotated[tuple[Quantity, ...], Field(min_length=1)] = Field(
-        QUANTITIES, description="quantities that are kept, U1 to U6 and tasks; default: all of U1 to U6"
+        RECORDED, description=f"quantities that are kept, {KEPT} and tasks; default: all of {KEPT}"
     )

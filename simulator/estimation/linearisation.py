@@ -16,6 +16,17 @@ from .parameters import SharedLayout, shared_layout
 
 
 @dataclass(frozen=True, eq=False)
+class LinearFunctions:
+    """Derivatives of m functions: `shared` (m, s) by the shared parameters, `balls` (m, n, d) by those of all balls,
+    None where no ball has a part in them; `drawn` are the same at the design as drawn, None where these are.
+    """
+
+    shared: Array
+    balls: Array | None = None
+    drawn: LinearFunctions | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Linearisation:
     """A design at a `state`, with its `factor` and `spectrum` there.
 
@@ -73,6 +84,33 @@ class Linearisation:
         rows = rows if drawn is None else drawn
         size = np.sqrt(((rows * self.as_drawn.spectrum.scale) ** 2).sum(axis=1))
         return blank(result, rows @ self.shared_null, size)
+
+    def uncertainty(self, functions: LinearFunctions) -> Array:
+        """Standard deviations (m,) of functions; NaN where open."""
+        values = np.sqrt((self._root(functions) ** 2).sum(axis=1))
+        as_drawn = functions.drawn or functions
+        change = as_drawn.shared @ self.shared_null
+        size = ((as_drawn.shared * self.as_drawn.spectrum.scale) ** 2).sum(axis=1)
+        if as_drawn.balls is not None:
+            change = change + np.einsum("mnd,ndk->mk", as_drawn.balls, self.ball_null)
+            size = size + MICROMETRE**2 * (as_drawn.balls**2).sum(axis=(1, 2))
+        return blank(values, change, np.sqrt(size))
+
+    def covariance(self, one: LinearFunctions, other: LinearFunctions) -> Array:
+        """Covariances (m, k) of functions with others, what is undetermined left out."""
+        first, second = self._root(one), self._root(other)
+        width = min(first.shape[1], second.shape[1])
+        return np.asarray(first[:, :width] @ second[:, :width].T)
+
+    def _root(self, functions: LinearFunctions) -> Array:
+        """Derivatives (m, r) by standard normal variables: those of what is shared, of kept balls, of each ball."""
+        common = functions.shared @ self.shared
+        if functions.balls is None:
+            return np.asarray(common)
+        of_balls = np.einsum("mnd,ndr->mr", functions.balls, self.balls.common)
+        of_balls[:, : self.rank] += common
+        own = np.einsum("mnd,ndj->mnj", functions.balls, self.balls.own)
+        return np.concatenate([of_balls, own.reshape(len(own), -1)], axis=1)
 
     def of_balls(self) -> Array:
         """Standard deviations (n, d) of the ball co-ordinates; NaN where open."""

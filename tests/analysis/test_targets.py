@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.corrections import correction_rows
 from ballplate.lengths import Settings, length_map
 from ballplate.rank import Verdict, weak_limit
 from ballplate.results.formatting import percent
 from ballplate.simulator.design import nominal_state
+from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.parameters import shared_layout

@@ -7,13 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.quantities import task_distances
 from ballplate.simulator.design import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.estimation.functions import linear_functions
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
+from ballplate.simulator.quantities import Target
 from ballplate.study import predict
-from ballplate.tasks import share_within, task_differences, task_rows
+from ballplate.uncertainty import uncertainties
 
 from tests.analysis.test_invariants import judged, small_design
 
@@ -65,6 +69,11 @@ def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path
     assert len(planned.design.points) == 200
 
 
+def length_of(ends: np.ndarray) -> np.ndarray:
+    """Lengths (t,) between the ends (2 t, 3) of tasks."""
+    return np.linalg.norm(ends[::2] - ends[1::2], axis=1)
+
+
 def changed(design: Design, layout: SharedLayout, state: State, step: np.ndarray) -> State:
     """The state with the machine's parameters and estimated offsets changed by a step (s,)."""
     offsets = probe_offsets(design, state).copy()
@@ -79,7 +88,8 @@ def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> No
     design = lay_out(with_tasks(tmp_path, text=free))
     layout = shared_layout(design)
     state = replace(nominal_state(design), a=np.random.default_rng(3).normal(0, 1e-5, len(design.model.parameters)))
-    rows = task_rows(design, layout, state)
+    given = task_distances(design)
+    rows = linear_functions(linearise(design, state), given).shared
     assert rows.shape == (3, len(layout))
     # The fixed tip has no part in it, a tip of one end all, a tip of both only what rotations make of it.
     by_offset = np.abs(rows[:, layout.offsets]).max(axis=1)
@@ -87,10 +97,7 @@ def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> No
     generator = np.random.default_rng(4)
     for _ in range(4):
         step = 1e-5 * generator.standard_normal(len(layout))
-        lengths = [
-            np.linalg.norm(task_differences(design, changed(design, layout, state, sign * step)), axis=1)
-            for sign in (1, -1)
-        ]
+        lengths = [length_of(given.places.at(design, changed(design, layout, state, sign * step))) for sign in (1, -1)]
         np.testing.assert_allclose(rows @ step, (lengths[0] - lengths[1]) / 2.0, atol=1e-14, rtol=1e-6)
 
 
@@ -112,7 +119,13 @@ def test_undetermined_tasks_are_told_as_such() -> None:
 
 
 def test_share_within_counts_only_tasks_with_a_target(tmp_path: Path) -> None:
-    tasks = predict(with_tasks(tmp_path)).tasks
-    assert share_within(tasks[:1]) == 0.0
-    assert share_within([replace(one, target=None) for one in tasks]) is None
-    assert share_within([replace(tasks[0], standard_uncertainty=float("nan")), tasks[1]]) == 0.5
+    at = linearise(lay_out(with_tasks(tmp_path)))
+    targets = at.design.task_targets
+
+    def share(*targets: Target | None) -> float | None:
+        changed = replace(at.design, task_targets=targets)
+        return uncertainties(replace(at, design=changed))["tasks"].within_target
+
+    assert share(targets[0], None, None) == 0.0
+    assert share(None, None, None) is None
+    assert share(targets[0], targets[1], None) == 0.5

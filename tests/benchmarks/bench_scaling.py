@@ -33,7 +33,7 @@ def peak() -> float:
 def measure(n: int) -> dict[str, float]:
     """Figures for a grid of n x n balls, in this process; times are the best of three."""
     from ballplate.simulator.estimation.linearisation import linearise
-    from ballplate.uncertainty import ball_pairs, point_pairs
+    from ballplate.uncertainty import point_pairs, uncertainties
 
     from tests.reference.designs import grid_experiment
 
@@ -58,7 +58,7 @@ def measure(n: int) -> dict[str, float]:
     before = peak()
     del runs[:-1]
     start = time.perf_counter()
-    pairs = ball_pairs(found)
+    pairs = uncertainties(found, symbols=("U5",))["U5"]
     return {
         "readings": len(design.readings),
         "pairs": pairs.count,

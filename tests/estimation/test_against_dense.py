@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.pairs import all_pairs
+from ballplate.quantities import QUANTITIES, evaluation_points
 from ballplate.simulator.design import Design, State, nominal_state
+from ballplate.simulator.estimation.functions import Displacements, displacements
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import expected_readings
@@ -209,42 +211,29 @@ def deficient_grid_of_seven() -> Design:
     return plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=10)
 
 
-def pair_values(places: Real, common: Real, own: Real, null: Real) -> Real:
+def pair_values(moved: Displacements) -> Real:
     """The uncertainty of every single pair, NaN where open, each from a call with two places."""
     values = []
-    for i, j in zip(*np.triu_indices(len(places), 1), strict=True):
-        two = [i, j]
-        summary = all_pairs(places[two], common[two], own[two], null[two], np.array(two))
+    for i, j in zip(*np.triu_indices(len(moved.places), 1), strict=True):
+        two = np.array([i, j])
+        summary = all_pairs(moved.select(two), two)
         values.append(np.nan if summary.undetermined else summary.maximum)
     return np.array(values)
 
 
 def individual(found: Linearisation) -> dict[str, Real]:
     """All that stands behind U1 to U6, in the order of the dense reference."""
-    design, layout, state = found.design, found.layout, found.state
+    design, layout = found.design, found.layout
     reported = np.zeros((len(design.model.reported().names), len(layout)))
     reported[:, layout.model] = design.model.reported().matrix
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    by_model = np.zeros((len(design.points), 3, len(layout)))
-    by_model[:, :, layout.model] = design.model.jacobian(design.points, state.a, offsets)
-    corrected = design.points + design.model.error(design.points, state.a, offsets)
-    own = np.zeros((len(design.points), 3, 3))
+    of_balls = QUANTITIES["U5"].functions(design, layout)
     return {
         "U1": found.of_balls()[design.plate_balls].ravel(),
         "U2": found.of_shared(np.eye(len(layout))[layout.poses]),
         "U3": found.of_shared(reported),
         "U4": point_pairs(found)[0].ravel(),
-        "U5": np.concatenate(
-            [
-                pair_values(
-                    state.balls[chosen], found.balls.common[chosen], found.balls.own[chosen], found.ball_null[chosen]
-                )
-                for chosen in (
-                    np.flatnonzero(design.ball_artefact == plate) for plate in np.flatnonzero(design.is_plate)
-                )
-            ]
-        ),
-        "U6": pair_values(corrected, by_model @ found.shared, own, by_model @ found.shared_null),
+        "U5": np.concatenate([pair_values(displacements(found, one.places)) for one in of_balls]),
+        "U6": pair_values(displacements(found, evaluation_points(design))),
     }
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design import Design, State, probe_offsets
-from ballplate.simulator.estimation.observations import offset_sensitivity
-from ballplate.simulator.estimation.parameters import SharedLayout
-from ballplate.simulator.machines.protocol import Array, Integers
+
+from ..design import Design, State, probe_offsets
+from ..machines.protocol import Array, Integers
+from .observations import offset_sensitivity
+from .parameters import SharedLayout
 
 
 def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:
