@@ -59,6 +59,7 @@ def task_uncertainties(at: Linearisation, sigma: float = 1.0) -> tuple[TaskUncer
     if not at.design.task_names:
         return ()
     given = task_distances(at.design)
+    assert given.pairs is not None
     tile = pairs_of(displacements(at, given.places), given.pairs)
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
     told = zip(given.names, tile.lengths.tolist(), values.tolist(), given.targets, strict=True)

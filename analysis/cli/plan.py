@@ -96,7 +96,7 @@ class _Criterion(Action):
         setattr(options, self.dest, value)
 
     @property
-    def help(self) -> str:  # type: ignore[override]
+    def help(self) -> str:
         from ..planning.criteria import NAMES
 
         return f"{NAMES[0]} (default: average), {', '.join(NAMES[1:-1])} or {NAMES[-1]}"

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.functions import Functions
+from ballplate.simulator.estimation.functions import Functions, Parameters
 from ballplate.simulator.estimation.hat import row_places
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
@@ -53,7 +53,10 @@ def reliability_of(
     at = linearise(design)
     given = patterns(design, at.state, None)
     functions = {symbol: QUANTITIES[symbol].functions(design, at.layout) for symbol in SYMBOLS}
-    changes = {symbol: [changes_of(at, group) for group in groups] for symbol, groups in functions.items()}
+    changes = {
+        symbol: [changes_of(at, group) for group in groups if not isinstance(group, Parameters)]
+        for symbol, groups in functions.items()
+    }
     places = row_places(design)
     redundancy, left, information = np.zeros(len(places)), np.zeros(len(given)), np.zeros(len(given))
     effects = {symbol: _nothing(len(given), groups) for symbol, groups in functions.items()}

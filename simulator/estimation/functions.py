@@ -162,7 +162,7 @@ def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Dis
     root = at.shared[columns]
     if narrow and root.shape[0] < root.shape[1]:
         # A root of the same covariance.
-        root = np.linalg.qr(root.T, mode="r").T
+        root = np.asarray(np.linalg.qr(root.T, mode="r")).T
     common = np.zeros((n, d, root.shape[1] if narrow else at.balls.common.shape[2]))
     null, size = np.empty((n, d, at.shared_null.shape[1])), np.empty((n, d))
     for some, rows in point_rows(design, at.layout, at.state, places):
