@@ -184,7 +184,7 @@ def _estimates(at: Linearisation, sigma: float, monomials: bool) -> tuple[Parame
     for k, uncertainty in enumerate(at.of_shared(matrix)):
         add("machine", names[k], values[k], uncertainty, units[k] if units else design.model.parameters[k].unit)
 
-    of_poses = at.of_shared(own[layout.poses])
+    of_shared = at.of_shared(own)
     turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
     poses = np.concatenate([state.origins, turned], axis=1)
     words = pose_parameter_names(design.dimension)
@@ -193,16 +193,15 @@ def _estimates(at: Linearisation, sigma: float, monomials: bool) -> tuple[Parame
             if column >= 0:
                 kind: ParameterKind = "origin" if j < design.dimension else "rotation"
                 unit: Unit = "m" if kind == "origin" else "rad"
-                add(kind, f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
+                add(kind, f"{design.position_names[k]}: {words[j]}", poses[k, j], of_shared[column], unit)
 
-    of_offsets = at.of_shared(own[layout.offsets])
     for probe, axis in np.argwhere(layout.offset_columns >= 0):
         column = layout.offset_columns[probe, axis]
         value = probe_offsets(design, state)[probe, axis]
-        add("offset", layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
+        add("offset", layout.parameters[column].name, value, of_shared[column], "m")
 
-    of_lengths = at.of_shared(own[layout.lengths])
-    for name, value, uncertainty in zip(design.length_names, unknown_lengths(design, state), of_lengths, strict=True):
+    lengths = unknown_lengths(design, state), of_shared[layout.lengths]
+    for name, value, uncertainty in zip(design.length_names, *lengths, strict=True):
         add("length", name, value, uncertainty, "m")
 
     of_balls = at.of_balls()

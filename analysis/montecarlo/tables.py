@@ -7,6 +7,7 @@ from typing import Any
 
 from ballplate.simulator.settings import listing
 
+from ..quantities import QUANTITIES
 from ..results.formatting import aligned, number, shown_unit
 from .figures import BEYOND, Comparison, Figure, Outcome
 from .study import Trials
@@ -84,7 +85,7 @@ def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
         return lines
     if misfit.noise_free < NO_MISFIT * misfit.degrees_of_freedom:
         return [*lines, "the true machine has another error model, which the fitted one follows exactly"]
-    told = {symbol: one.actual for symbol, one in outcome.comparisons.items() if one.symbol in ("U4", "U5", "U6")}
+    told = {symbol: one.actual for symbol, one in outcome.comparisons.items() if QUANTITIES[one.symbol].effect}
     ratios = [f"{symbol} {with_error(ratio)}" for symbol, ratio in told.items()]
     too_optimistic = any(ratio.value > 1.0 and ratio.differs_from(1.0) for ratio in told.values())
     lines += [

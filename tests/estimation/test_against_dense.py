@@ -10,7 +10,7 @@ import pytest
 from ballplate.pairs import all_pairs
 from ballplate.quantities import QUANTITIES, evaluation_points
 from ballplate.simulator.design import Design, State, nominal_state
-from ballplate.simulator.estimation.functions import Displacements, displacements
+from ballplate.simulator.estimation.functions import Displacements, displacements, linear_functions
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import expected_readings
@@ -287,6 +287,37 @@ def test_rank_and_what_is_left_determined_of_a_deficient_design(
 ) -> None:
     design = with_points(make(), 8)
     assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+
+
+@pytest.mark.parametrize(
+    ("make", "coefficients"),
+    [(neighbour_distances, 5), (length_standard_by_distance, 5), (two_artefacts, 5), (deficient_grid_of_four, 7)],
+)
+def test_covariances_of_functions_with_one_another(make: Callable[[], Design], coefficients: int) -> None:
+    """Of balls that distances tie together, of points, of parameters and of distances, all with all."""
+    design = with_points(make(), 8)
+    found, problem = linearise(design), dense.planned(design, coefficients, 5)
+    reference = dense.linearised(problem)
+    quoted = design.model.reported().matrix.any(axis=1)
+    functions, jacobians = [], []
+    for symbol, function in dense.quantities(problem).items():
+        groups = QUANTITIES[symbol].functions(design, found.layout)
+        own = dense.jacobian(function, problem.parameters)
+        own = own[quoted] if symbol == "U3" else own
+        made = [linear_functions(found, one) for one in groups]
+        values = np.concatenate([found.uncertainty(one) for one in made])
+        expected = reference.of(own)
+        np.testing.assert_array_equal(np.isnan(values), np.isnan(expected), err_msg=symbol)
+        np.testing.assert_allclose(values, expected, rtol=RELATIVE, err_msg=symbol)
+        functions.append(made[0])
+        jacobians.append(own[: len(made[0].shared)])
+    if reference.deficiency:
+        return
+    for one, left in zip(functions, jacobians, strict=True):
+        for other, right in zip(functions, jacobians, strict=True):
+            size = np.outer(reference.of(left), reference.of(right))
+            expected = left @ reference.covariance @ right.T
+            np.testing.assert_allclose(found.covariance(one, other) / size, expected / size, atol=1e-8)
 
 
 @pytest.mark.parametrize(
