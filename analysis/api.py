@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.messages import ExperimentError, Message
 from .simulator.experiment.model import Experiment
+from .simulator.experiment.yamltree import GivenText
 from .simulator.settings import hint
 
 if TYPE_CHECKING:
@@ -174,7 +175,7 @@ def fit(
     from .simulator.readings import read_readings
 
     chosen = _experiment(experiment)
-    observed = read_readings(Path(readings), lay_out(chosen))
+    observed = read_readings(_table(readings), lay_out(chosen))
     return study.fit(chosen, observed, sigma, monomials)
 
 
@@ -243,6 +244,12 @@ def reach(
     from .requirements.unknowns import NAMES
 
     return search(_experiment(experiment), parse_goal(goal), tuple(unknowns or NAMES), target=target)
+
+
+def _table(readings: PathLike | pandas.DataFrame) -> Path | GivenText:
+    if isinstance(readings, str | os.PathLike):
+        return Path(readings)
+    return GivenText("readings", readings.to_csv(index=False))
 
 
 def _experiment(given: Experiment | PathLike) -> Experiment:

@@ -13,7 +13,7 @@ from .design import Design
 from .estimation.spheres import fit_sphere
 from .experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
 from .experiment.tables import Row, column_names, read_table
-from .experiment.yamltree import Mark
+from .experiment.yamltree import GivenText, Mark
 from .machines.protocol import Array, Integers
 from .misreading_messages import refuse_misreadings
 from .observation_arrays import Lengths, Readings
@@ -52,7 +52,7 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
         writer.writerow([positions[position], balls[ball], probes[probe], *map(repr, row)])
 
 
-def read_readings(path: Path, design: Design, every_ball: bool = True) -> ObservedReadings:
+def read_readings(path: Path | GivenText, design: Design, every_ball: bool = True) -> ObservedReadings:
     """Readings of a file as observations of a design.
 
     The probe's column may be left out where there is one probe only. An optional column u, with a unit as in u_um,

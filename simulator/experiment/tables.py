@@ -13,7 +13,7 @@ from ..quantities import LENGTH_UNITS, QuantityError, metres_or_radians
 from ..settings import hint, listing, shorten
 from ..spreadsheets import text_of_cell
 from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from .yamltree import Mark, read_text
+from .yamltree import GivenText, Mark, read_text
 
 CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
 MOST_ROWS = 1_000_000
@@ -30,7 +30,7 @@ class Row:
     lengths: tuple[float, ...]
 
 
-def table_lines(path: Path) -> list[tuple[int, str]]:
+def table_lines(path: Path | GivenText) -> list[tuple[int, str]]:
     """Lines of a CSV file with their numbers, those that are empty or comments left out.
 
     :raises ExperimentError: the file cannot be read.
@@ -43,7 +43,7 @@ def table_lines(path: Path) -> list[tuple[int, str]]:
 
 
 def read_table(
-    path: Path,
+    path: Path | GivenText,
     texts: Sequence[str],
     lengths: Sequence[str],
     optional: Sequence[str] = (),
@@ -118,7 +118,7 @@ def refuse_separators(mark: Mark, header: str, example: str) -> None:
         raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])
 
 
-def column_names(path: Path) -> tuple[str, ...]:
+def column_names(path: Path | GivenText) -> tuple[str, ...]:
     """Names of a table's columns without their units; none where the file has no line.
 
     :raises ExperimentError: the file cannot be read.

@@ -101,11 +101,24 @@ def read_tree(path: Path, refused: list[Message] | None = None) -> Node:
     return parse_tree(read_text(path), str(path), refused)
 
 
-def read_text(path: Path) -> str:
+@dataclass(frozen=True)
+class GivenText:
+    """A text that stands in no file, under the name that messages have for it."""
+
+    name: str
+    text: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def read_text(path: Path | GivenText) -> str:
     """Read a UTF-8 text file.
 
     :raises ExperimentError: the file is missing, is a directory, cannot be read or is not UTF-8.
     """
+    if isinstance(path, GivenText):
+        return path.text
     file = str(path)
     try:
         kind = path.stat().st_mode

@@ -17,7 +17,7 @@ NUMBER = count()
 
 MODEL = """\
 import numpy as np
-from ballplate.simulator.machines.protocol import Parameter, Reported
+from ballplate.models import Parameter, Reported
 
 
 class Scales:

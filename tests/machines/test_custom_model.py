@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.metadata
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from ballplate.study import check
 # A machine of straight axes in space: three scales and three angles.
 GOOD = """
 import numpy as np
-from ballplate.simulator.machines.protocol import Parameter, Reported
+from ballplate.models import Parameter, Reported
 
 
 class Straight:
@@ -154,6 +156,17 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
     assert f"no module nobody_has_this.at_all is installed nor in {tmp_path}" in line
     file.write_text(EXPERIMENT.replace("MODEL", "nobody"), encoding="utf-8")
     assert "for an object of a module write module:name" in refusal(file)
+
+
+@pytest.mark.parametrize("former", ["simulator.machines.protocol", "analysis.study"])
+def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, former: str) -> None:
+    """In a process of its own, which does not find the folders of a checkout as packages."""
+    file, _ = written(tmp_path, GOOD.replace("from ballplate.models import", f"from {former} import"))
+    command = [sys.executable, "-m", "ballplate", "check", file.name]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 3
+    assert former.partition(".")[0] in done.stderr
+    assert "write: from ballplate.models import Parameter, Reported" in done.stderr
 
 
 def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:

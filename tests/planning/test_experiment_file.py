@@ -120,7 +120,7 @@ variants:
 """
 MODEL = """\
 import numpy as np
-from ballplate.simulator.machines.protocol import Parameter, Reported
+from ballplate.models import Parameter, Reported
 
 
 class Scale:
