@@ -26,7 +26,7 @@ from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings import ObservedReadings, observe
 
 from .length_fits import has_all_errors
-from .results.fit import ParameterEstimate
+from .results.estimates import ParameterEstimate
 from .results.formatting import SHOWN, aligned, number
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)

@@ -28,7 +28,8 @@ from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
 
 from .plates import axes_of_plates
-from .results.fit import Fit, ParameterEstimate
+from .results.estimates import ParameterEstimate
+from .results.fit import Fit
 from .results.formatting import number
 from .study import fit
 

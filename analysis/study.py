@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import Design, probe_offsets, unknown_lengths
+from ballplate.simulator.design import Design
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
-from ballplate.simulator.estimation.parameters import pose_parameter_names
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.layout import lay_out
-from ballplate.simulator.machines.protocol import Array, Unit
+from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.observation_arrays import Readings
 from ballplate.simulator.readings import ObservedReadings
@@ -25,7 +23,8 @@ from .adjustments import Adjustment, adjustments
 from .gross_errors.search import diagnosis
 from .plates import plate_coordinates
 from .rank import verdict
-from .results.fit import Fit, ParameterEstimate, ParameterKind, Residual
+from .results.estimates import estimated_functions, parameter_estimates
+from .results.fit import Fit, Residual
 from .results.prediction import Prediction
 from .scale import scale_of
 from .tasks import TaskUncertainty, task_uncertainties
@@ -109,13 +108,14 @@ def fit(
         estimated,
         freedom,
         uncertainties(at, scale, experiment.target_accuracy),
-        _estimates(at, scale, monomials),
+        parameter_estimates(estimated_functions(at, monomials), scale),
         _largest(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
         task_uncertainties(at, scale),
         diagnosis(at, observed.x, freedom, estimated),
         observed.marks,
+        monomials,
     )
 
 
@@ -165,49 +165,3 @@ def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ..
 
 def _ball(design: Design, reading: int) -> str:
     return design.ball_names[design.readings.ball[reading]]
-
-
-def _estimates(at: Linearisation, sigma: float, monomials: bool) -> tuple[ParameterEstimate, ...]:
-    design, layout, state = at.design, at.layout, at.state
-    found: list[ParameterEstimate] = []
-
-    def add(kind: ParameterKind, name: str, value: float, uncertainty: float, unit: Unit) -> None:
-        known = not np.isnan(uncertainty)
-        found.append(ParameterEstimate(name, float(value) if known else np.nan, float(sigma * uncertainty), unit, kind))
-
-    own = np.eye(len(layout))
-    matrix, names, units = own[layout.model], [p.name for p in design.model.parameters], None
-    if monomials:
-        reported = design.model.reported()
-        matrix, names, units = reported.matrix @ matrix, list(reported.names), reported.units
-    values = (reported.matrix if monomials else np.eye(len(state.a))) @ state.a
-    for k, uncertainty in enumerate(at.of_shared(matrix)):
-        add("machine", names[k], values[k], uncertainty, units[k] if units else design.model.parameters[k].unit)
-
-    of_poses = at.of_shared(own[layout.poses])
-    turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
-    poses = np.concatenate([state.origins, turned], axis=1)
-    words = pose_parameter_names(design.dimension)
-    for k in design.posed_positions:
-        for j, column in enumerate(layout.pose_columns[k]):
-            if column >= 0:
-                kind: ParameterKind = "origin" if j < design.dimension else "rotation"
-                unit: Unit = "m" if kind == "origin" else "rad"
-                add(kind, f"{design.position_names[k]}: {words[j]}", poses[k, j], of_poses[column], unit)
-
-    of_offsets = at.of_shared(own[layout.offsets])
-    for probe, axis in np.argwhere(layout.offset_columns >= 0):
-        column = layout.offset_columns[probe, axis]
-        value = probe_offsets(design, state)[probe, axis]
-        add("offset", layout.parameters[column].name, value, of_offsets[column - layout.model.stop], "m")
-
-    of_lengths = at.of_shared(own[layout.lengths])
-    for name, value, uncertainty in zip(design.length_names, unknown_lengths(design, state), of_lengths, strict=True):
-        add("length", name, value, uncertainty, "m")
-
-    of_balls = at.of_balls()
-    for ball in design.plate_balls:
-        for axis, letter in enumerate(("x", "y", "z")[: design.dimension]):
-            name = f"{design.ball_label(ball)}: {letter}"
-            add("ball", name, state.balls[ball, axis], of_balls[ball, axis], "m")
-    return tuple(found)

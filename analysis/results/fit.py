@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
 from ballplate.simulator.experiment.yamltree import Mark
-from ballplate.simulator.machines.protocol import Unit
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.settings import hint
 
 from ..adjustments import Adjustment, few_degrees_of_freedom, freedom_words
 from ..gross_errors.suspects import Diagnosis
@@ -18,6 +21,14 @@ from ..plates import PlateCoordinates
 from ..rank import Verdict
 from ..tasks import TaskUncertainty
 from ..uncertainty import Quantity
+from .estimates import (
+    CorrectedPoints,
+    EstimatedFunctions,
+    ParameterEstimate,
+    correct,
+    estimated_functions,
+    labels,
+)
 from .formatting import SHOWN, aligned, finite, number, to_uncertainty
 from .parts import (
     adjustment_data,
@@ -34,27 +45,14 @@ from .parts import (
 from .prediction import length_headline, rank_words
 from .result import Result
 
+if TYPE_CHECKING:
+    import pandas
+
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
 
 # The largest residuals that the text names.
 SHOWN_RESIDUALS = 3
-
-ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "ball"]
-
-
-@dataclass(frozen=True)
-class ParameterEstimate:
-    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined.
-
-    `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a standard's length, a ball.
-    """
-
-    name: str
-    value: float
-    standard_uncertainty: float
-    unit: Unit
-    kind: ParameterKind = "machine"
 
 
 @dataclass(frozen=True)
@@ -79,6 +77,7 @@ class Fit(Result):
     `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
     freedom, or 1 where the file says that they are given. `adjustments` are those of a three-dimensional metric.
     `diagnosis` is what the residuals make suspect, which nothing else here heeds; `marks` tell where readings stand.
+    With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1].
     """
 
     label: str
@@ -97,6 +96,7 @@ class Fit(Result):
     tasks: tuple[TaskUncertainty, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     marks: tuple[Mark, ...] = ()
+    monomials: bool = False
 
     def headline(self) -> str:
         if not self.converged:
@@ -195,6 +195,71 @@ class Fit(Result):
     def converged(self) -> bool:
         return self.solution.status == "converged"
 
+    @cached_property
+    def functions(self) -> EstimatedFunctions:
+        """Everything estimated and the measuring tasks, as functions of the parameters; without sigma.
+
+        :raises ValueError: the estimate has not converged.
+        """
+        if not self.converged:
+            raise ValueError(f"the estimate has {self.solution.status}; nothing is known of its uncertainty")
+        return estimated_functions(linearised_fit(self.design, self.solution), self.monomials)
+
+    def covariance(self, *chosen: str) -> pandas.DataFrame:
+        """Covariance of estimates and measuring tasks, in products of their units; NaN where one is undetermined.
+
+        Each of `chosen` is a name or a kind: machine, pose (or origin, rotation), offset, length, ball, task; without
+        any it is that of everything. The uncertainties are multiplied by `sigma`, as everywhere in a fit.
+
+        :raises ValueError: there is no such name, or the estimate has not converged.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.covariance("machine", "r1c2: x").shape
+        (34, 34)
+        """
+        import pandas
+
+        found = self.functions.choose(chosen)
+        return pandas.DataFrame(self.sigma**2 * found.covariance(), found.labels, found.labels)
+
+    def correlation(self, *chosen: str) -> pandas.DataFrame:
+        """Correlation coefficients of what `covariance` gives; NaN also beside what has no uncertainty.
+
+        :raises ValueError: there is no such name, or the estimate has not converged.
+        """
+        found = self.covariance(*chosen)
+        spread = np.sqrt(np.diagonal(found))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return found / np.outer(spread, spread)
+
+    def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
+        """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint covariance.
+
+        `probe` is the name of one, or of one for each point; without any it is that of the evaluation points. Of
+        points outside the volume the correction is extrapolated.
+
+        :raises ValueError: points of another shape, an unknown probe, or an estimate that has not converged.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.correct([[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], "down").covariance.shape
+        (6, 6)
+        """
+        design, given = self.design, np.asarray(points, float)
+        if given.ndim != 2 or given.shape[1] != design.dimension:
+            raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
+        names = design.probe_names
+        given_probe = names[design.point_probe] if probe is None else probe
+        asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
+        for name in asked:
+            if name not in names:
+                raise ValueError(f'no probe "{name}"; {hint(name, names)}')
+        if len(asked) not in (1, len(given)):
+            raise ValueError(f"{len(asked)} probes for {len(given)} points")
+        probes = np.broadcast_to([names.index(name) for name in asked], len(given))
+        return correct(self.functions.at, given, probes, self.sigma)
+
     @property
     def doubt(self) -> str:
         """What is to be said of sigma where it comes from few degrees of freedom; otherwise empty."""
@@ -231,14 +296,13 @@ class Fit(Result):
 
     def _estimates_data(self) -> dict[str, Any]:
         """Estimates by name; by kind and name where a model gives a parameter the name that another kind has."""
-        times = Counter(one.name for one in self.estimates)
         return {
-            one.name if times[one.name] == 1 else f"{one.kind}: {one.name}": {
+            name: {
                 "value": finite(one.value),
                 "standard_uncertainty": finite(one.standard_uncertainty),
                 "unit": one.unit,
             }
-            for one in self.estimates
+            for name, one in zip(labels(self.estimates), self.estimates, strict=True)
         }
 
 
