@@ -28,6 +28,7 @@ from ballplate.simulator.threads import single_threaded
 from numpy.typing import NDArray
 
 from .plates import axes_of_plates
+from .report.vectors import Vectors
 from .results.estimates import ParameterEstimate
 from .results.fit import Fit
 from .results.formatting import number
@@ -83,6 +84,11 @@ class ReversalFit:
         """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's own axes."""
         exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
         return float(np.abs(self.coordinates - exact).max())
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Readings in the first position less what those in the second predict."""
+        label = f"{self.first}, less what {self.second} predicts"
+        return (Vectors(label, self.places, self.found.residuals, self.names),)
 
     @property
     def complaint(self) -> str:

@@ -7,16 +7,12 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.layout import lay_out
-from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.observation_arrays import Readings
 from ballplate.simulator.readings import ObservedReadings
-from ballplate.simulator.rounding import comparable
 from ballplate.simulator.threads import single_threaded
 
 from .adjustments import Adjustment, adjustments
@@ -24,14 +20,12 @@ from .gross_errors.search import diagnosis
 from .plates import plate_coordinates
 from .rank import verdict
 from .results.estimates import estimated_functions, parameter_estimates
-from .results.fit import Fit, Residual
+from .results.fit import Fit
 from .results.prediction import Prediction
+from .results.residuals import largest_residuals
 from .scale import scale_of
 from .tasks import TaskUncertainty, task_uncertainties
 from .uncertainty import Quantity, length_uncertainties, uncertainties
-
-# Residuals that a fit names.
-LARGEST = 10
 
 
 @dataclass(frozen=True)
@@ -92,7 +86,8 @@ def fit(
     solution = estimate(design, observed.x)
     if solution.status != "converged":
         judged = check(experiment, design).verdict
-        return Fit(experiment.label, experiment.title, design, solution, judged, 1.0, False, 0, {}, (), ())
+        names = experiment.label, experiment.title
+        return Fit(*names, design, observed.x, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_accuracy)
     freedom = design.observations - design.parameter_count + judged.deficiency
@@ -102,6 +97,7 @@ def fit(
         experiment.label,
         experiment.title,
         design,
+        observed.x,
         solution,
         judged,
         scale,
@@ -109,7 +105,7 @@ def fit(
         freedom,
         uncertainties(at, scale, experiment.target_accuracy),
         parameter_estimates(estimated_functions(at, monomials), scale),
-        _largest(design, solution, observed.x),
+        largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
         task_uncertainties(at, scale),
@@ -119,49 +115,8 @@ def fit(
     )
 
 
-def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Readings, Array, Array]:
-    """Readings of plates, with what each differs by from the estimate, (m, d) metres and in standard uncertainties."""
-    chosen = design.plate_readings
-    readings = design.readings.select(chosen)
-    standardised = reading_blocks(design, solution.state, readings, x[chosen]).residual
-    return readings, standardised / reading_weights(design, readings), standardised
-
-
 def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjustment, ...]:
     if not isinstance(at.design.model, SpatialMetricModel):
         return ()
     of_model = at.layout.model
     return adjustments(at.state.a, sigma * at.shared[of_model], at.shared_null[of_model], freedom)
-
-
-def _largest(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
-    """The largest residuals of readings and of lengths, largest first."""
-    chosen = design.plate_readings
-    _, apart, residual = reading_residuals(design, solution, x)
-    off, uncertainty = length_deviations(design, solution.state, x)
-    standardised = np.concatenate([residual.ravel(), off / uncertainty])
-    value = np.concatenate([apart.ravel(), off])
-    found = []
-    for place in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
-        i, axis = divmod(place, design.dimension)
-        k = place - residual.size
-        reading = int(chosen[i] if k < 0 else design.lengths.first[k])
-        ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
-        if k >= 0:
-            second = design.lengths.second[k]
-            ball, words = (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
-        found.append(
-            Residual(
-                design.position_names[design.readings.position[reading]],
-                ball,
-                design.probe_names[design.readings.probe[reading]],
-                words,
-                float(value[place]),
-                float(standardised[place]),
-            )
-        )
-    return tuple(found)
-
-
-def _ball(design: Design, reading: int) -> str:
-    return design.ball_names[design.readings.ball[reading]]

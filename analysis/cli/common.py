@@ -77,15 +77,14 @@ def picture(text: str) -> Path:
     return Path(text)
 
 
-def draw(draw_to: Callable[[Path], None], path: Path) -> bool:
+def draw(draw_to: Callable[[Path], object], path: Path) -> bool:
     """Write a picture; False after saying why not on standard error."""
     try:
         draw_to(path)
     except ImportError as error:
         if error.name is None or error.name.partition(".")[0] != "matplotlib":
             raise
-        told = "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
-        print(f"{path}: {told}", file=sys.stderr)
+        print(f"{path}: {error}", file=sys.stderr)
         return False
     except OSError as error:
         print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)

@@ -59,9 +59,9 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
         complaint = found.full.verdict.complaint
 
     def draw(path: Path) -> None:
-        from ..report.vectors import draw_vectors, of_reversal
+        from ..report.vectors import draw_vectors
 
-        draw_vectors(of_reversal(found), found.title, path)
+        draw_vectors(found.residual_vectors(), found.title, path)
 
     return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings, draw)
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings import ObservedReadings
 
-    from ..results.fit import Fit
-
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
@@ -84,7 +82,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.settings import listing
 
     from ..study import fit
-    from .common import print_json, print_lines, single
+    from .common import draw, print_json, print_lines, single
 
     for option, given, estimators in (
         ("--scale", options.scale, ("reversal",)),
@@ -126,7 +124,7 @@ def run(options: Namespace) -> int:
         text = "see the record of iterations, and look for wrong units, balls or probes among the readings"
         print(f"the estimate has {result.solution.status} and nothing is made of it: {text}", file=sys.stderr)
         return 1
-    if options.plot and not _drawn(result, observed, options.plot):
+    if options.plot and not draw(result.plot, options.plot):
         return 3
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
@@ -140,14 +138,6 @@ def run(options: Namespace) -> int:
         print(result.verdict.complaint, file=sys.stderr)
         return 1
     return 0
-
-
-def _drawn(result: Fit, observed: ObservedReadings, path: Path) -> bool:
-    """Draw the residuals; False if that cannot be done."""
-    from ..report.vectors import draw_vectors, of_fit
-    from .common import draw
-
-    return draw(lambda path: draw_vectors(of_fit(result, observed), result.title, path), path)
 
 
 def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:

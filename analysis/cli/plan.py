@@ -189,13 +189,7 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)
     # Numbered as on the run sheet.
     in_order = replace(found, chosen=sheet.chosen)
-    return options.plot is None or draw(lambda path: _draw(in_order, path), options.plot)
-
-
-def _draw(found: Campaign, path: Path) -> None:
-    from ..report.campaign import draw_campaign
-
-    draw_campaign(found, path)
+    return options.plot is None or draw(in_order.plot, options.plot)
 
 
 def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:

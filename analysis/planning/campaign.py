@@ -17,13 +17,14 @@ from ballplate.simulator.threads import single_threaded
 from ..processes import in_processes
 from ..study import predict
 from .bound import Bound, bound
+from .choice import CurvePoint, Gain
 from .constraints import Budget, Constraints, constraints
 from .criteria import CriterionName, criterion, is_about_balls
 from .information import pool_information
 from .offer import Offer, offer, open_directions
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
-from .selection import Campaign, CurvePoint, Gain
+from .selection import Campaign
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8

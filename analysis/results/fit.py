@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..plates import PlateCoordinates
 from ..rank import Verdict
+from ..report.vectors import Vectors, draw_vectors
 from ..tasks import TaskUncertainty
 from ..uncertainty import Quantity
 from .estimates import (
@@ -43,10 +45,12 @@ from .parts import (
     verdict_lines,
 )
 from .prediction import length_headline, rank_words
+from .residuals import Residual, reading_residuals
 from .result import Result
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 # Steps of an iteration below this, in metres and radians, are told as rounding.
 LEAST_STEP = 1e-10
@@ -55,27 +59,13 @@ LEAST_STEP = 1e-10
 SHOWN_RESIDUALS = 3
 
 
-@dataclass(frozen=True)
-class Residual:
-    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties.
-
-    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the certificate's.
-    """
-
-    position: str
-    ball: str
-    probe: str
-    axis: str
-    value: float
-    standardised: float
-
-
 @dataclass(frozen=True, repr=False)
 class Fit(Result):
     """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
 
-    `sigma` multiplies all stated uncertainties: estimated from the residuals as the root of S^2 over the degrees of
-    freedom, or 1 where the file says that they are given. `adjustments` are those of a three-dimensional metric.
+    `x` (readings, d) are the scale readings in metres. `sigma` multiplies all stated uncertainties: estimated from the
+    residuals as the root of S^2 over the degrees of freedom, or 1 where the file says that they are given.
+    `adjustments` are those of a three-dimensional metric.
     `diagnosis` is what the residuals make suspect, which nothing else here heeds; `marks` tell where readings stand.
     With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1].
     """
@@ -83,6 +73,7 @@ class Fit(Result):
     label: str
     title: str
     design: Design
+    x: Array
     solution: Solution
     verdict: Verdict
     sigma: float
@@ -259,6 +250,35 @@ class Fit(Result):
             raise ValueError(f"{len(asked)} probes for {len(given)} points")
         probes = np.broadcast_to([names.index(name) for name in asked], len(given))
         return correct(self.functions.at, given, probes, self.sigma)
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Residuals of a two-dimensional fit that has converged, for each position."""
+        design = self.design
+        readings, residuals, _ = reading_residuals(design, self.solution, self.x)
+        places = self.x[design.plate_readings]
+        return tuple(
+            Vectors(
+                design.position_names[k],
+                places[mine],
+                residuals[mine],
+                tuple(design.ball_names[ball] for ball in readings.ball[mine]),
+            )
+            for k in np.unique(readings.position)
+            for mine in [readings.position == k]
+        )
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Residuals of a two-dimensional fit as magnified vectors where the balls were read.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else, the fit has three dimensions, or has not converged.
+        """
+        if self.design.dimension != 2 or not self.converged:
+            why = "has three dimensions" if self.converged else f"has {self.solution.status}"
+            raise ValueError(f"residuals are drawn of fits in two dimensions that have converged; this one {why}")
+        return draw_vectors(self.residual_vectors(), self.title, path)
 
     @property
     def doubt(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from ballplate.simulator.design import Design
 
 from ..montecarlo.tables import trials_data, trials_lines
 from ..rank import Verdict
+from ..report.pictures import draw_design
 from ..scale import Scale
 from ..tasks import TaskUncertainty
 from ..uncertainty import Quantity
@@ -29,6 +31,8 @@ from .parts import (
 from .result import Result
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..montecarlo.study import Trials
 
 
@@ -77,6 +81,17 @@ class Prediction(Result):
             "scale": scale_data(self.scale),
             **({} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}),
         }
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The positions in the volume, by their names or, where there are many, by their numbers.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        names = ", ".join(self.design.position_names)
+        return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of U1 to U6."""

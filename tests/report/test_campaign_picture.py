@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.planning.choice import CurvePoint, Gain
 from ballplate.planning.constraints import Budget, Spent
-from ballplate.planning.selection import Campaign, CurvePoint, Gain
+from ballplate.planning.selection import Campaign
 from ballplate.report.campaign import draw_campaign, words
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.pool import with_chosen
