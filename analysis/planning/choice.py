@@ -38,7 +38,7 @@ class CurvePoint:
     bound: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Selection:
     """A selection and what is to be said of it; values in metres, those of `condition` ratios.
 

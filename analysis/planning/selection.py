@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import with_chosen
+
 from ..report.campaign import draw_campaign
 from ..results.formatting import aligned, finite, number
 from ..results.result import Result
@@ -40,6 +43,11 @@ class Campaign(Selection, Result):
     def sheet(self) -> RunSheet:
         """The choice in the order in which it is to be read."""
         return run_sheet(self.chosen, self.pool.changes, self.done, self.completed, self.interrupted)
+
+    @property
+    def chosen_experiment(self) -> Experiment:
+        """The experiment with the chosen positions and certificates alone, in the order of the run sheet."""
+        return with_chosen(self.experiment, self.sheet.chosen)
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
