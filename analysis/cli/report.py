@@ -62,8 +62,8 @@ def run(options: Namespace) -> int:
 
                 text = page(store, results, options.run_modules)
             else:
-                from ..report.formats import FORMATS
                 from ..report.tables import report_tables
+                from ..results.formats import FORMATS
 
                 text = FORMATS[form](results.title, report_tables(results))
     except StoreError as error:

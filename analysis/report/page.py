@@ -15,6 +15,7 @@ from ballplate.simulator.layout import lay_out
 from ballplate.simulator.settings import listing
 
 from ..results.formatting import number, percent, uncertainty_words
+from ..results.table import Block, Entry, Row, Table
 from ..sweeps.store import Store
 from ..uncertainty import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
@@ -25,7 +26,7 @@ from .results import Results, best_and_worst, criterion, one_line
 from .scene import MOST_BALLS, Scene, scene
 from .series import Plot, plots
 from .svg import micro
-from .tables import Block, Entry, Row, Table, report_tables
+from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
 from .volume import error_map
 

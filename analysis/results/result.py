@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from html import escape
+import math
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
+
+from .formats import as_html, as_latex, as_markdown
+from .table import Block, Entry, Row, Table
 
 if TYPE_CHECKING:
     import pandas
@@ -42,6 +46,22 @@ class Result:
 
         return pandas.DataFrame(self.rows())
 
+    def to_markdown(self) -> str:
+        """Its main table in Markdown, with label and title above."""
+        return self._written(as_markdown)
+
+    def to_latex(self) -> str:
+        """Its main table in LaTeX, as a table environment that needs no package."""
+        return self._written(as_latex)
+
+    def to_html(self) -> str:
+        """Its main table as elements of a page, as a notebook shows it."""
+        return self._written(as_html)
+
+    def to_csv(self) -> str:
+        """Its main table as CSV with a line of headings, with all digits; what is undetermined is empty."""
+        return self.to_frame().to_csv(index=False)
+
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
@@ -49,5 +69,25 @@ class Result:
         return f"<{type(self).__name__} of {self.label}: {self.headline()}>"
 
     def _repr_html_(self) -> str:
-        table = self.to_frame().to_html(index=False, na_rep="undetermined", float_format="{:.4g}".format, border=0)
-        return f"<p><strong>{escape(self.label)}: {escape(self.title)}</strong><br>{escape(self.headline())}</p>{table}"
+        return self.to_html()
+
+    def _written(self, form: Callable[[str, Sequence[Table]], str]) -> str:
+        """Title and main table in a form, with four digits; without any row, the result in a few words."""
+        rows, title = self.rows(), f"{self.label}: {self.title}"
+        if not rows:
+            return form(f"{title}: {self.headline()}", [])
+        names = list(rows[0])
+        are_text = [all(isinstance(row[name], str) for row in rows) for name in names]
+        left = are_text.index(False) if False in are_text else len(names)
+        texts = [tuple(_shown(row[name]) for name in names) for row in rows]
+        block = Block("", tuple(Row(row[:left], tuple(Entry(text) for text in row[left:])) for row in texts))
+        return form(title, [Table("", self.headline(), tuple(names[:left]), tuple(names[left:]), (block,))])
+
+
+def _shown(value: Any) -> str:
+    """A value in a table that is shown."""
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return "undetermined" if math.isnan(value) else f"{value:.4g}"
+    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)

@@ -1,4 +1,4 @@
-"""Tables as text, Markdown, CSV and LaTeX."""
+"""Tables as text, Markdown, HTML, CSV and LaTeX."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import io
 import re
 import textwrap
 from collections.abc import Callable, Sequence
+from html import escape
 
 from ballplate.simulator.spreadsheets import CsvWriter
 
-from ..results.formatting import aligned
-from .tables import Block, Row, Table
+from .formatting import aligned
+from .table import Block, Row, Table
 
 WIDTH = 120
 
@@ -73,6 +74,33 @@ def _markdown(text: str) -> str:
     'a\\|b \\*c\\* \\<d\\>'
     """
     return re.sub(r"([\\`*_{}\[\]<>|#$~])", r"\\\1", text)
+
+
+def as_html(title: str, tables: Sequence[Table]) -> str:
+    """Tables as elements of a page, with a title in front."""
+    parts = [f"<p><strong>{escape(title)}</strong></p>"] if title else []
+    for table in tables:
+        spanned = f"{table.spanner} " if table.spanner else ""
+        head = [*table.headings, *(spanned + column for column in table.columns)]
+        stubs = len(table.headings)
+        parts.append(f"<table><caption>{escape(table.caption)}</caption>")
+        parts.append(f"<thead>{_html_row(head, 'th', stubs)}</thead>")
+        for block in table.blocks:
+            titled = f'<tr><th colspan="{len(head)}">{escape(block.title)}</th></tr>' if block.title else ""
+            rows = "\n".join(_html_row(_texts(row), "td", stubs) for row in block.rows)
+            parts.append(f"<tbody>{titled}{rows}</tbody>")
+        parts += ["</table>", *(f"<p>{escape(note)}</p>" for note in table.notes)]
+    return "\n".join(parts) + "\n"
+
+
+def _html_row(texts: Sequence[str], element: str, left: int) -> str:
+    """A row whose first cells are aligned to the left, the others to the right."""
+    sides = ["left"] * left + ["right"] * (len(texts) - left)
+    cells = (
+        f'<{element} style="text-align: {side}">{escape(text)}</{element}>'
+        for text, side in zip(texts, sides, strict=True)
+    )
+    return f"<tr>{''.join(cells)}</tr>"
 
 
 def as_csv(title: str, tables: Sequence[Table]) -> str:
