@@ -207,7 +207,7 @@ class Fit(Result):
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
         >>> fit.covariance("machine", "r1c2: x").shape
-        (34, 34)
+        (70, 70)
         """
         import pandas
 
