@@ -4,14 +4,20 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-# The source tree itself, so that pages tell of this version and not of one that happens to be installed.
-sys.path[:0] = [str(HERE / "_extensions"), str(HERE.parent)]
+sys.path.insert(0, str(HERE / "_extensions"))
 
 project = "ballplate"
 author = copyright = "The ballplate authors"
-extensions = ["myst_parser", "console_examples", "generated_pages", "mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "console_examples", "generated_pages", "mathml"]
 exclude_patterns = ["_build", "_extensions"]
 nitpicky = True
+# Types in signatures are those of NumPy, pandas and Python, whose pages are not at hand.
+nitpick_ignore_regex = [("py:.*", ".*")]
+
+# In docstrings, single backticks are code.
+default_role = "code"
+autodoc_typehints_format = "short"
+autodoc_default_options = {"undoc-members": False}
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3

@@ -6,14 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, State, probe_offsets
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.readings.reading_files import read_readings
 
-from simulator.design import Design, State, probe_offsets
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.readings import read_readings
-
-from ..study import fit, plan
-from ..uncertainty import Quantity
+from ..results.study import fit, predict
+from ..uncertainty.summaries import Quantity
 from .problems import CertifiedProblem
 
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
@@ -25,7 +24,7 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
     :raises ExperimentError: the experiment file or the readings beside the problem's file cannot be used.
     """
     experiment = load(problem.experiment_file)[0]
-    drawn = plan(experiment)
+    drawn = predict(experiment)
     found: dict[str, Any] = {
         "as_drawn": {
             "rank_deficiency": drawn.verdict.deficiency,

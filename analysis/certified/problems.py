@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.settings import hint, shorten
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.settings import hint, shorten
+
+# Above any number that means something here, and below where a float ends.
+LARGE = 1e150
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,44 @@ def _problem(path: Path) -> CertifiedProblem:
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("certified"), dict):
         raise ExperimentError([Message(str(path), 0, 0, "", 'no certified problem: it has no key "certified"')])
+    for part in data["certified"].keys() & {"as_drawn", "estimate"}:
+        complaint = _complaint(data["certified"][part])
+        if complaint:
+            text = f"{complaint}; make the file anew, or take the shipped one"
+            raise ExperimentError([Message(str(path), 0, 0, f"certified.{part}", text)])
     return CertifiedProblem(str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"])
+
+
+def _complaint(answers: Any) -> str | None:
+    """What keeps certified answers from being compared with, None where nothing does."""
+    if not isinstance(answers, dict) or not isinstance(answers.get("uncertainties"), dict):
+        return 'has no mapping "uncertainties"'
+    for symbol, one in answers["uncertainties"].items():
+        if not isinstance(one, dict):
+            return f"{symbol} is no mapping"
+        for key in ("count", "undetermined"):
+            if type(one.get(key)) is not int:
+                return f'{symbol} has no whole number "{key}"'
+        for key in ("maximum", "average"):
+            is_undetermined = key in one and one["maximum" if key == "average" else key] is None
+            if not is_undetermined and not (_is_number(one.get(key)) and one[key] > 0.0):
+                return f'{symbol} has no number "{key}" above zero'
+    if "sum_of_squares" in answers and not _is_number(answers["sum_of_squares"]):
+        return '"sum_of_squares" is no number'
+    for group in answers.keys() & {"machine", "balls", "origins"}:
+        if not _are_numbers(answers[group]):
+            return f'"{group}" is not of numbers alone'
+    return None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < LARGE
+
+
+def _are_numbers(value: Any) -> bool:
+    """A number, or a list or mapping of such."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return _is_number(value) if parts is None else all(map(_are_numbers, parts))
 
 
 def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, Any]:
@@ -85,7 +125,9 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ExperimentError([Message(str(path), 0, 0, "", f"cannot be read ({error.strerror})")]) from None
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "", f"cannot be read ({error.strerror}); name a JSON file")]
+        ) from None
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
-        raise ExperimentError([Message(str(path), line, column, "", f"is not JSON ({error})")]) from None
+        raise ExperimentError([Message(str(path), line, column, "", f"is not JSON ({error}); write it anew")]) from None

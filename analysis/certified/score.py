@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from simulator.settings import listing
+from ballplate.simulator.inputs.settings import listing
 
 MOST_DIGITS = 15.0
 
@@ -132,7 +132,10 @@ def absolute_digits(found: Any, certified: Any, unit: float) -> float:
 def _difference(found: Any, certified: float) -> float:
     if isinstance(found, bool) or not isinstance(found, int | float):
         return math.nan
-    return abs(found - certified)
+    try:
+        return abs(float(found) - certified)
+    except OverflowError:
+        return math.inf
 
 
 def _digits(error: float) -> float:

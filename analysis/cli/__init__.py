@@ -5,11 +5,19 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
+from typing import Any, NoReturn
 
-from .interruption import interruptions
+from .completion import SHELLS, PrintCompletion
+from .encoding import write_data_in_utf8, write_readably
+from .interruption import Interruption, files_named, interruptions, leave, tell, written
+from .outputs import UsageError, check_outputs
+from .streams import StandardOutputError, keep_standard_numbers, lasting_streams
+from .telling import add_telling, told
 
-AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+AS_EXPECTED, NOT_AS_EXPECTED, USAGE, BAD_FILE, INTERNAL = 0, 1, 2, 3, 70
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,57 +43,162 @@ def parser() -> argparse.ArgumentParser:
         sweep,
     )
 
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
-        epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used.",
+        epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used, 70 an "
+        "error of the program itself, 130 and 143 interrupted.",
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    top.add_argument(
+        "--print-completion",
+        action=PrintCompletion,
+        choices=SHELLS,
+        help="print a script with which a shell completes commands, options, choices and names of files, and leave",
+    )
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     experiments = (check, run, plan, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
+    for command in commands.choices.values():
+        add_telling(command)
     return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit status."""
-    try:
-        with interruptions() as answer:
-            return _main(arguments, answer)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
-
-
-def _main(arguments: Sequence[str] | None, answer_interruption: Callable[[], None]) -> int:
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-    options = parser().parse_args(arguments)
-    options.answer_interruption = answer_interruption
-    # Loaded only now, so that --help and wrong usage answer at once.
-    from simulator.experiment.messages import ExperimentError
-
-    from ..internal_error import InternalError
-
-    try:
-        status = int(options.run(options))
-        sys.stdout.flush()
+    """Run a command and return its exit status; without arguments, that of the process itself."""
+    is_own_process = arguments is None
+    if is_own_process:
+        keep_standard_numbers()
+    with interruptions(is_own_process) as interruption:
+        status = _answering(arguments, interruption)
+        if is_own_process and interruption.came is not None:
+            if sys.stdout is not None:
+                with suppress(OSError):
+                    sys.stdout.flush()
+            leave(status)
         return status
+
+
+def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> int:
+    try:
+        with interruption.raising():
+            return _main(arguments, interruption)
+    except KeyboardInterrupt:
+        pass
+    except Exception:
+        # What fails after a signal does so because of it.
+        if interruption.came is None:
+            raise
+    tell(interruption)
+    return interruption.status
+
+
+def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
+    with lasting_streams():
+        write_readably(sys.stdout, sys.stderr)
+        try:
+            try:
+                options = parser().parse_args(arguments)
+            except SystemExit:
+                # Help is data, too.
+                sys.stdout.flush()
+                raise
+            write_data_in_utf8(options)
+            interruption.kept = partial(written, files_named(options))
+            options.interruption = interruption
+            status = _run(options)
+            sys.stdout.flush()
+            return status
+        except StandardOutputError as error:
+            print(f"standard output: cannot be written ({error}); give it room", file=sys.stderr)
+            return BAD_FILE
+
+
+def _run(options: argparse.Namespace) -> int:
+    # Loaded only now, so that --help and wrong usage answer at once.
+    from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
+
+    from ..running.internal_error import InternalError
+
+    try:
+        check_outputs(options)
+        with told(options):
+            return int(options.run(options))
+    except UsageError as error:
+        print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
+        return USAGE
     except ExperimentError as error:
-        print(error, file=sys.stderr)
+        from .excerpts import print_errors
+
+        print_errors(error.messages, options)
         return BAD_FILE
     except InternalError as error:
         print(f"internal error: {error}. Please report it with the file and the command.", file=sys.stderr)
         return INTERNAL
-    except BrokenPipeError:
-        # The reader has gone; say nothing, and keep the interpreter from flushing into the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return AS_EXPECTED
-    except OSError as error:
-        print(f"standard output: cannot be written ({error.strerror}); give it room", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return BAD_FILE
+    except Exception as error:
+        from .memory import no_memory
+
+        shortage = no_memory(error, options)
+        if shortage is not None:
+            print(shortage, file=sys.stderr)
+            return BAD_FILE
+        if isinstance(error, OSError):
+            print(in_one_line(_told(error, options)), file=sys.stderr)
+            return BAD_FILE
+        raise
+
+
+def _told(error: OSError, options: argparse.Namespace) -> str:
+    """What the system refused, of a file or without saying of which."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return f"ballplate {options.command}: the current folder is not there any more; change to another"
+    where = error.filename or f"ballplate {options.command}"
+    return f"{where}: cannot be used ({error.strerror or error}); check the name, the permissions and the room there"
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells wrong usage in one line, whatever stands in the arguments, and what was probably meant.
+
+    The parsers of commands are of this class as well.
+    """
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        options, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            chosen = self.commands[options.command]
+            chosen.error(f"unrecognized arguments: {' '.join(unknown)}{chosen.meant_by(unknown)}")
+        return options
+
+    @property
+    def commands(self) -> dict[str, _Parser]:
+        """The parsers of the commands, by name."""
+        return next(dict(one.choices) for one in self._actions if isinstance(one, argparse._SubParsersAction))
+
+    def meant_by(self, unknown: Sequence[str]) -> str:
+        """Tell which of the command's options the unknown ones are probably meant for."""
+        from ballplate.simulator.inputs.settings import nearest
+
+        known = [option for action in self._actions for option in action.option_strings if option.startswith("--")]
+        meant = [nearest(one.partition("=")[0], known) for one in unknown if one.startswith("--")]
+        told = ", ".join(f'"{one}"' for one in dict.fromkeys(meant) if one is not None)
+        return f"; did you mean {told}?" if told else ""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        from ballplate.simulator.inputs.settings import nearest
+
+        if action.choices is not None and value not in action.choices:
+            meant = nearest(str(value), [str(one) for one in action.choices])
+            if meant is not None:
+                raise argparse.ArgumentError(action, f'invalid choice: {value!r}; did you mean "{meant}"?')
+        super()._check_value(action, value)
+
+    def error(self, message: str) -> NoReturn:
+        from ballplate.simulator.inputs.messages import in_one_line
+
+        super().error(in_one_line(message))
 
 
 class _Version(argparse.Action):

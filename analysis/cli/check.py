@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .common import add_file, percentage
 
 if TYPE_CHECKING:
-    from ..checking import CheckedDesign
+    from ..checking.check_files import CheckedDesign
 
 FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
@@ -68,13 +68,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..annotations import advice_lines, annotation_lines
-    from ..checking import Wanted, check_files
-    from ..file_patterns import matching_files
-    from ..goals import GoalError, parse_goal
-    from ..junit import junit_report
-    from ..tables import plan_data, plan_lines
+    from ..checking.check_files import Wanted, check_files
+    from ..checking.file_patterns import matching_files
+    from ..checking.github import advice_lines, annotation_lines
+    from ..checking.junit import junit_report
+    from ..requirements.goals import GoalError, parse_goal
     from .common import print_json, print_lines
+    from .excerpts import print_errors
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
     try:
@@ -97,15 +97,14 @@ def run(options: Namespace) -> int:
                 print(line, flush=True)
         elif options.format == "text":
             for design in checked.designs:
-                print_lines([*plan_lines(design.plan), *advice_lines(design)])
+                print_lines([*design.plan.lines(), *advice_lines(design)])
         if options.format in ("text", "json"):
-            for message in checked.messages:
-                print(message, file=sys.stderr)
+            print_errors(checked.messages, options)
     if options.format == "junit":
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([plan_data(one.plan) | _asked(one, options.suggest) for one in designs])
+        print_json([one.plan.to_dict() | _asked(one, options.suggest) for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED
@@ -113,7 +112,7 @@ def run(options: Namespace) -> int:
 
 def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:
     """What was asked for besides the rank, as plain data."""
-    from ..planning.repair.tables import certificate_data, repair_data
+    from ..planning.repair.repair_tables import certificate_data, repair_data
 
     told: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
     if with_suggestions:

@@ -7,16 +7,14 @@ import shutil
 import sys
 import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
+
+from .outputs import PICTURE, add_output
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
-
-
-EXISTS = "exists already; name a new file, or overwrite it with --force"
+    from ballplate.simulator.experiment.model import Experiment
 
 
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
@@ -41,6 +39,16 @@ def count(text: str) -> int:
     if not text.isascii() or not text.isdigit() or int(text) < 1:
         raise ArgumentTypeError(f'expected a whole number, 1 or above, not "{text}"')
     return int(text)
+
+
+def trial_count(text: str) -> int:
+    """Read a number of synthetic data sets from the command line."""
+    from ..montecarlo.trials import MOST_TRIALS
+
+    found = count(text)
+    if found > MOST_TRIALS:
+        raise ArgumentTypeError(f"{found} data sets are too many; at most {MOST_TRIALS} are possible")
+    return found
 
 
 def whole(text: str) -> int:
@@ -68,8 +76,12 @@ def seed(text: str) -> int:
     return int(text)
 
 
-def picture(text: str) -> Path:
-    """Read the name of a picture to be drawn from the command line."""
+def add_picture(parser: Any, name: str, help: str) -> None:
+    """Add an option that names a picture to be drawn."""
+    add_output(parser, name, metavar="FILE", type=_picture, needed=lambda path: PICTURE, help=help)
+
+
+def _picture(text: str) -> Path:
     from ..report.svg import PICTURES
 
     if not text.lower().endswith(PICTURES):
@@ -77,92 +89,14 @@ def picture(text: str) -> Path:
     return Path(text)
 
 
-def draw(draw_to: Callable[[Path], None], path: Path) -> bool:
-    """Write a picture; False after saying why not on standard error."""
-    try:
-        draw_to(path)
-    except ImportError as error:
-        if error.name is None or error.name.partition(".")[0] != "matplotlib":
-            raise
-        told = "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
-        print(f"{path}: {told}", file=sys.stderr)
-        return False
-    except OSError as error:
-        print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
-        return False
-    return True
-
-
-def refuse_existing(*paths: Path | None) -> None:
-    """Refuse to go on where a file that is to be written is there already, before the work and not after it.
-
-    :raises ExperimentError: one of the files is there already.
-    """
-    from simulator.experiment.messages import ExperimentError, Message
-
-    found = [path for path in paths if path is not None and path.exists()]
-    if found:
-        raise ExperimentError([Message(str(path), 0, 0, "", EXISTS) for path in found])
-
-
-def write(path: Path, text: str, force: bool = False) -> None:
-    """Write a text file, no other in its place unless with `force`.
-
-    :raises ExperimentError: there is such a file already, or it cannot be written.
-    """
-    from simulator.experiment.messages import ExperimentError, Message
-
-    try:
-        with path.open("w" if force else "x", encoding="utf-8", newline="") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise ExperimentError([Message(str(path), 0, 0, "", EXISTS)]) from None
-    except OSError as error:
-        told = f"cannot be written ({error.strerror}); name another file"
-        raise ExperimentError([Message(str(path), 0, 0, "", told)]) from None
-    print(f"{path} written", file=sys.stderr)
-
-
-def write_all(writers: Mapping[Path, Callable[[TextIO], None]], force: bool = False) -> None:
-    """Let each writer write its text file, all of them or none; the file named - is standard output, written last.
-
-    :raises ExperimentError: without `force` there is one already, or one cannot be written.
-    """
-    from simulator.experiment.messages import ExperimentError, Message
-
-    files = [path for path in writers if str(path) != "-"]
-    made = []
-    try:
-        with ExitStack() as opened:
-            streams = []
-            for path in files:
-                is_new = not path.exists()
-                # Files that are there are emptied only when all can be written.
-                stream = opened.enter_context(path.open("a" if force else "x", encoding="utf-8", newline=""))
-                made += [path] if is_new else []
-                streams.append(stream)
-            for path, stream in zip(files, streams, strict=True):
-                if path.is_file():
-                    stream.truncate(0)
-                writers[path](stream)
-    except OSError as error:
-        for one in made:
-            one.unlink(missing_ok=True)
-        told = f"cannot be written ({error.strerror}); name another file"
-        text = EXISTS if isinstance(error, FileExistsError) else told
-        raise ExperimentError([Message(str(path), 0, 0, "", text)]) from None
-    for path in writers.keys() - files:
-        writers[path](sys.stdout)
-
-
 def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
     """Experiments of all files, every variant one of its own, less those not chosen; with pools for `planning`.
 
     :raises ExperimentError: the errors of all files together.
     """
-    from simulator.experiment.load import load
-    from simulator.experiment.messages import ExperimentError, Message
-    from simulator.experiment.variants import unknown_variants
+    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.variants import unknown_variants
+    from ballplate.simulator.inputs.messages import ExperimentError, Message
 
     found: list[Experiment] = []
     messages: list[Message] = []
@@ -188,7 +122,7 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
 
     :raises ExperimentError: the file has several variants and none was chosen.
     """
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.messages import ExperimentError, Message
 
     found = experiments(options, planning)
     if len(found) > 1:
@@ -200,8 +134,10 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
 
 def print_lines(lines: Sequence[str]) -> None:
     """Print lines; on a terminal, sentences are wrapped to its width, and tables are left alone."""
+    from ballplate.simulator.inputs.messages import in_one_line
+
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
-    for line in lines:
+    for line in map(in_one_line, lines):
         is_sentence = "  " not in line.strip()
         wrapped = textwrap.wrap(line, width, subsequent_indent="  ") if width and is_sentence else [line]
         print("\n".join(wrapped or [""]))

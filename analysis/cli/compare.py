@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from argparse import ArgumentTypeError, Namespace
-from functools import partial
 
-from .common import add_file, add_json, count, seed
+from .common import add_file, add_json, count, seed, trial_count
 
 PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "braced", "all")
 
@@ -19,7 +18,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "CISE 15/98, section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
     )
     add_file(parser, several=True)
-    parser.add_argument("--trials", metavar="N", type=count, default=100, help="number of data sets; default 100")
+    parser.add_argument("--trials", metavar="N", type=trial_count, default=100, help="number of data sets; default 100")
     parser.add_argument(
         "--estimator",
         choices=("distances", "cresto", "kruth", "length-equations", "sphere-then-metric"),
@@ -28,7 +27,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_pairs(parser)
     parser.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
-    parser.add_argument("--points", metavar="N", type=count, default=200, help="pairs of points; default 200")
+    parser.add_argument("--points", metavar="N", type=_points, default=200, help="pairs of points; default 200")
     for key, words in (("rms", "root mean square"), ("maximum", "largest difference")):
         parser.add_argument(
             f"--published-{key}",
@@ -55,8 +54,17 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
     )
 
 
+def _points(text: str) -> int:
+    from ..estimators.distances import MOST_POINTS
+
+    found = count(text)
+    if found > MOST_POINTS:
+        raise ArgumentTypeError(f"{found} pairs of points are too many; at most {MOST_POINTS} are possible")
+    return found
+
+
 def _length(text: str) -> float:
-    from simulator.quantities import QuantityError, parse_length
+    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
 
     try:
         return parse_length(text)
@@ -66,15 +74,14 @@ def _length(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Compare the estimators for all experiments of the files; 1 if an estimate did not converge."""
-    from ..estimators import compare_estimators, comparison_data, comparison_lines
+    from ..estimators.distances import compare_estimators, comparison_data, comparison_lines
     from .common import experiments, print_json, print_lines
-    from .progress import ProgressBar
+    from .progress import progress
 
     published = {"rms": options.published_rms, "maximum": options.published_maximum}
     found = []
     for experiment in experiments(options):
-        bar = ProgressBar(f"data sets of {experiment.label}")
-        try:
+        with progress(options) as shown:
             comparison = compare_estimators(
                 experiment,
                 options.trials,
@@ -83,10 +90,8 @@ def run(options: Namespace) -> int:
                 options.across_probes,
                 options.seed,
                 options.points,
-                partial(bar.show, wanted=options.trials),
+                shown.show,
             )
-        finally:
-            bar.close()
         found.append(comparison)
         if not options.json:
             print_lines([*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)])

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
-    from simulator.readings import ObservedReadings
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.readings.reading_files import ObservedReadings
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ Estimator = Callable[[Namespace, "Experiment", "ObservedReadings"], Outcome]
 
 
 def _of_distances(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
-    from ..estimators import fit_rival, rival_fit_data, rival_fit_lines
+    from ..estimators.distances import fit_rival, rival_fit_data, rival_fit_lines
 
     found = fit_rival(experiment, observed, options.estimator, options.pairs, options.across_probes, options.monomials)
     complaint = ""
@@ -48,8 +48,8 @@ def _of_distances(options: Namespace, experiment: Experiment, observed: Observed
 
 
 def _reversal(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
-    from ..reversal import fit_reversal
-    from ..reversal_tables import reversal_data, reversal_lines
+    from ..estimators.reversal_fits import fit_reversal
+    from ..estimators.reversal_tables import reversal_data, reversal_lines
 
     found = fit_reversal(experiment, observed, options.scale, not options.no_offsets, options.sigma)
     complaint = found.complaint
@@ -59,16 +59,16 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
         complaint = found.full.verdict.complaint
 
     def draw(path: Path) -> None:
-        from ..report.vectors import draw_vectors, of_reversal
+        from ..report.vectors import draw_vectors
 
-        draw_vectors(of_reversal(found), found.title, path)
+        draw_vectors(found.residual_vectors(), found.title, path)
 
     return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings, draw)
 
 
 def _of_length_equations(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
-    from ..length_fits import fit_lengths, has_all_errors, length_fit_data, length_fit_lines
-    from ..rank import rank_complaint
+    from ..estimators.length_fits import fit_lengths, has_all_errors, length_fit_data, length_fit_lines
+    from ..rank.verdict import rank_complaint
 
     found = fit_lengths(experiment, observed, options.estimator)
     complaint, deficiency = "", found.solution.deficiency

@@ -5,11 +5,16 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .outputs import PARQUET, add_force, add_output, write_outputs
+
 if TYPE_CHECKING:
-    from ..sweeps.store import Store
+    from collections.abc import Iterable
+
+    from ..sweeps.store import Results
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -19,17 +24,21 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "export",
         help="write a sweep's results as CSV or Parquet",
         description="Write a row for each cell of a store and a column for each figure, in metres and radians, with "
-        "the unit in the column's name.",
+        "the unit in the column's name. Of a damaged store these are the cells that can be read; the exit status then "
+        "is 3.",
     )
     add_store(parser)
-    parser.add_argument(
+    add_output(
+        parser,
         "-o",
         "--output",
         metavar="FILE",
-        type=Path,
         required=True,
+        takes_screen=True,
+        needed=lambda path: PARQUET if path.suffix.lower() == ".parquet" else None,
         help="table, .csv or .parquet; - for CSV on the screen",
     )
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -39,32 +48,52 @@ def add_store(parser: ArgumentParser) -> None:
     parser.add_argument("--sweep", metavar="N", type=int, help="which sweep of the store; default: the newest")
 
 
-def warn_of_other_methods(store: Store, sweep: int) -> None:
+def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
     """Tell of rows that this version would compute by another method."""
+    from ballplate.simulator.inputs.messages import in_one_line
+
     from ..sweeps.store import of_other_methods
 
-    for text in of_other_methods(store, sweep):
-        print(f"{store.path}: {text}; run ballplate sweep again to compute them anew", file=sys.stderr)
+    for text in of_other_methods(keys):
+        print(in_one_line(f"{path}: {text}; run ballplate sweep again to compute them anew"), file=sys.stderr)
+
+
+def warn_of_damage(path: Path, found: Results, count: int) -> bool:
+    """Tell what of a store could not be read; whether there is anything."""
+    from ..sweeps.store import unread
+    from ..sweeps.store_file import GO_ON
+
+    go_on = GO_ON if found.damage else "ballplate sweep computes anew what is missing"
+    text = unread(path, found.unreadable, found.strays, count, found.damage, go_on)
+    if text:
+        print(text, file=sys.stderr)
+    return bool(text)
 
 
 def run(options: Namespace) -> int:
     """Write the table."""
-    from simulator.spreadsheets import cell_of_text
+    from ballplate.simulator.inputs.spreadsheets import cell_of_text
 
-    from ..sweeps.frame import frame
-    from ..sweeps.store import StoreError, chosen_sweep, open_store
+    from ..sweeps.frame import frame_of
+    from ..sweeps.store import StoreError, chosen_sweep, definition_of, open_store, results
 
     suffix = options.output.suffix.lower()
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
         print(f"ballplate export: {options.output} should end in .csv or .parquet", file=sys.stderr)
         return WRONG_USAGE
-    if options.output.resolve() == options.store.resolve():
-        print(f"ballplate export: -o {options.output} is the store itself; name another file", file=sys.stderr)
-        return WRONG_USAGE
     try:
         with closing(open_store(options.store)) as store:
-            table = frame(store, options.sweep)
-            warn_of_other_methods(store, chosen_sweep(store, options.sweep))
+            number = chosen_sweep(store, options.sweep)
+            try:
+                defined = definition_of(store, number)
+            except StoreError as error:
+                print(error, file=sys.stderr)
+                defined = None
+            found = results(store, number, None if defined is None else len(defined["cells"]))
+            count = len(found.cells) + len(found.unreadable) if defined is None else len(defined["cells"])
+            is_damaged = warn_of_damage(store.path, found, count) or defined is None
+            table = frame_of(found, defined)
+            warn_of_other_methods(store.path, found.keys)
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
@@ -73,18 +102,9 @@ def run(options: Namespace) -> int:
         table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)
         table.columns = [cell_of_text(name) for name in table.columns]
     if str(options.output) == "-":
-        table.to_csv(sys.stdout, index=False)
-        return 0
-    try:
-        if suffix == ".csv":
-            table.to_csv(options.output, index=False)
-        else:
-            table.to_parquet(options.output, index=False)
-    except ImportError:
-        text = "Parquet needs pyarrow; install it with: python -m pip install 'ballplate[parquet]'"
-        print(f"ballplate export: {text}", file=sys.stderr)
+        table.to_csv(sys.stdout, index=False, lineterminator="\n")
+        return BAD_FILE if is_damaged else 0
+    write = table.to_parquet if suffix == ".parquet" else partial(table.to_csv, lineterminator="\n")
+    if not write_outputs({options.output: lambda path: write(path, index=False)}, options.force):
         return BAD_FILE
-    except OSError as error:
-        print(f"{options.output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
-        return BAD_FILE
-    return 0
+    return BAD_FILE if is_damaged else 0

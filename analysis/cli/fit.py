@@ -7,15 +7,14 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, add_json, picture
+from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .estimators import ESTIMATORS
+from .outputs import add_force, write_outputs
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
-    from simulator.readings import ObservedReadings
-
-    from ..study import Fit
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.readings.reading_files import ObservedReadings
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -62,12 +61,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="store_true",
         help="with reversal: leave out the offsets between the positions, three parameters instead of five",
     )
-    parser.add_argument(
+    add_picture(
+        parser,
         "--plot",
-        metavar="FILE",
-        type=picture,
         help="draw the residuals of a two-dimensional experiment as magnified vectors (.svg, .png or .pdf)",
     )
+    add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -77,14 +76,14 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
-    from simulator.certificates import read_certificate
-    from simulator.layout import lay_out
-    from simulator.misreading_messages import doubts_about_lengths, doubts_about_volume
-    from simulator.readings import read_readings
-    from simulator.settings import listing
+    from ballplate.simulator.design.layout import lay_out
+    from ballplate.simulator.inputs.messages import in_one_line
+    from ballplate.simulator.inputs.settings import listing
+    from ballplate.simulator.readings.certificate_files import read_certificate
+    from ballplate.simulator.readings.gross_error_messages import doubts_about_lengths, doubts_about_volume
+    from ballplate.simulator.readings.reading_files import read_readings
 
-    from ..study import fit
-    from ..tables import fit_data, fit_lines
+    from ..results.study import fit
     from .common import print_json, print_lines, single
 
     for option, given, estimators in (
@@ -112,22 +111,25 @@ def run(options: Namespace) -> int:
     observed = read_readings(options.readings, lay_out(experiment))
     for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
         if names:
-            print(f"{options.readings}: {what} ({len(names)}): {listing(names)}", file=sys.stderr)
+            told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
+            print(in_one_line(told), file=sys.stderr)
     doubts = doubts_about_lengths(observed.design, observed.x)
     for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
         print(f"warning: {doubt}", file=sys.stderr)
     if options.estimator != "full":
         return _run_other(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
+    has_converged = result.solution.status == "converged"
+    is_drawn = not options.plot or not has_converged or write_outputs({options.plot: result.plot}, options.force)
     if options.json:
-        print_json([fit_data(result)])
+        print_json([result.to_dict()])
     else:
-        print_lines(fit_lines(result))
-    if result.solution.status != "converged":
+        print_lines(result.lines())
+    if not has_converged:
         text = "see the record of iterations, and look for wrong units, balls or probes among the readings"
         print(f"the estimate has {result.solution.status} and nothing is made of it: {text}", file=sys.stderr)
         return 1
-    if options.plot and not _drawn(result, observed, options.plot):
+    if not is_drawn:
         return 3
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
@@ -135,32 +137,25 @@ def run(options: Namespace) -> int:
         if result.diagnosis.suspects or result.diagnosis.scatter:
             cure = "look at what is suspected"
         print(f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {cure}", file=sys.stderr)
-    if result.doubt:
-        print(f"warning: {result.doubt}", file=sys.stderr)
+    for doubt in result.doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
     if not result.verdict.as_expected:
         print(result.verdict.complaint, file=sys.stderr)
         return 1
     return 0
 
 
-def _drawn(result: Fit, observed: ObservedReadings, path: Path) -> bool:
-    """Draw the residuals; False if that cannot be done."""
-    from ..report.vectors import draw_vectors, of_fit
-    from .common import draw
-
-    return draw(lambda path: draw_vectors(of_fit(result, observed), result.title, path), path)
-
-
 def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:
     """Fit with another estimator than the full one; 1 if it complains."""
-    from .common import draw, print_json, print_lines
+    from .common import print_json, print_lines
 
     found = ESTIMATORS[options.estimator](options, experiment, observed)
+    is_drawn = not options.plot or not found.draw or write_outputs({options.plot: found.draw}, options.force)
     if options.json:
         print_json([found.data])
     else:
         print_lines(found.lines)
-    if options.plot and found.draw and not draw(found.draw, options.plot):
+    if not is_drawn:
         return 3
     for warning in found.warnings:
         print(f"warning: {warning}", file=sys.stderr)

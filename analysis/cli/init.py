@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
-from pathlib import Path
+
+from .outputs import add_force, add_output, text_writer, write_outputs
+from .telling import note
+
+BAD_FILE = 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -14,26 +17,19 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         description="Write an experiment file with comments on what may be said, ready for check and run, or a machine "
         "file, ready for map.",
     )
-    parser.add_argument("file", metavar="NAME.yaml", type=Path, help="file to write; must not exist")
+    add_output(parser, "file", metavar="NAME.yaml", help="file to write")
     parser.add_argument("--machine", action="store_true", help="write a machine file, for map and kind: machine")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
-    """Write the file unless it exists."""
+    """Write the file."""
     from importlib.resources import files
-
-    from simulator.experiment.messages import ExperimentError, Message
 
     name, command = ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
-    try:
-        with options.file.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise ExperimentError([Message(str(options.file), 0, 0, "", "exists already; name a new file")]) from None
-    except OSError as error:
-        reason = f"cannot be written ({error.strerror}); name a file in a folder that exists"
-        raise ExperimentError([Message(str(options.file), 0, 0, "", reason)]) from None
-    print(f"{options.file} written; next: ballplate {command} {options.file}", file=sys.stderr)
+    if not write_outputs({options.file: text_writer(lambda stream: stream.write(text))}, options.force):
+        return BAD_FILE
+    note(options, f"{options.file} written; next: ballplate {command} {options.file}")
     return 0

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import add_file, add_json, draw, picture, print_json, print_lines, single
+from .common import add_file, add_json, add_picture, print_json, print_lines, single
+from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
-    from ..lengths import Settings
+    from ..length_map.length_map import Settings
 
 NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 1, 2, 3
 # Lines of a table of all lengths.
@@ -52,11 +55,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--with-repeatability", action="store_true", help="count the scatter of the two readings of a length, too"
     )
-    parser.add_argument("--csv", metavar="FILE", type=Path, help="write a line for each point of the grid")
-    parser.add_argument("--pairs", metavar="FILE", type=Path, help="write a line for each length")
-    parser.add_argument(
-        "--plot", metavar="FILE", type=picture, help="draw slices through the volume, and u against the length"
-    )
+    add_output(parser, "--csv", metavar="FILE", help="write a line for each point of the grid")
+    add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")
+    add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
+    add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -82,30 +84,36 @@ def _factor(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ..length_tables import length_data, length_lines, pair_csv, point_csv
-    from ..lengths import length_map
+    from ..length_map.length_map import length_map
+    from ..length_map.length_tables import length_data, length_lines, pair_csv, point_csv
+    from .progress import progress
 
     experiment = single(options)
     settings = _settings(experiment, options)
     if isinstance(settings, str):
         print(f"ballplate lengths: {settings}", file=sys.stderr)
         return WRONG_USAGE
-    found = length_map(experiment, settings)
-    count = int(found.whole.count[0])
+    count = math.comb(math.prod(settings.grid), 2)
     if options.pairs is not None and count > MOST_PAIRS:
         told = f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make --grid coarser"
         print(f"ballplate lengths: {told}", file=sys.stderr)
         return WRONG_USAGE
+    with progress(options) as shown:
+        found = length_map(experiment, settings, shown.show)
+    writers: dict[Path, Writer] = {}
+    if options.csv is not None:
+        writers[options.csv] = _of_lines(point_csv(found))
+    if options.pairs is not None:
+        writers[options.pairs] = _of_lines(pair_csv(experiment, settings))
+    if options.plot is not None:
+        from ..report.lengths import draw_lengths
+
+        writers[options.plot] = partial(draw_lengths, found)
+    is_written = write_outputs(writers, options.force)
     if options.json:
         print_json([length_data(experiment.label, experiment.title, found)])
     else:
         print_lines(length_lines(f"{experiment.label}: {experiment.title}", found))
-    is_written = options.csv is None or _write(options.csv, point_csv(found))
-    is_written &= options.pairs is None or _write(options.pairs, pair_csv(experiment, settings))
-    if options.plot is not None:
-        from ..report.lengths import draw_lengths
-
-        is_written &= draw(lambda path: draw_lengths(found, path), options.plot)
     if not is_written:
         return BAD_FILE
     is_missed = options.fail and not found.is_met
@@ -115,13 +123,11 @@ def run(options: Namespace) -> int:
 
 def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
     """What was asked for, or why it cannot be."""
-    import math
+    from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
+    from ballplate.simulator.inputs.settings import hint
 
-    from simulator.quantities import QuantityError, parse_length_function
-    from simulator.settings import hint
-
-    from ..lengths import MOST_POINTS, Settings
-    from ..tasks import expansion
+    from ..length_map.length_map import MOST_POINTS, Settings
+    from ..uncertainty.tasks import expansion
 
     try:
         stated = None if experiment.target_accuracy is None else experiment.target_accuracy.stated
@@ -139,20 +145,10 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
     probe = options.probe or experiment.evaluation.probe
     if probe not in experiment.probes:
         return f'unknown probe "{probe}"; {hint(probe, experiment.probes)}'
-    named = [path.resolve() for path in (options.csv, options.pairs, options.plot) if path is not None]
-    if len({*named, options.files[0].resolve()}) <= len(named):
-        return "two of --csv, --pairs, --plot and the experiment are the same file; name another"
     factor = experiment.coverage_factor
     expanded = options.coverage_factor or expansion(factor)
     return Settings(grid, probe, target, expanded, options.with_repeatability, factor)
 
 
-def _write(path: Path, lines: Iterable[str]) -> bool:
-    """Write lines; False after saying why not on standard error."""
-    try:
-        with path.open("w", encoding="utf-8") as stream:
-            stream.writelines(f"{line}\n" for line in lines)
-    except OSError as error:
-        print(f"{path}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
-        return False
-    return True
+def _of_lines(lines: Iterable[str]) -> Writer:
+    return text_writer(lambda stream: stream.writelines(f"{line}\n" for line in lines))

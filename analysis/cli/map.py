@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import count, draw, picture, print_json, print_lines
+from .common import add_picture, count, print_json, print_lines
+from .outputs import Writer, add_force, write_outputs
 
 if TYPE_CHECKING:
-    from simulator.machines.description import Three
-    from simulator.machines.protocol import Array
+    from ballplate.simulator.machines.description import Three
+    from ballplate.simulator.machines.protocol import Array
 
-    from ..volumetric import AlongAxis, Volumetric
+    from ..volumetric.volumetric_errors import AlongAxis, Volumetric
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -44,9 +46,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     where.add_argument("--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX")
     parser.add_argument("--points", metavar="N", type=_points, help="points along the line, at least 2; default 21")
-    parser.add_argument(
-        "--plot", metavar="FILE", type=picture, help="draw it as well, in three dimensions or along the line or axis"
-    )
+    add_picture(parser, "--plot", help="draw it as well, in three dimensions or along the line or axis")
+    add_force(parser)
     parser.add_argument(
         "--magnification", metavar="N", type=count, help="of errors in the drawing of the grid; default: as fits"
     )
@@ -58,7 +59,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _grid(text: str) -> tuple[int, int, int]:
-    from ..volumetric import MOST_POINTS
+    from ..volumetric.volumetric_errors import MOST_POINTS
 
     parts = [part.strip() for part in text.split(",")]
     if len(parts) == 3 and all(part.isascii() and part.isdigit() and len(part) < 8 for part in parts):
@@ -71,7 +72,7 @@ def _grid(text: str) -> tuple[int, int, int]:
 
 
 def _points(text: str) -> int:
-    from ..volumetric import MOST_POINTS
+    from ..volumetric.volumetric_errors import MOST_POINTS
 
     found = count(text)
     if not 2 <= found <= MOST_POINTS:
@@ -80,7 +81,7 @@ def _points(text: str) -> int:
 
 
 def _line(text: str) -> dict[str, float] | tuple[Three, Three]:
-    from simulator.experiment.error_tables import LineError, parse_line, parse_point
+    from ballplate.simulator.experiment.error_tables import LineError, parse_line, parse_point
 
     try:
         start, to, end = text.partition(" to ")
@@ -100,19 +101,15 @@ def _line(text: str) -> dict[str, float] | tuple[Three, Three]:
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
     import numpy as np
+    from ballplate.simulator.experiment.machine_file import load_machine
+    from ballplate.simulator.inputs.messages import Message
 
-    from simulator.experiment.machine_file import load_machine
-    from simulator.experiment.messages import Message
-
-    from ..volumetric import Volumetric, along_axes
+    from ..volumetric.volumetric_errors import Volumetric, along_axes
 
     doubts: list[Message] = []
     machine = load_machine(options.file, doubts)
     for doubt in doubts:
         print(f"warning: {doubt}", file=sys.stderr)
-    if options.plot is not None and options.plot.resolve() == options.file.resolve():
-        print(f"ballplate map: --plot {options.plot} is the machine file itself; name another", file=sys.stderr)
-        return WRONG_USAGE
     drawn = options.plot is not None and options.line is None and options.error is None
     if options.magnification is not None and not drawn:
         print("ballplate map: --magnification is for the drawing of the grid; leave it out", file=sys.stderr)
@@ -121,7 +118,7 @@ def run(options: Namespace) -> int:
         print("ballplate map: --points is for --line; leave it out", file=sys.stderr)
         return WRONG_USAGE
     if options.error is not None:
-        from ..volumetric_tables import why_not_along
+        from ..volumetric.volumetric_tables import why_not_along
 
         every = {one.error.name: one for one in along_axes(machine)}
         if options.error not in every:
@@ -144,34 +141,43 @@ def run(options: Namespace) -> int:
 
 def _of_one(found: AlongAxis, options: Namespace) -> int:
     from ..report.volumetric import draw_along
-    from ..volumetric_tables import along_csv, along_data, along_lines
+    from ..volumetric.volumetric_tables import along_csv, along_data, along_lines
 
+    status = _drawn(options, partial(draw_along, found))
     if options.format == "json":
         print_json([along_data(found)])
     else:
         print_lines(along_lines(found) if options.format == "text" else list(along_csv(found)))
-    return _drawn(options, lambda path: draw_along(found, path))
+    return status
 
 
 def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace) -> int:
     from ..report.volumetric import draw_line
-    from ..volumetric import between
-    from ..volumetric_tables import error_csv, error_data, error_lines, length_data, length_line, machine_data
+    from ..volumetric.volumetric_errors import between
+    from ..volumetric.volumetric_tables import (
+        error_csv,
+        error_data,
+        error_lines,
+        length_data,
+        length_line,
+        machine_data,
+    )
 
     found = machine.errors(between(start, end, options.points or POINTS))
     length = machine.lengths(start[None], end[None])
+    status = _drawn(options, partial(draw_line, found))
     if options.format == "json":
         print_json([{**machine_data(machine), "length": length_data(length)[0], "line": error_data(found)}])
     elif options.format == "csv":
         print_lines(list(error_csv(found)))
     else:
         print_lines([*error_lines(found), length_line(length)])
-    return _drawn(options, lambda path: draw_line(found, path))
+    return status
 
 
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
     from ..report.volumetric import draw_grid
-    from ..volumetric_tables import (
+    from ..volumetric.volumetric_tables import (
         diagonal_data,
         diagonal_lines,
         error_csv,
@@ -183,6 +189,7 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
 
     found = machine.errors(machine.grid(options.grid))
     diagonals = machine.diagonals()
+    status = _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
     if options.format == "json":
         data = {**machine_data(machine), "diagonals": diagonal_data(diagonals), "grid": error_data(found)}
         print_json([data])
@@ -190,8 +197,9 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
         print_lines(list(error_csv(found)))
     else:
         print_lines([*machine_lines(machine), "", *diagonal_lines(diagonals), "", *error_lines(found)])
-    return _drawn(options, lambda path: draw_grid(found, diagonals, options.grid, options.magnification, path))
+    return status
 
 
-def _drawn(options: Namespace, draw_to) -> int:  # type: ignore[no-untyped-def]
-    return 0 if options.plot is None or draw(draw_to, options.plot) else BAD_FILE
+def _drawn(options: Namespace, writer: Writer) -> int:
+    """Draw what was asked for, before anything is printed that nobody may read to its end."""
+    return 0 if options.plot is None or write_outputs({options.plot: writer}, options.force) else BAD_FILE

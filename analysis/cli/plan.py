@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-import sys
-from argparse import ArgumentTypeError, Namespace
+from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from .common import (
-    add_file,
-    add_json,
-    count,
-    draw,
-    picture,
-    print_json,
-    print_lines,
-    refuse_existing,
-    seed,
-    single,
-    write,
-)
+from .common import add_file, add_json, add_picture, count, print_json, print_lines, seed, single
+from .outputs import Writer, add_force, add_output, text_writer, write_outputs
+from .telling import note
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
-    from ..planning.campaign import Campaign
     from ..planning.schedule import RunSheet
+    from ..planning.selection import Campaign
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 SHEETS = (".html", ".md", ".csv", ".txt")
@@ -47,7 +36,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         metavar="NAME",
         type=_criterion,
         default="U6",
-        help="U6 (default: average), U6-maximum, U5, U5-maximum, tasks, tasks-maximum, A, D, E or condition",
+        action=_Criterion,
     )
     budget = parser.add_argument_group("budget")
     budget.add_argument("--hours", metavar="H", type=_hours, help="of laboratory time, with changes between positions")
@@ -74,19 +63,40 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="a design chosen from this pool before, to compare with and go on from; default: the positions as drawn",
     )
     output = parser.add_argument_group("output")
-    output.add_argument("-o", "--output", metavar="YAML", type=Path, help="write the choice as an experiment file")
-    output.add_argument(
-        "--sheet", metavar="FILE", type=_sheet, help="write the run sheet: .html to print, .md, .csv or .txt"
+    add_output(output, "-o", "--output", metavar="YAML", help="write the choice as an experiment file")
+    add_output(
+        output,
+        "--sheet",
+        metavar="FILE",
+        type=_sheet,
+        help="write the run sheet: .html to print, .md, .csv or .txt",
     )
     output.add_argument("--curve", action="store_true", help="plan for smaller and larger budgets as well")
-    output.add_argument("--plot", metavar="FILE", type=picture, help="draw the choice, its bound, gains, and the curve")
-    output.add_argument("--force", action="store_true", help="overwrite files that there are already")
+    add_picture(output, "--plot", help="draw the choice, its bound, gains, and the curve")
+    add_force(output)
     add_json(parser)
     parser.add_argument("--seed", type=seed, default=1, help="of the random starts of the search; default 1")
     parser.add_argument(
         "--workers", metavar="N", type=count, help="processes that share the work; default: one for each processor"
     )
     parser.set_defaults(run=run)
+
+
+class _Criterion(Action):
+    """Loads the names of all criteria only where help is printed."""
+
+    def __call__(self, parser: ArgumentParser, options: Namespace, value: Any, option: str | None = None) -> None:
+        setattr(options, self.dest, value)
+
+    @property
+    def help(self) -> str:
+        from ..planning.criteria import NAMES
+
+        return f"{NAMES[0]} (default: average), {', '.join(NAMES[1:-1])} or {NAMES[-1]}"
+
+    @help.setter
+    def help(self, text: str | None) -> None:
+        pass
 
 
 def _criterion(text: str) -> str:
@@ -115,23 +125,18 @@ def _sheet(text: str) -> Path:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
-    from simulator.experiment.load import load
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.inputs.messages import ExperimentError, Message
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
     from ..planning.done import done_candidates
     from ..planning.earlier import earlier_choice
     from ..planning.offer import offer
-    from ..planning.schedule import run_sheet
-    from ..planning.tables import campaign_data, campaign_lines
-    from ..processes import processors
+    from ..running.processes import processors
+    from .excerpts import print_errors
+    from .progress import progress
 
-    if not options.force:
-        refuse_existing(options.output, options.sheet)
-    elif options.output is not None and options.output.resolve() == options.files[0].resolve():
-        text = "is the file that the pool stands in; name another"
-        raise ExperimentError([Message(str(options.output), 0, 0, "", text)])
     experiment = single(options, planning=True)
     offered = None if experiment.pool is None else offer(experiment.pool)
     messages: list[Message] = []
@@ -159,25 +164,28 @@ def run(options: Namespace) -> int:
         seconds = None if options.hours is None else HOUR * options.hours
         budget = Budget(seconds, options.readings, options.positions)
     request = Request(options.criterion, budget, options.curve, options.seed)
-    found = campaign(experiment, request, offered, earlier, options.workers or processors(), _report)
-    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
+    with progress(options) as shown:
+        found = campaign(experiment, request, offered, earlier, options.workers or processors(), shown.show)
+    sheet = found.sheet
+    try:
+        is_written = _written(found, sheet, options)
+    except ExperimentError as error:
+        # What took so long to find is told nevertheless.
+        print_errors(error.messages, options)
+        is_written = False
     if options.json:
-        print_json([campaign_data(found, sheet)])
+        print_json([found.to_dict()])
     else:
-        print_lines(campaign_lines(found, sheet))
-    if not _written(found, sheet, options):
+        print_lines(found.lines())
+    if not is_written:
         return BAD_FILE
     is_full = found.plan.verdict.deficiency == found.left_open
     return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
 
 
-def _report(step: str) -> None:
-    if sys.stderr is not None and sys.stderr.isatty():
-        print(f"{step} ...", file=sys.stderr, flush=True)
-
-
 def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
-    """Write what was asked for; False if a picture could not be drawn."""
+    """Write what was asked for; False if something cannot be written."""
+    writers: dict[Path, Writer] = {}
     if options.output is not None:
         from ..planning.experiment_file import experiment_text
 
@@ -186,18 +194,18 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         )
         deficiency = found.left_open or None
         text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent, None, deficiency)
-        write(options.output, text, options.force)
+        writers[options.output] = text_writer(lambda stream: stream.write(text))
     if options.sheet is not None:
-        write(options.sheet, _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet), options.force)
-    # Numbered as on the run sheet.
-    in_order = replace(found, chosen=sheet.chosen)
-    return options.plot is None or draw(lambda path: _draw(in_order, path), options.plot)
-
-
-def _draw(found: Campaign, path: Path) -> None:
-    from ..report.campaign import draw_campaign
-
-    draw_campaign(found, path)
+        told = _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet)
+        writers[options.sheet] = text_writer(lambda stream: stream.write(told))
+    if options.plot is not None:
+        # Numbered as on the run sheet.
+        writers[options.plot] = replace(found, chosen=sheet.chosen).plot
+    is_written = write_outputs(writers, options.force)
+    for path in (options.output, options.sheet):
+        if is_written and path is not None:
+            note(options, f"{path} written")
+    return is_written
 
 
 def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:

@@ -1,52 +1,79 @@
-"""How far a long run has come, on standard error: a bar on a terminal, plain lines now and then elsewhere."""
+"""How far a long step has come, on standard error: a bar on a terminal, plain lines now and then elsewhere."""
 
 from __future__ import annotations
 
-import shutil
 import sys
 import time
-from dataclasses import dataclass, field
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-# Seconds between two reports.
-OFTEN, SELDOM = 0.1, 5.0
+if TYPE_CHECKING:
+    from .bar import Bar
+
+# Seconds between two lines where there is no terminal.
+LINE_INTERVAL = 5.0
 
 
 @dataclass
-class ProgressBar:
-    """Reports work done of work wanted, with rate and time left. `what` is counted."""
+class Progress:
+    """Shows one step after the other; `what` is counted, which is also what tells steps apart."""
 
-    what: str
-    started: float = field(default_factory=time.monotonic)
-    last: float = field(default_factory=time.monotonic)
-    drawn: bool = False
+    is_quiet: bool = False
+    is_verbose: bool = False
+    what: str = ""
+    done: int = 0
+    wanted: int = 0
+    started: float = 0.0
+    last: float = 0.0
+    bar: Bar | None = None
 
-    def show(self, done: int, wanted: int, remark: str = "", before: int = 0) -> None:
-        """Report, unless the last report is recent; the rate leaves out what was done `before`."""
-        if sys.stderr is None:
+    def show(self, what: str, done: int, wanted: int, remark: str = "", before: int = 0) -> None:
+        """Report work done of work wanted; the time left does not count what was done `before`."""
+        if what != self.what:
+            self.close()
+            self.what, self.started, self.last = what, time.monotonic(), time.monotonic()
+        self.done, self.wanted = done, wanted
+        if self.is_quiet or sys.stderr is None:
             return
-        now = time.monotonic()
-        is_terminal = sys.stderr.isatty()
-        due = now - self.last >= (OFTEN if is_terminal else SELDOM)
-        if not due:
-            return
-        self.last = now
-        rate = (done - before) / max(now - self.started, 1e-9)
-        left = duration((wanted - done) / rate) if done > before else "?"
-        text = f"{done}/{wanted} {self.what}, {rate:.3g}/s, {left} left{f', {remark}' if remark else ''}"
-        if not is_terminal:
-            print(text, file=sys.stderr, flush=True)
-            return
-        room = shutil.get_terminal_size().columns - len(text) - 4
-        if room >= 5:
-            filled = round(room * min(done / max(wanted, 1), 1.0))
-            text = f"[{'#' * filled}{'.' * (room - filled)}] {text}"
-        print(f"\r\x1b[K{text[: shutil.get_terminal_size().columns - 1]}", end="", file=sys.stderr, flush=True)
-        self.drawn = True
+        if sys.stderr.isatty():
+            self._draw(done, wanted, remark, before)
+        elif time.monotonic() - self.last >= LINE_INTERVAL:
+            from .bar import line
+
+            self.last = time.monotonic()
+            print(line(what, done, wanted, before, self.last - self.started, remark), file=sys.stderr, flush=True)
+
+    def _draw(self, done: int, wanted: int, remark: str, before: int) -> None:
+        # Loaded only where it is seen.
+        from .bar import Bar, width
+
+        if self.bar is None:
+            self.bar = Bar(self.what, wanted, before)
+        self.bar.total, self.bar.ncols = wanted, width()
+        self.bar.set_postfix_str(remark, refresh=False)
+        self.bar.update(done - self.bar.n)
 
     def close(self) -> None:
-        """Take the bar away."""
-        if self.drawn:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        """Take the bar away, as the step has ended, and tell how long it took where that is asked for."""
+        if self.bar is not None:
+            self.bar.close()
+        if self.is_verbose and self.what:
+            elapsed = time.monotonic() - self.started
+            print(f"{self.done} of {self.wanted} {self.what}: {elapsed:.3g} s", file=sys.stderr)
+        self.what, self.bar = "", None
+
+
+@contextmanager
+def progress(options: Namespace) -> Iterator[Progress]:
+    """What shows the steps of a command, for as long as they take."""
+    shown = Progress(options.quiet, options.verbose)
+    try:
+        yield shown
+    finally:
+        shown.close()
 
 
 def duration(seconds: float) -> str:

@@ -51,26 +51,28 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
-    from simulator.quantities import QuantityError, parse_length_function
+    from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
 
-    from ..goals import GoalError, parse_goal
-    from ..reach.search import reach
-    from ..reach.tables import reach_data, reach_lines
-    from ..reach.unknowns import NotVariableError
+    from ..requirements.goals import GoalError, parse_goal
+    from ..requirements.search import reach
+    from ..requirements.unknowns import NotVariableError
+    from .progress import progress
 
     try:
         goal = parse_goal(options.goal, options.share)
         if options.target is not None:
             parse_length_function(options.target)
         names = tuple(dict.fromkeys(options.by or UNKNOWNS))
-        found = reach(single(options), goal, names, options.artefact, options.calibration, options.target)
+        experiment = single(options)
+        with progress(options) as shown:
+            found = reach(experiment, goal, names, options.artefact, options.calibration, options.target, shown.show)
     except (GoalError, NotVariableError, QuantityError) as error:
         print(f"ballplate reach: {error}", file=sys.stderr)
         return WRONG_USAGE
     if options.json:
-        print_json([reach_data(found)])
+        print_json([found.to_dict()])
     else:
-        print_lines(reach_lines(found))
+        print_lines(found.lines())
     if options.fail:
         return 0 if found.present.is_met else 1
     met = [one.is_met for one in found.answers]

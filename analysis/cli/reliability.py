@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentTypeError, Namespace
-from pathlib import Path
+from functools import partial
 
 from .common import add_file, add_json
+from .outputs import add_force, add_output, text_writer, write_outputs
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -36,7 +37,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="test against the scatter of the residuals, or the stated uncertainties; default: what the file says",
     )
     parser.add_argument("--all", action="store_true", help="list every event, not only the worst of a kind")
-    parser.add_argument("--csv", metavar="FILE", type=Path, help="write a row for every observation")
+    add_output(parser, "--csv", metavar="FILE", help="write a row for every observation")
+    add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -54,15 +56,13 @@ def _share(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Tell the reliability of all experiments of the files."""
-    from ..reliability.study import reliability
-    from ..reliability.tables import reliability_data, reliability_lines, write_observations
+    from ..gross_errors.redundancy import reliability
+    from ..gross_errors.reliability import write_observations
     from .common import experiments, print_json, print_lines
+    from .progress import progress
 
     if options.power <= options.false_alarm:
         print("ballplate reliability: --power must be above --false-alarm; any test has that much", file=sys.stderr)
-        return WRONG_USAGE
-    if options.csv is not None and options.csv.resolve() in [path.resolve() for path in options.files]:
-        print(f"ballplate reliability: --csv {options.csv} is the experiment file; name another", file=sys.stderr)
         return WRONG_USAGE
     chosen = experiments(options)
     if options.csv is not None and len(chosen) > 1:
@@ -70,21 +70,17 @@ def run(options: Namespace) -> int:
         text = f"--csv writes the table of one experiment; choose one with --variant: {names}"
         print(f"ballplate reliability: {text}", file=sys.stderr)
         return WRONG_USAGE
-    found = []
+    found, is_written = [], True
     for number, experiment in enumerate(chosen):
-        result = reliability(experiment, options.false_alarm, options.power, options.sigma)
-        if options.json:
-            found.append(reliability_data(result))
-        else:
-            print_lines([*([""] if number else []), *reliability_lines(result, options.all)])
+        with progress(options) as shown:
+            result = reliability(experiment, options.false_alarm, options.power, options.sigma, shown.show)
         if options.csv is not None:
-            try:
-                with options.csv.open("w", encoding="utf-8", newline="") as stream:
-                    write_observations(stream, result)
-            except OSError as error:
-                text = f"cannot be written ({error.strerror or error}); check the folder"
-                print(f"{options.csv}: {text}", file=sys.stderr)
-                return BAD_FILE
+            writer = text_writer(partial(write_observations, result=result))
+            is_written = write_outputs({options.csv: writer}, options.force)
+        if options.json:
+            found.append(result.to_dict())
+        else:
+            print_lines([*([""] if number else []), *result.lines(options.all)])
     if options.json:
         print_json(found)
-    return 0
+    return 0 if is_written else BAD_FILE

@@ -7,7 +7,8 @@ from argparse import ArgumentParser, Namespace
 from contextlib import closing
 from pathlib import Path
 
-from .export import add_store, warn_of_other_methods
+from .export import add_store, warn_of_damage, warn_of_other_methods
+from .outputs import PAGE, add_force, add_output, write_outputs
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -19,10 +20,19 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "report",
         help="write a sweep's results as an HTML page, or its tables",
         description="Write what a sweep has found as one HTML page that needs no network: tables, plots, rank, the "
-        "best and the worst design. With --format text, markdown, csv or latex the tables alone.",
+        "best and the worst design. With --format text, markdown, csv or latex the tables alone. Of a damaged store it "
+        "tells of the cells that can be read; the exit status then is 3.",
     )
     add_store(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="page or tables; default, and -: the screen")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        takes_screen=True,
+        help="page or tables; default, and -: the screen",
+    )
+    add_force(parser)
     parser.add_argument(
         "--format",
         choices=("html", "text", "markdown", "csv", "latex"),
@@ -39,12 +49,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 def run(options: Namespace) -> int:
     """Write the report."""
     from ..report.results import read_results
-    from ..sweeps.store import StoreError, chosen_sweep, open_store
+    from ..sweeps.store import StoreError, open_store
 
     output: Path | None = options.output
-    if output is not None and output.resolve() == options.store.resolve():
-        print(f"ballplate report: -o {output} is the store itself; name another file", file=sys.stderr)
-        return WRONG_USAGE
     if str(output) == "-":
         output = None
     suffix = "" if output is None else output.suffix.lower()
@@ -53,34 +60,32 @@ def run(options: Namespace) -> int:
         print(f"ballplate report: {output} should end in one of {endings}; or state --format", file=sys.stderr)
         return WRONG_USAGE
     form = options.format or SUFFIXES.get(suffix, "html")
+    if form == "html" and PAGE.is_missing:
+        print(f"ballplate report: {PAGE.told}", file=sys.stderr)
+        return BAD_FILE
     try:
         with closing(open_store(options.store)) as store:
             results = read_results(store, options.sweep)
-            warn_of_other_methods(store, chosen_sweep(store, options.sweep))
+            is_damaged = warn_of_damage(store.path, results.found, len(results.cells))
+            warn_of_other_methods(store.path, results.found.keys)
             if form == "html":
                 from ..report.page import page
+                from .progress import progress
 
-                text = page(store, results, options.run_modules)
+                with progress(options) as shown:
+                    text = page(store, results, options.run_modules, shown.show)
             else:
-                from ..report.formats import FORMATS
                 from ..report.tables import report_tables
+                from ..results.formats import FORMATS
 
                 text = FORMATS[form](results.title, report_tables(results))
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE
-    except ImportError as error:
-        if error.name is None or error.name.partition(".")[0] not in ("jinja2", "markupsafe", "matplotlib"):
-            raise
-        told = "a page needs jinja2 and matplotlib; install them with: python -m pip install 'ballplate[report]'"
-        print(f"ballplate report: {told}", file=sys.stderr)
-        return BAD_FILE
     if output is None:
         sys.stdout.write(text)
-        return 0
-    try:
-        output.write_bytes(text.encode("utf-8", "replace"))
-    except OSError as error:
-        print(f"{output}: cannot be written ({error.strerror or error}); check the folder", file=sys.stderr)
+        return BAD_FILE if is_damaged else 0
+    content = text.encode("utf-8", "replace")
+    if not write_outputs({output: lambda path: path.write_bytes(content)}, options.force):
         return BAD_FILE
-    return 0
+    return BAD_FILE if is_damaged else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from .common import count
+from .common import trial_count
 
 WRONG_USAGE = 2
 
@@ -39,7 +39,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         metavar="FOLDER",
         type=Path,
         default=None,
-        help="where the shipped designs are; default: designs/npl or designs/certified below the current folder",
+        help="where the shipped designs are; default: those that come with ballplate",
     )
     parser.add_argument(
         "--results",
@@ -49,7 +49,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument("--quick", action="store_true", help="leave out what needs synthetic data sets (6.2.7)")
     parser.add_argument(
-        "--trials", metavar="N", type=count, default=100, help="number of data sets for 6.2.7; default 100"
+        "--trials", metavar="N", type=trial_count, default=100, help="number of data sets for 6.2.7; default 100"
     )
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print a JSON object in metres and radians")
@@ -67,14 +67,15 @@ def run(options: Namespace) -> int:
         print("ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr)
         return WRONG_USAGE
 
-    from simulator.settings import hint
+    from ballplate.designs import shipped
+    from ballplate.simulator.inputs.settings import hint
 
     from ..reproduction.compare import reproduce
     from ..reproduction.published import npl
+    from ..reproduction.reproduction_tables import reproduction_data, reproduction_lines, reproduction_markdown
     from ..reproduction.shipped import Shipped
-    from ..reproduction.tables import reproduction_data, reproduction_lines, reproduction_markdown
     from .common import print_json, print_lines
-    from .progress import ProgressBar
+    from .progress import progress
 
     document = npl()
     known = document.statements.sections
@@ -82,23 +83,9 @@ def run(options: Namespace) -> int:
         if name not in known:
             print(f'ballplate reproduce: no experiment "{name}"; {hint(name, known)}', file=sys.stderr)
             return WRONG_USAGE
-    bars: dict[str, ProgressBar] = {}
-
-    def report(what: str, done: int, wanted: int) -> None:
-        if what not in bars:
-            bars[what] = ProgressBar(what)
-        bars[what].show(done, wanted)
-        if done == wanted:
-            bars[what].close()
-
     trials = None if options.quick else options.trials
-    try:
-        found = reproduce(
-            document, Shipped(options.designs or Path("designs", "npl")), options.experiment, trials, report
-        )
-    finally:
-        for bar in bars.values():
-            bar.close()
+    with progress(options) as shown:
+        found = reproduce(document, Shipped(options.designs or shipped("npl")), options.experiment, trials, shown.show)
     if options.json:
         print_json([reproduction_data(found)])
     elif options.markdown:
@@ -112,26 +99,27 @@ def _certified(options: Namespace) -> int:
     """Score answers to certified problems; 1 if a rank or count is wrong, or an answer is missing."""
     import sys
 
+    from ballplate.designs import shipped
+
     from ..certified.answers import answers
     from ..certified.problems import certified_problems, read_results
     from ..certified.score import all_right, scores
-    from ..certified.tables import score_data, score_lines
+    from ..certified.score_tables import score_data, score_lines
     from .common import print_json, print_lines
-    from .progress import ProgressBar
+    from .progress import progress
 
     if options.quick or options.markdown:
         print("ballplate reproduce: --quick and --markdown go with npl only; leave them out", file=sys.stderr)
         return WRONG_USAGE
-    problems = certified_problems(options.designs or Path("designs", "certified"), options.experiment)
+    problems = certified_problems(options.designs or shipped("certified"), options.experiment)
     if options.results:
         results = read_results(options.results, problems)
     else:
         results = {}
-        bar = ProgressBar("problems")
-        for done, problem in enumerate(problems):
-            bar.show(done, len(problems))
-            results[problem.name] = answers(problem)
-        bar.close()
+        with progress(options) as shown:
+            for done, problem in enumerate(problems):
+                shown.show("problems", done, len(problems))
+                results[problem.name] = answers(problem)
     found = [one for problem in problems for one in scores(problem.name, problem.answers, results.get(problem.name))]
     if options.json:
         print_json([score_data(found, results)])

@@ -6,14 +6,14 @@ import sys
 from argparse import ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
-from .common import add_file, add_json, count, percentage, seed
+from .common import add_file, add_json, count, percentage, seed, trial_count
 
 if TYPE_CHECKING:
-    from simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment.model import Experiment
 
-    from ..montecarlo.study import Trials
+    from ..montecarlo.experiments import Trials
 
-WRONG_USAGE, INTERRUPTED = 2, 130
+WRONG_USAGE = 2
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -39,15 +39,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _trial_count(text: str) -> int:
-    if count(text) < 2:
+    found = trial_count(text)
+    if found < 2:
         raise ArgumentTypeError(f'one data set has no scatter; ask for 2 at least, not "{text}"')
-    return count(text)
+    return found
 
 
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
-    from ..study import plan
-    from ..tables import plan_data, plan_lines
+    from ..results.study import predict
     from .common import experiments, print_json, print_lines
 
     plans, found, interrupted = [], [], False
@@ -55,44 +55,46 @@ def run(options: Namespace) -> int:
     if not with_trials and (options.seed is not None or options.workers is not None):
         print("ballplate run: --seed and --workers have a meaning with --trials or --until only", file=sys.stderr)
         return WRONG_USAGE
+    kept = options.interruption.kept
     for experiment in experiments(options):
-        plans.append(plan(experiment, with_scale=True))
+        plans.append(predict(experiment, with_scale=True))
         if not options.json:
-            print_lines([*([""] if len(plans) > 1 else []), *plan_lines(plans[-1])])
-        data: dict[str, Any] = plan_data(plans[-1])
+            print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
+        data: dict[str, Any] = plans[-1].to_dict()
         if with_trials:
-            from ..montecarlo.tables import trials_data, trials_lines
+            from ..montecarlo.comparison_tables import trials_data, trials_lines
 
             done = _trials(experiment, options)
             data["monte_carlo"] = trials_data(done)
             if not options.json:
                 print_lines(["", *trials_lines(done)])
+                options.interruption.kept = kept
             interrupted = done.outcome is not None and done.outcome.interrupted
         found.append(data)
         if interrupted:
-            print("interrupted: the figures are those of the data sets done so far", file=sys.stderr)
+            print(f"{options.interruption.word}: the figures are those of the data sets done so far", file=sys.stderr)
             break
     if options.json:
         print_json(found)
     if interrupted:
-        return INTERRUPTED
+        return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
-    from ..montecarlo.study import trials
+    from ..montecarlo.experiments import trials
     from ..montecarlo.trials import MOST_TRIALS, Progress
-    from ..processes import processors
-    from .progress import ProgressBar
+    from ..running.processes import processors
+    from .progress import progress
 
-    bar = ProgressBar("data sets")
+    with progress(options) as shown:
 
-    def report(progress: Progress) -> None:
-        options.answer_interruption()
-        remark = f"accurate to {100 * progress.accuracy:.2g} %" if progress.accuracy < 1.0 else ""
-        bar.show(progress.done, progress.wanted, remark)
+        def report(now: Progress) -> None:
+            options.interruption.answer()
+            options.interruption.kept = lambda: f"the figures of the {now.done} data sets done are lost"
+            remark = f"accurate to {100 * now.accuracy:.2g} %" if now.accuracy < 1.0 else ""
+            shown.show("data sets", now.done, now.wanted, remark)
 
-    try:
         return trials(
             experiment,
             options.trials or MOST_TRIALS,
@@ -101,5 +103,3 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
             options.workers or processors(),
             report,
         )
-    finally:
-        bar.close()

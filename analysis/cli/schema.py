@@ -15,7 +15,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "complete and check as you type.",
     )
     parser.add_argument("files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, prints_data=True)
 
 
 def run(options: Namespace) -> int:
@@ -25,7 +25,7 @@ def run(options: Namespace) -> int:
 
 
 def _experiment() -> dict[str, Any]:
-    from simulator.experiment.schema import schema
+    from ballplate.simulator.experiment.schema import schema
 
     return schema()
 
@@ -37,7 +37,7 @@ def _sweep() -> dict[str, Any]:
 
 
 def _machine() -> dict[str, Any]:
-    from simulator.experiment.machine_sections import machine_schema
+    from ballplate.simulator.experiment.machine_sections import machine_schema
 
     return machine_schema()
 

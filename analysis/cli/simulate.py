@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 from .common import add_file, seed
+from .outputs import add_force, add_output, text_writer, write_outputs
+from .telling import note
+
+BAD_FILE = 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -18,77 +24,64 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "same readings, with and without --certificate.",
     )
     add_file(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="CSV", required=True, type=Path, help="file to write, or - for standard output"
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="CSV",
+        required=True,
+        takes_screen=True,
+        help="file to write, or - for standard output",
     )
-    parser.add_argument(
+    add_output(
+        parser,
         "--certificate",
         metavar="CSV",
-        type=Path,
+        takes_screen=True,
         help="also write values of certificates, priors and probe offsets, drawn about what is read, for "
         "fit --certificate",
     )
     parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
     parser.add_argument("--exact", action="store_true", help="leave all noise out; artefacts are as drawn")
-    parser.add_argument("--force", action="store_true", help="overwrite the output file if there is one")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: Namespace) -> int:
     """Write one set of readings."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from simulator.certificates import certified_values, drawn_values, with_values, write_certificate
-    from simulator.experiment.load import message_at
-    from simulator.experiment.messages import ExperimentError, Message
-    from simulator.generate import (
-        NoReadingError,
-        exact_readings,
-        noisy_readings,
-        on_true_machine,
-        true_artefacts,
+    from ballplate.simulator.inputs.messages import ExperimentError, Message
+    from ballplate.simulator.readings.certificate_files import (
+        certified_values,
+        drawn_values,
+        with_values,
+        write_certificate,
     )
-    from simulator.layout import lay_out
-    from simulator.machines.truth import true_machine
-    from simulator.readings import write_readings
+    from ballplate.simulator.readings.reading_files import write_readings
+    from ballplate.simulator.readings.simulated import simulated_readings
 
-    from .common import single, write_all
+    from .common import single
 
     experiment = single(options)
     if options.certificate and not certified_values(experiment):
         text = "there is no certificate, prior or probe offset with an uncertainty; leave --certificate out"
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)])
-    design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
-    chosen = experiment.seed if options.seed is None else options.seed
-    generator = None if options.exact else np.random.default_rng(np.random.SeedSequence(chosen))
-    try:
-        if generator is None:
-            readings, x = exact_readings(on_truth, truth)
-        else:
-            truth = replace(truth, balls=true_artefacts(design, generator))
-            readings, x = noisy_readings(on_truth, truth, generator)
-    except NoReadingError as error:
-        text = f"{error}; state smaller ones"
-        raise ExperimentError([message_at(experiment.source, ("true_machine",), text)]) from None
-    writers = {options.output: lambda stream: write_readings(stream, design, readings, x)}
-    told = [f"{len(readings)} readings written to {options.output}"]
+    found = simulated_readings(experiment, options.seed, options.exact)
+    texts: dict[Path, Callable[[TextIO], None]] = {
+        options.output: lambda stream: write_readings(stream, found.design, found.readings, found.x)
+    }
+    told = [f"{len(found.readings)} readings written to {options.output}"]
     if options.certificate:
-        if options.certificate == options.output:
-            text = "is to have both readings and certificate; name two files"
-            raise ExperimentError([Message(str(options.certificate), 0, 0, "", text)])
-        values = drawn_values(experiment, design, truth, on_truth.model, generator)
-        how = "exact" if options.exact else f"drawn with seed {chosen}"
+        values = drawn_values(experiment, found.design, found.truth, found.model, found.generator)
+        how = "exact" if options.exact else f"drawn with seed {found.seed}"
         comment = f"certificate values of {experiment.label}, {how}, for fit --certificate"
-        writers[options.certificate] = lambda stream: write_certificate(
-            stream, with_values(experiment, values), comment
-        )
+        texts[options.certificate] = lambda stream: write_certificate(stream, with_values(experiment, values), comment)
         told.append(f"{len(values)} certificate values written to {options.certificate}")
-    write_all(writers, options.force)
-    for line, path in zip(told, writers, strict=True):
-        if str(path) != "-":
-            print(line, file=sys.stderr)
+    writers = {path: text_writer(write) for path, write in texts.items() if str(path) != "-"}
+    if not write_outputs(writers, options.force):
+        return BAD_FILE
+    for line, path in zip(told, texts, strict=True):
+        if path in writers:
+            note(options, line)
+        else:
+            texts[path](sys.stdout)
     return 0

@@ -7,17 +7,19 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .common import count, draw, picture, print_json, print_lines
+from .common import add_picture, count, print_json, print_lines
+from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 
 if TYPE_CHECKING:
-    from simulator.experiment.messages import ExperimentError
-    from simulator.splines.problems import SplineError
-    from simulator.splines.read import Column, Points
+    from ballplate.simulator.inputs.messages import ExperimentError
+    from ballplate.simulator.splines.problems import SplineError
+    from ballplate.simulator.splines.read import Column, Points
 
-    from ..curve import CurveSettings, Place
+    from ..error_curve.error_curve import CurveSettings, Place
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -90,16 +92,16 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     output = parser.add_argument_group("output")
     output.add_argument("--evaluate", metavar="PLACES", help='values there too, such as "10 mm, 12.5 mm"')
     output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
-    output.add_argument(
-        "--coefficients", metavar="FILE", type=Path, help="write the polynomials as CSV; - for the screen"
-    )
-    output.add_argument("--plot", metavar="FILE", type=picture, help="draw points and curve (.svg, .png or .pdf)")
-    output.add_argument(
-        "--whiskers",
+    add_output(
+        output,
+        "--coefficients",
         metavar="FILE",
-        type=picture,
-        help="draw errors as bars normal to the profile (.svg, .png or .pdf)",
+        takes_screen=True,
+        help="write the polynomials as CSV; - for the screen",
     )
+    add_picture(output, "--plot", help="draw points and curve (.svg, .png or .pdf)")
+    add_picture(output, "--whiskers", help="draw errors as bars normal to the profile (.svg, .png or .pdf)")
+    add_force(output)
     output.add_argument("--magnification", metavar="N", type=float, help="of the bars; default: one that suits")
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
     parser.set_defaults(run=run)
@@ -114,13 +116,12 @@ POWERS = "polynomials in the distance from the start of each piece (default), or
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
     import numpy as np
+    from ballplate.simulator.inputs.messages import in_one_line
+    from ballplate.simulator.splines.problems import SplineError
+    from ballplate.simulator.splines.read import choose_points, read_points
 
-    from simulator.experiment.messages import in_one_line
-    from simulator.splines.problems import SplineError
-    from simulator.splines.read import choose_points, read_points
-
-    from ..curve import fit_curve
-    from ..curve_tables import coefficients_csv, curve_data, curve_lines
+    from ..error_curve.curve_tables import coefficients_csv, curve_data, curve_lines
+    from ..error_curve.error_curve import fit_curve
     from ..report.curves import plot, whiskers
 
     everything = read_points(options.file, options.x, options.y)
@@ -140,37 +141,31 @@ def run(options: Namespace) -> int:
         where = np.array(at, dtype=float)
         curve.fit.values(where)
         lines = [] if options.json else curve_lines(curve, options.file.name, options.powers, where)
-        drawings: list[tuple[Path | None, Callable[[Path], None]]] = [
-            (options.plot, lambda path: plot(curve, path)),
-            (options.whiskers, lambda path: whiskers(curve, everything, path, options.magnification)),
-        ]
-        if not all(draw(drawing, path) for path, drawing in drawings if path is not None):
-            return BAD_FILE
+        writers: dict[Path, Writer] = {}
+        if options.plot is not None:
+            writers[options.plot] = partial(plot, curve)
+        if options.whiskers is not None:
+            writers[options.whiskers] = lambda path: whiskers(curve, everything, path, options.magnification)
+        polynomials = None if options.coefficients is None else coefficients_csv(curve, options.powers)
+        if polynomials is not None and str(options.coefficients) != "-":
+            writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
+        is_written = write_outputs(writers, options.force)
     except SplineError as error:
         raise _told(error, points.x_column, options.file) from None
-    if options.coefficients is not None and str(options.coefficients) != "-":
-        try:
-            options.coefficients.write_text(coefficients_csv(curve, options.powers), encoding="utf-8")
-        except OSError as error:
-            print(
-                f"{options.coefficients}: cannot be written ({error.strerror or error}); check the folder",
-                file=sys.stderr,
-            )
-            return BAD_FILE
     if options.json:
         print_json([curve_data(curve, str(options.file), options.powers, where)])
-    elif str(options.coefficients) == "-":
-        sys.stdout.write(coefficients_csv(curve, options.powers))
+    elif polynomials is not None and str(options.coefficients) == "-":
+        sys.stdout.write(polynomials)
     else:
         print_lines(lines)
-    return 0
+    return 0 if is_written else BAD_FILE
 
 
 def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
     """The problems with places in the unit of the abscissa."""
-    from simulator.experiment.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.messages import ExperimentError, Message
 
-    from ..curve_tables import shown
+    from ..error_curve.curve_tables import shown
 
     texts = [problem.told(lambda place: shown(place, column)) for problem in error.problems]
     return ExperimentError(Message(str(file), 0, 0, "", text) for text in texts)
@@ -181,10 +176,6 @@ def _check(options: Namespace, points: Points) -> None:
 
     :raises OptionError: there are such.
     """
-    outputs = [path for path in (options.plot, options.whiskers, options.coefficients) if path is not None]
-    resolved = [path.resolve() for path in outputs if str(path) != "-"]
-    if options.file.resolve() in resolved or len(set(resolved)) < len(resolved):
-        raise OptionError("two of the files are the same; name another")
     if options.whiskers is not None and points.places is None:
         raise OptionError("--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file")
     if options.whiskers is not None and points.y_column.kind != "length":
@@ -202,7 +193,7 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
 
     :raises OptionError: a value that is no length, angle or slope.
     """
-    from ..curve import EVERY, CurveSettings, Hold
+    from ..error_curve.error_curve import EVERY, CurveSettings, Hold
 
     x, y = points.x_column, points.y_column
     holds = []
@@ -244,13 +235,13 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
 
 
 def _parser(kind: str) -> Callable[[object], float]:
-    from simulator.quantities import parse_angle, parse_length
+    from ballplate.simulator.inputs.quantities import parse_angle, parse_length
 
     return parse_length if kind == "length" else parse_angle
 
 
 def _quantity(option: str, text: str, kind: str) -> float:
-    from simulator.quantities import QuantityError
+    from ballplate.simulator.inputs.quantities import QuantityError
 
     if text.strip() in ("0", "-0", "0.0"):
         return 0.0
@@ -285,7 +276,7 @@ def _place(option: str, text: str, column: Column) -> Place:
 
 def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> float:
     """A value of the error, or a slope as a unit of the error over one of the abscissa."""
-    from simulator.quantities import UNITS, QuantityError, metres_or_radians, parse_ratio
+    from ballplate.simulator.inputs.quantities import UNITS, QuantityError, metres_or_radians, parse_ratio
 
     if derivative == 0:
         return _quantity(option, text, y.kind)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..sweeps.model import Sweep
     from ..sweeps.store import Store
 
-WRONG_USAGE, BAD_FILE, INTERRUPTED = 2, 3, 130
+WRONG_USAGE, BAD_FILE = 2, 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -54,90 +54,70 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Run a sweep; 1 if cells have failed."""
-    from filelock import FileLock, Timeout
+    from ballplate.simulator.inputs.messages import in_one_line
 
     from ..sweeps.bundle import bundle_of
     from ..sweeps.cluster import ClusterError
     from ..sweeps.load import load_sweep
-    from ..sweeps.store import StoreError, open_store
+    from ..sweeps.running import OtherSweepError, writable_store
+    from ..sweeps.store_file import StoreError, is_same_file
 
     sweep = load_sweep(options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder))
     if options.dry_run:
         return _dry_run(sweep, options)
     bundle = bundle_of(sweep)
     path = options.store or options.file.with_suffix(".sqlite")
-    if path.resolve() in (options.file.resolve(), sweep.base.resolve()):
+    if any(is_same_file(path, file) for file in (options.file, sweep.base)):
         print(f"ballplate sweep: --store {path} is the sweep's own file; name another", file=sys.stderr)
         return WRONG_USAGE
     try:
-        with FileLock(f"{path}.lock", timeout=0):
-            store = open_store(path, create=True)
-            try:
-                return _run(sweep, bundle, store, options)
-            finally:
-                store.close()
-    except Timeout:
-        print(f"{path}: another process is computing into it; wait for it, or end it", file=sys.stderr)
+        with writable_store(path) as store:
+            return _run(sweep, bundle, store, options)
     except OSError as error:
-        print(f"{path}: cannot be written ({error.strerror}); check the folder and its permissions", file=sys.stderr)
-    except (StoreError, ClusterError) as error:
+        where = error.filename or path
+        text = f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
+        print(in_one_line(text), file=sys.stderr)
+    except (StoreError, ClusterError, OtherSweepError) as error:
         print(error, file=sys.stderr)
     return BAD_FILE
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ..sweeps.bundle import changes, definition
-    from ..sweeps.execute import run_sweep
+    from ballplate.simulator.inputs.messages import in_one_line
+
     from ..sweeps.local import ChangedError
-    from ..sweeps.store import add_sweep, of_other_methods, statuses, sweeps
-    from .progress import ProgressBar
+    from ..sweeps.running import compute_sweep, enter
+    from .progress import progress
 
-    new = definition(sweep, bundle)
-    stored = sweeps(store)
-    number = next((k for k, old in stored.items() if not changes(old, new)), None)
-    has_results = "done" in statuses(store).values()
-    if number is None and has_results and not options.beside:
-        print(f"{store.path}: holds another sweep; what has changed:", file=sys.stderr)
-        for line in changes(stored[max(stored)], new)[:20]:
-            print(f"  {line}", file=sys.stderr)
-        print("name another store with --store, or keep both in this one with --beside", file=sys.stderr)
-        return BAD_FILE
-    if number is None:
-        number = add_sweep(store, new, bundle.files)
-    for text in of_other_methods(store, number):
-        print(f"{store.path}: {text}, and computes these cells anew", file=sys.stderr)
-    bar = ProgressBar("cells")
-
-    def report(summary: Summary) -> None:
-        options.answer_interruption()
-        remark = ", ".join(
-            ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
-            + ([f"{summary.failed} failed"] if summary.failed else [])
-        )
-        bar.show(summary.done + summary.failed, summary.cells, remark, summary.before)
-
+    entered = enter(store, sweep, bundle, options.beside)
+    for remark in entered.remarks:
+        print(remark, file=sys.stderr)
+    options.interruption.kept = lambda: f"what is done is in {store.path}, and the same command goes on from there"
     try:
-        with _runner(sweep, bundle, options) as runner:
-            summary = run_sweep(store, number, sweep, runner, options.retry_failed, options.fail_fast, report)
+        with progress(options) as shown:
+
+            def report(summary: Summary) -> None:
+                options.interruption.answer()
+                remark = ", ".join(
+                    ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
+                    + ([f"{summary.failed} failed"] if summary.failed else [])
+                )
+                shown.show("cells", summary.done + summary.failed, summary.cells, remark, summary.before)
+
+            runner = _runner(sweep, bundle, options)
+            summary = compute_sweep(store, sweep, entered, runner, options.retry_failed, options.fail_fast, report)
         if summary.left:
-            options.answer_interruption()
+            options.interruption.answer()
     except ChangedError:
-        bar.close()
         text = "the files of the sweep have been changed while it ran; what is done is stored, start it again"
-        print(f"{options.file}: {text}", file=sys.stderr)
+        print(in_one_line(f"{options.file}: {text}"), file=sys.stderr)
         return BAD_FILE
-    except KeyboardInterrupt:
-        bar.close()
-        print(f"interrupted; what is done is in {store.path}, and the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
-    finally:
-        bar.close()
-    _tell(store, f" of sweep {number}" if len({*stored, number}) > 1 else "", number, summary)
+    _tell(store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary)
     return 1 if summary.failed or summary.left else 0
 
 
 def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
-    from ..processes import processors
+    from ..running.processes import processors
     from ..sweeps.cluster import cluster_runner
     from ..sweeps.local import local_runner
 
@@ -147,16 +127,20 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
 
 
 def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
+    from ballplate.simulator.inputs.messages import in_one_line
+
     from ..sweeps.store import results
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
     counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
-    print(f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}")
-    found = results(store, number)
+    told = f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}"
+    print(in_one_line(told))
+    found = results(store, number, summary.cells)
     versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:
-        print(f"{store.path}: the rows were computed with {len(versions)} different sets of versions", file=sys.stderr)
+        text = f"{store.path}: the rows were computed with {len(versions)} different sets of versions"
+        print(in_one_line(text), file=sys.stderr)
     if summary.failed:
         reasons: dict[str, list[int]] = {}
         for cell, status, reason in zip(found.cells.tolist(), found.statuses, found.reasons, strict=True):
@@ -170,7 +154,7 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    from ..processes import processors
+    from ..running.processes import processors
     from ..sweeps.estimate import seconds_of
     from .progress import duration
 

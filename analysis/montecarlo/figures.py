@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.montecarlo.reference import Reference
+from ballplate.simulator.montecarlo.reference import Reference
 
 from .tally import ACTUAL, COVERAGE, ESTIMATED, KNOWN, SPREAD, SYSTEMATIC, QuantityTally, Tally, factors
 from .targets import Target

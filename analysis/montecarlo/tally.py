@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from simulator.machines.protocol import Array
-from simulator.montecarlo.reference import Reference
-from simulator.montecarlo.replicates import Estimates
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.montecarlo.reference import Reference
+from ballplate.simulator.montecarlo.replicates import Estimates
 
 from .targets import Target
 

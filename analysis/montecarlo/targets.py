@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
+from ballplate.simulator.estimation.functions import (
+    Balls,
+    Coordinates,
+    Displacements,
+    Distances,
+    Parameters,
+    Places,
+    Points,
+    displacements,
+)
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import vector_from_rotation
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.montecarlo.reference import Reference
+from ballplate.simulator.montecarlo.replicates import Deviations
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.design import Integers, probe_offsets
-from simulator.estimation.covariance import Covariance, covariance
-from simulator.estimation.observations import offset_sensitivity
-from simulator.geometry.motions import vector_from_rotation
-from simulator.machines.protocol import Array
-from simulator.montecarlo.reference import Reference
-from simulator.montecarlo.replicates import Deviations
-from simulator.threads import single_threaded
+from ..uncertainty.pairs import pairs_of
+from ..uncertainty.quantities import QUANTITIES
 
 # Distances that are followed through all replicates; a sample of the pairs where there are more.
 MOST_PAIRS = 1000
@@ -39,46 +51,61 @@ class Target:
 
 @single_threaded
 def targets(shared: Reference) -> tuple[Target, ...]:
-    """The quantities of U1 to U6 that a design has; U3 only where the true machine is one of the fitted model's."""
-    design, start, truth = shared.design, shared.start, shared.truth
-    found = covariance(design, shared.factor, shared.spectrum)
-    result = [_balls(shared, found), _poses(shared, found)]
-    if truth.model == design.model:
-        result.append(_parameters(shared, found))
-    for artefact in np.flatnonzero(design.is_plate):
-        own = np.flatnonzero(design.ball_artefact == artefact)
-        if len(own) > 1:
-            result.append(_ball_distances(shared, found, own))
-    if len(design.points):
-        probe, layout = design.point_probe, shared.factor.layout
-        offsets = np.broadcast_to(probe_offsets(design, start)[probe], design.points.shape)
-        true_offsets = np.broadcast_to(probe_offsets(design, truth.state)[probe], design.points.shape)
-        corrected = design.points + design.model.error(design.points, start.a, offsets)
-        true = design.points + truth.model.error(design.points, truth.state.a, true_offsets)
-        jacobian = design.model.jacobian(design.points, start.a, offsets)
-        by_offset = offset_sensitivity(design.model, design.points, start.a, offsets)
-        free = layout.offset_columns[probe] >= 0
-        spread = jacobian @ found.shared[layout.model]
-        spread += by_offset[:, :, free] @ found.shared[layout.offset_columns[probe][free]]
+    """The quantities that a design has; those of the model only where the true machine is one of the fitted model's."""
+    at = shared.linearisation
+    displaced = _displaced(shared, at)
+    found: list[Target] = []
+    for symbol, kind in QUANTITIES.items():
+        for functions in kind.functions(at.design, at.layout) if kind.in_replicates else ():
+            if isinstance(functions, Parameters):
+                is_known = shared.truth.model == at.design.model or not functions.rows[:, at.layout.model].any()
+                found += [_parameters(symbol, shared, at, functions)] if is_known else []
+            elif isinstance(functions, Coordinates):
+                found.append(_coordinates(symbol, displaced(functions.places)))
+            else:
+                found.append(_distances(symbol, functions, displaced(functions.places)))
+    return tuple(uncertain for target in found if (uncertain := _uncertain(target)) is not None)
 
-        def moved(replicates: Deviations) -> Array:
-            none = np.zeros((len(replicates.a), design.dimension, len(design.points)))
-            if not free.any():
-                return shared.points.change(none, replicates.a)
-            moved_probe = np.broadcast_to(replicates.offsets[:, probe, :, None], none.shape)
-            return shared.points.change(none, replicates.a, moved_probe)
 
-        def errors(replicates: Deviations) -> Array:
-            return moved(replicates).swapaxes(1, 2).reshape(-1, design.points.size)
+@dataclass(frozen=True)
+class Displaced:
+    """Places at the reference, with their displacements, where they `truly` are (n, d), and their change (b, d, n)."""
 
-        base = (corrected - true).ravel()
-        values = np.sqrt((spread**2).sum(axis=2)).ravel()
-        result.append(Target("U4", base, values, ("m",) * len(base), errors))
-        own_none = np.zeros((*corrected.shape, design.dimension))
-        result.append(_distances("U6", corrected, true, spread, own_none, moved))
-    order = ["U1", "U2", "U3", "U4", "U5", "U6"]
-    found_uncertain = [uncertain for target in result if (uncertain := _uncertain(target)) is not None]
-    return tuple(sorted(found_uncertain, key=lambda target: order.index(target.symbol)))
+    moved: Displacements
+    truly: Array
+    change: Callable[[Deviations], Array]
+
+
+def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displaced]:
+    """A function from places to what becomes of them, which remembers the points that it has been asked for."""
+    made: dict[bytes, Displaced] = {}
+
+    def displaced(places: Places) -> Displaced:
+        if isinstance(places, Balls):
+            truly = places.at(at.design, shared.truth.state)
+            return Displaced(displacements(at, places), truly, lambda found: found.balls[:, :, places.index])
+        key = places.points.tobytes() + places.probes.tobytes()
+        if key not in made:
+            true = replace(at.design, model=shared.truth.model)
+            truly = places.at(true, shared.truth.state)
+            made[key] = Displaced(displacements(at, places), truly, _change(shared, places))
+        return made[key]
+
+    return displaced
+
+
+def _change(shared: Reference, places: Points) -> Callable[[Deviations], Array]:
+    """The change (b, d, n) of corrected points in replicates."""
+    model = shared.local_model(places.points, places.probes)
+    n, d = places.points.shape
+    are_free = bool((shared.factor.layout.offset_columns[places.probes] >= 0).any())
+
+    def change(replicates: Deviations) -> Array:
+        none = np.zeros((len(replicates.a), d, n))
+        offsets = replicates.offsets[:, places.probes].swapaxes(1, 2) if are_free else None
+        return model.change(none, replicates.a, offsets)
+
+    return change
 
 
 def _uncertain(target: Target) -> Target | None:
@@ -96,66 +123,58 @@ def _uncertain(target: Target) -> Target | None:
     return Target(target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled)
 
 
-def _balls(shared: Reference, found: Covariance) -> Target:
-    balls = shared.design.plate_balls
-    base = (shared.start.balls - shared.truth.state.balls)[balls].ravel()
-    values = found.of_balls()[balls].ravel()
+def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Parameters) -> Target:
+    design, layout, start, real = at.design, at.layout, shared.start, shared.truth.state
+    used = functions.rows.any(axis=0)
+    rows = functions.rows[:, used]
+    turned = vector_from_rotation(start.rotations @ real.rotations.transpose(0, 2, 1))
+    # Parameters of another true model are no errors of these, which then have no part in the functions.
+    a = start.a - real.a if shared.truth.model == design.model else start.a
+    offsets = probe_offsets(design, start) - probe_offsets(design, real)
+    steps = np.zeros((1, len(layout)))
+    steps[:, layout.lengths] = unknown_lengths(design, start) - unknown_lengths(design, real)
+    origins, balls = start.origins - real.origins, np.zeros((1, 0, 0))
+    error = Deviations(balls, turned[None], origins[None], a[None], offsets[None], steps)
 
     def change(replicates: Deviations) -> Array:
-        return replicates.balls[:, :, balls].swapaxes(1, 2).reshape(-1, len(base))
+        return np.asarray(_shared(layout, replicates)[:, used] @ rows.T)
 
-    return Target("U1", base, values, ("m",) * len(base), change)
+    return Target(symbol, change(error)[0], at.of_shared(functions.rows), functions.units, change)
 
 
-def _poses(shared: Reference, found: Covariance) -> Target:
-    layout, start, real, d = shared.factor.layout, shared.start, shared.truth.state, shared.design.dimension
+def _shared(layout: SharedLayout, found: Deviations) -> Array:
+    """Changes (b, s) of the shared parameters; those of rotations are not the sums of their steps."""
+    changed = found.shared.copy()
     position, place = np.nonzero(layout.pose_columns >= 0)
-    turn = vector_from_rotation(start.rotations @ real.rotations.transpose(0, 2, 1))
-    base = np.concatenate([start.origins - real.origins, turn], axis=1)[position, place]
-    rows = np.eye(len(layout))[layout.pose_columns[position, place]]
+    poses = np.concatenate([found.origins, found.rotations], axis=2)
+    changed[:, layout.pose_columns[position, place]] = poses[:, position, place]
+    changed[:, layout.model] = found.a
+    probe, axis = np.nonzero(layout.offset_columns >= 0)
+    changed[:, layout.offset_columns[probe, axis]] = found.offsets[:, probe, axis]
+    return changed
+
+
+def _coordinates(symbol: str, of: Displaced) -> Target:
+    base, moved = (of.moved.places - of.truly).ravel(), of.change
 
     def change(replicates: Deviations) -> Array:
-        return np.asarray(np.concatenate([replicates.origins, replicates.rotations], axis=2)[:, position, place])
+        return moved(replicates).swapaxes(1, 2).reshape(-1, len(base))
 
-    units = tuple("m" if j < d else "rad" for j in place)
-    return Target("U2", base, found.of_shared(rows), units, change)
-
-
-def _parameters(shared: Reference, found: Covariance) -> Target:
-    layout, reported = shared.factor.layout, shared.design.model.reported()
-    quoted = np.flatnonzero(reported.matrix.any(axis=1))
-    matrix = reported.matrix[quoted]
-    rows = np.zeros((len(quoted), len(layout)))
-    rows[:, layout.model] = matrix
-    base = matrix @ (shared.start.a - shared.truth.state.a)
-    units = tuple(reported.units[i] for i in quoted)
-    return Target("U3", base, found.of_shared(rows), units, lambda replicates: replicates.a @ matrix.T)
+    return Target(symbol, base, of.moved.uncertainties.ravel(), ("m",) * len(base), change)
 
 
-def _ball_distances(shared: Reference, found: Covariance, own: Integers) -> Target:
-    start, real = shared.start.balls[own], shared.truth.state.balls[own]
-    return _distances(
-        "U5", start, real, found.ball[own], found.ball_own[own], lambda replicates: replicates.balls[:, :, own]
-    )
-
-
-def _distances(
-    symbol: str, places: Array, true: Array, common: Array, own: Array, moved: Callable[[Deviations], Array]
-) -> Target:
-    """Distances between pairs of places (n, d), whose errors are `common` (n, d, r) and `own` (n, d, d)."""
-    first, second, sampled = sample_of_pairs(len(places), MOST_PAIRS)
+def _distances(symbol: str, functions: Distances, of: Displaced) -> Target:
+    """Distances between all places, or a sample of them, or between some."""
+    places, moved = of.moved.places, of.change
+    if functions.pairs is None:
+        *ends, sampled = sample_of_pairs(len(places), MOST_PAIRS)
+    else:
+        ends, sampled = list(functions.pairs.T), False
+    first, second = ends
     between = places[first] - places[second]
     length = np.sqrt((between**2).sum(axis=1))
-    true_length = np.sqrt(((true[first] - true[second]) ** 2).sum(axis=1))
-    unit = between / length[:, None]
-    variance = np.zeros(len(first))
-    # A slice of the pairs at a time: the products of all would take far more memory than the pairs.
-    for start in range(0, len(first), 512):
-        part = slice(start, start + 512)
-        i, j, along = first[part], second[part], unit[part]
-        variance[part] = (np.einsum("md,mdr->mr", along, common[i] - common[j]) ** 2).sum(axis=1)
-        for end in (i, j):
-            variance[part] += (np.einsum("md,mdr->mr", along, own[end]) ** 2).sum(axis=1)
+    true_length = np.sqrt(((of.truly[first] - of.truly[second]) ** 2).sum(axis=1))
+    uncertainty = pairs_of(of.moved, np.stack(ends, axis=1)).uncertainties
 
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
@@ -169,7 +188,7 @@ def _distances(
             gained += part
         return np.asarray(gained / (np.sqrt(length**2 + gained) + length))
 
-    return Target(symbol, length - true_length, np.sqrt(variance), ("m",) * len(first), change, sampled)
+    return Target(symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled)
 
 
 def sample_of_pairs(n: int, most: int) -> tuple[Integers, Integers, bool]:

@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.montecarlo.reference import Reference
+from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.montecarlo.reference import Reference
-from simulator.montecarlo.replicates import BATCH, estimate_batch
-from simulator.threads import single_threaded
-
-from ..processes import in_processes
+from ..running.processes import in_processes
 from .figures import Outcome, outcome
 from .tally import Tally, tally
 from .targets import Target, targets
@@ -20,7 +19,7 @@ from .targets import Target, targets
 BATCHES = 4
 TASK = BATCH * BATCHES
 
-# Replicates of a run that is to go on until its figures are accurate, at the most.
+# Replicates of a run, those of one included that is to go on until its figures are accurate.
 MOST_TRIALS = 1_000_000
 
 

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
-from simulator.threads import single_threaded
-
-from ..internal_error import InternalError
+from ..running.internal_error import InternalError
 from .search import Losses, Problem, counted_root, fill, full_root, square_root
 
 # Relative distance of bound and relaxation at which the weights are good enough, and steps at most.

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import AtMost, Candidate, Pool, with_chosen
-from simulator.rounding import comparable
-from simulator.settings import listing
-from simulator.threads import single_threaded
-
-from ..processes import in_processes
-from ..study import Plan, plan
+from ..results.study import predict
+from ..running.processes import in_processes
+from ..running.steps import Report, counted, unreported
 from .bound import Bound, bound
-from .constraints import Budget, Constraints, Spent, constraints
-from .criteria import CriterionName, criterion, is_about_balls
+from .choice import CurvePoint, Gain
+from .constraints import Budget, Constraints, constraints
+from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
 from .information import pool_information
 from .offer import Offer, offer, open_directions
 from .schedule import Completion, run_sheet
 from .search import GAIN, Found, Losses, Problem, improve, ranked_additions, starts, value
+from .selection import Campaign
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8
@@ -49,92 +51,13 @@ class Request:
     seed: int = 1
 
 
-@dataclass(frozen=True)
-class Gain:
-    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something is undetermined."""
-
-    candidate: Candidate
-    without: float
-    with_: float
-
-    @property
-    def relative(self) -> float:
-        """How much larger the criterion is without it."""
-        return self.without / self.with_ - 1.0
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """The best selection found for a budget; `bound` is NaN where there is none."""
-
-    budget: Budget
-    spent: Spent
-    chosen: tuple[Candidate, ...]
-    value: float
-    bound: float
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """A selection and what is to be said of it; values in metres, those of `condition` ratios.
-
-    `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
-    order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
-    `interrupted` are all that were read in part, and `left_open` counts the directions of their own poses and lengths
-    that stay undetermined where they are left so; nothing else depends on these. What has been read and is `ignored` is
-    no part of it. `value` is infinite where the
-    selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
-    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
-    the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
-    """
-
-    experiment: Experiment
-    pool: Pool
-    criterion: CriterionName
-    unit: str
-    excluded: int
-    budget: Budget
-    chosen: tuple[Candidate, ...]
-    done: tuple[Candidate, ...]
-    spent: Spent
-    value: float
-    bound: float
-    drawn: float | None
-    drawn_words: str
-    drawn_spent: Spent | None
-    target: float | None
-    gains: tuple[Gain, ...]
-    left_out: tuple[Gain, ...]
-    plan: Plan
-    curve: tuple[CurvePoint, ...] = ()
-    completed: Completion | None = None
-    interrupted: tuple[Candidate, ...] = ()
-    left_open: int = 0
-    ignored: tuple[Candidate, ...] = ()
-
-    @property
-    def efficiency(self) -> float:
-        """Bound over value: the selection is at most this far from the best possible."""
-        return self.bound / self.value
-
-    @property
-    def drawn_is_within(self) -> bool:
-        """Whether what it is compared with keeps to the budget; then the choice is never worse."""
-        spent, budget = self.drawn_spent, self.budget
-        return spent is None or spent.is_within(budget)
-
-    @property
-    def is_determined(self) -> bool:
-        return bool(np.isfinite(self.value))
-
-
 def campaign(
     experiment: Experiment,
     request: Request,
     offered: Offer | None = None,
     earlier: Collection[int] | None = None,
     workers: int = 1,
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = unreported,
 ) -> Campaign:
     """Choose from the pool of an experiment.
 
@@ -142,7 +65,8 @@ def campaign(
     it is of a plate that was only begun and is worth less to go on with than to leave out.
     `earlier` are the indices of an earlier choice, which the plan is compared with and never worse than within the same
     budget; without it that is the experiment's own positions. Without a budget the choice may cost what these do, less
-    what is done. The result does not depend on the number of `workers`; `report` is told what is being done.
+    what is done. The result does not depend on the number of `workers`; `report` is told which step is being done, and
+    how much of it is.
 
     :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
     :raises InternalError: the choice is better than the bound of any choice.
@@ -152,6 +76,7 @@ def campaign(
         raise _impossible(
             experiment, "pool", "missing; add candidates to choose from, or see what check --suggest tells"
         )
+    refuse_many_points(experiment, request.criterion)
     offered = offered or offer(pool)
     refusal: ExperimentError | None = None
     found, less = None, offered.without_begun(experiment)
@@ -185,12 +110,11 @@ def _campaign(
     offered: Offer,
     earlier: Collection[int] | None,
     workers: int,
-    report: Callable[[str], None],
+    report: Report,
 ) -> Campaign:
     candidates, standing = offered.candidates, offered.standing
-    report(f"information of {len(candidates)} candidates")
     whole, completed_by = offered.weighed
-    information = pool_information(experiment, whole, is_about_balls(request.criterion), completed_by)
+    information = pool_information(experiment, whole, is_about_balls(request.criterion), completed_by, report)
     wanted = criterion(information, experiment, request.criterion)
     own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
     drawn = sorted(earlier or own)
@@ -211,8 +135,7 @@ def _campaign(
     _refuse_impossible(experiment, limits, candidates)
     problem = Problem(information, wanted, limits)
 
-    report("searching")
-    best, relaxed = _search(problem, drawn, request.seed, workers)
+    best, relaxed = _search(problem, drawn, request.seed, workers, report)
     if relaxed is not None:
         relaxed.check(request.criterion, best.value)
     _refuse_lacking(experiment, problem, best, begun)
@@ -227,7 +150,6 @@ def _campaign(
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which U1 and U2 depend.
     in_order = run_sheet(chosen, pool.changes, done, completed, interrupted).chosen
-    report("gains")
     return Campaign(
         experiment,
         pool,
@@ -244,9 +166,9 @@ def _campaign(
         ("chosen before" if earlier else "as drawn") + (", with what is kept" if set(reference) - set(drawn) else ""),
         limits.spent(reference) if drawn else None,
         wanted.target,
-        _gains(problem, best, candidates),
+        _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
-        plan(replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)),
+        predict(replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
@@ -334,24 +256,27 @@ def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: 
     raise _impossible(experiment, "pool.limits.keep", text)
 
 
-def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> tuple[Found, Bound | None]:
+def _search(
+    problem: Problem, drawn: Sequence[int], seed: int, workers: int, report: Report
+) -> tuple[Found, Bound | None]:
     """The best selection found, and the bound of all."""
     limits = problem.constraints
     # An interrupted position, which has to be chosen, comes with two ways to go on.
     if limits.count - len(limits.done) <= TINY_POOL + (limits.first is not None):
-        return _best_of_all(problem), bound(problem)
+        return _best_of_all(problem, report), bound(problem)
     is_small = problem.constraints.count <= SMALL_POOL
     first = starts(problem, drawn, SMALL_STARTS if is_small else LARGE_STARTS, seed)
     # In a small pool most selections are met again and again, and one process remembers them.
     shares = [first] if is_small else [[start] for start in first]
     depth = 2 if is_small else 1
     tasks: list[tuple[object, ...]] = [(problem, None, 0), *((problem, share, depth) for share in shares)]
-    relaxed, *found = in_processes(_task, tasks, workers)
+    relaxed, *found = counted(in_processes(_task, tasks, workers), "starts of the search", len(tasks), report)
     selections = [one for some in found if isinstance(some, list) for one in some]
     # Of a selection that is just enough, most of what an exchange passes through is deficient.
     ways = (False, True) if _is_just_enough(problem, min(selections, key=lambda one: one.order)) else (False,)
     for by_pivots in ways[1:]:
-        others = in_processes(_task, [(problem, share, depth, by_pivots) for share in shares], workers)
+        tasks = [(problem, share, depth, by_pivots) for share in shares]
+        others = counted(in_processes(_task, tasks, workers), "starts by pivots", len(tasks), report)
         selections += [one for some in others if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
@@ -361,19 +286,20 @@ def _search(problem: Problem, drawn: Sequence[int], seed: int, workers: int) -> 
     if not is_small:
         best_starts = [one.chosen for one in selections[:BEST_STARTS]]
         tasks = [(problem, [start], 2, by_pivots) for start in best_starts for by_pivots in ways]
-        again = in_processes(_task, tasks, workers)
+        again = counted(in_processes(_task, tasks, workers), "deeper searches", len(tasks), report)
         selections += [one for some in again if isinstance(some, list) for one in some]
     best = min(selections, key=lambda one: one.order)
     return best, relaxed if isinstance(relaxed, Bound) else None
 
 
 @single_threaded
-def _best_of_all(problem: Problem) -> Found:
+def _best_of_all(problem: Problem, report: Report) -> Found:
     """The best of all selections of a pool that has few."""
     limits, losses = problem.constraints, Losses(problem)
     members = [k for k in range(limits.count) if k not in limits.done]
     every = (limits.done.union(chosen) for size in range(len(members) + 1) for chosen in combinations(members, size))
-    best = min((chosen for chosen in every if limits.allows(chosen)), key=lambda one: (losses.of(one), sorted(one)))
+    tried = counted(every, "selections", 2 ** len(members), report)
+    best = min((chosen for chosen in tried if limits.allows(chosen)), key=lambda one: (losses.of(one), sorted(one)))
     return Found(tuple(sorted(best)), value(problem, best))
 
 
@@ -394,13 +320,13 @@ def _task(
     return [improve(problem, start, losses, at_once, thorough) for start in from_]
 
 
-def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate]) -> tuple[Gain, ...]:
+def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate], report: Report) -> tuple[Gain, ...]:
     """What each chosen candidate gains, those first that gain most, whether it has to be chosen or not."""
     free = replace(problem, constraints=replace(problem.constraints, at_least=()))
+    new = [k for k in best.chosen if k not in problem.constraints.done]
     gains = [
         Gain(candidates[k], value(free, set(best.chosen) - {k}), best.value)
-        for k in best.chosen
-        if k not in problem.constraints.done
+        for k in counted(new, "gains", len(new), report)
     ]
     return tuple(sorted(gains, key=lambda gain: -float(comparable(gain.without))))
 
@@ -416,14 +342,14 @@ def _curve(
     best: Found,
     candidates: Sequence[Candidate],
     workers: int,
-    report: Callable[[str], None],
+    report: Report,
 ) -> list[CurvePoint]:
     """The best selections found for smaller and larger budgets, with their bounds, from the smallest on."""
     budgets = _budgets(problem)
-    report(f"curve of {len(budgets)} budgets")
     tasks = [(replace(problem, constraints=replace(problem.constraints, budget=b)), best) for b in budgets]
     points = []
-    for budget, result in zip(budgets, in_processes(_curve_point, tasks, workers), strict=True):
+    results = counted(in_processes(_curve_point, tasks, workers), "budgets of the curve", len(tasks), report)
+    for budget, result in zip(budgets, results, strict=True):
         if result is None:
             continue
         found, relaxed = result

@@ -15,8 +15,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from simulator.experiment.model import Position
-from simulator.experiment.pool import Candidate, ChangeTimes
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 
 # Sets of kinds that are followed for each size, where there are more than so many kinds.
 MOST_EXACT = 12

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Position
+from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
-
-from simulator.experiment.model import Position
-from simulator.experiment.pool import AtMost, Candidate, ChangeTimes
-from simulator.machines.protocol import Array
 
 from .schedule import Kind, changeover, kind_of
 

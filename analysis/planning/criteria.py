@@ -8,38 +8,43 @@ mean, whose weights are on the largest ones.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol, get_args
+from itertools import chain
+from typing import Protocol
 
 import numpy as np
+from ballplate.simulator.estimation.functions import Balls, Distances, Points, point_rows
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.machines.protocol import Array
+from numpy.typing import NDArray
 
-from simulator.design import Integers
-from simulator.estimation.observations import offset_sensitivity
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.geometry.motions import without_rigid_motion
-from simulator.machines.protocol import Array
-
-from ..tasks import task_differences, task_rows
+from ..uncertainty.quantities import QUANTITIES
 from .information import Information
 from .rows import STEP
 
-CriterionName = Literal["U6", "U6-maximum", "U5", "U5-maximum", "tasks", "tasks-maximum", "A", "D", "E", "condition"]
-NAMES: tuple[CriterionName, ...] = get_args(CriterionName)
+CriterionName = str
 
-DESCRIPTIONS: dict[str, str] = {
-    "U6": "average uncertainty of distances between corrected points",
-    "U6-maximum": "largest uncertainty of distances between corrected points",
-    "U5": "average uncertainty of distances between balls",
-    "U5-maximum": "largest uncertainty of distances between balls",
-    "tasks": "average uncertainty of the measuring tasks",
-    "tasks-maximum": "largest uncertainty of the measuring tasks",
+MAXIMUM = "-maximum"
+
+# Quantities of lengths, the first of which is what a plan makes small unless told.
+_LENGTHS = [symbol for symbol, kind in QUANTITIES.items() if kind.are_lengths]
+_LENGTHS.sort(key=lambda symbol: not QUANTITIES[symbol].has_target)
+
+DESCRIPTIONS: dict[CriterionName, str] = {}
+for _symbol in _LENGTHS:
+    DESCRIPTIONS[_symbol] = f"average uncertainty of {QUANTITIES[_symbol].description}"
+    DESCRIPTIONS[_symbol + MAXIMUM] = f"largest uncertainty of {QUANTITIES[_symbol].description}"
+DESCRIPTIONS |= {
     "A": "root mean square uncertainty of the machine's parameters",
     "D": "geometric mean of the semi-axes of the parameters' uncertainty ellipsoid",
     "E": "uncertainty of the least certain direction of the machine's parameters",
     "condition": "ratio of the uncertainties of the least and the most certain direction of the parameters",
 }
+NAMES: tuple[CriterionName, ...] = tuple(DESCRIPTIONS)
 
 # Powers that put the weight of a largest value's bound on the largest ones.
 SHARP = 24
@@ -47,24 +52,35 @@ SHARP = 24
 # A function counts as open when what the pool leaves open changes it by this, in micrometres for a micrometre.
 OPEN = 1e-7
 
+# Places in each direction of a block of pairs, whose matrices stay in cache, and up to which blocks are kept.
+BLOCK = 256
+MOST_PLACES_KEPT = 1024
+
+# Evaluation points between all of which a plan can make distances small: thousands of times in a search, which with
+# so many takes two minutes on one processor, and ten of a large pool; it grows with the square of their number.
+MOST_POINTS = 1000
+
+# Functions whose uncertainties are kept, rather than computed twice, for the tangent of a largest value.
+KEPT = 4_000_000
+
 
 class Functions(Protocol):
-    """Quantities whose uncertainties count, as functions of z."""
+    """Quantities whose uncertainties count, as functions of z; some of them at a time, always in the same order."""
 
     @property
     def count(self) -> int: ...
 
-    @property
-    def lengths(self) -> Array:
-        """Lengths (count,) in metres that the functions are uncertainties of."""
+    def lengths(self) -> Iterator[Array]:
+        """Lengths (some,) in metres that the functions are uncertainties of."""
         ...
 
-    def uncertainties(self, root: Array) -> Array:
-        """Standard uncertainties (count,) in metres, where root root' is the covariance of z."""
+    def uncertainties(self, root: Array) -> Iterator[Array]:
+        """Standard uncertainties (some,) in metres, where root root' is the covariance of z."""
         ...
 
-    def squares(self, weights: Array) -> Array:
-        """Sum (z, z) of the functions' squares with `weights` (count,)."""
+    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+        """Sums over all functions: (m,) of what `weigh` makes of their uncertainties (some,), namely (m, some), and of
+        their squares (z, z) with the first of these for weights."""
         ...
 
 
@@ -89,7 +105,7 @@ class Criterion:
 
     @property
     def largest(self) -> bool:
-        return self.name.endswith("-maximum")
+        return self.name.endswith(MAXIMUM)
 
     @property
     def unit(self) -> str:
@@ -104,7 +120,9 @@ class Criterion:
         """Value in metres, or a ratio, where root root' is the covariance of z."""
         if self.functions is not None:
             found = self.functions.uncertainties(root)
-            return float(found.max() if self.largest else found.mean())
+            if self.largest:
+                return max(float(some.max(initial=0.0)) for some in found)
+            return sum(float(some.sum()) for some in found) / self.functions.count
         sizes = np.linalg.svd(self.scaled @ root, compute_uv=False)
         if self.name == "A":
             return float(np.sqrt((sizes**2).mean()))
@@ -126,18 +144,8 @@ class Criterion:
         derivative.
         """
         if self.functions is not None:
-            found = self.functions.uncertainties(root)
-            relative = found / max(float(found.max()), np.finfo(float).tiny)
-            weights = relative ** (power - 1) if self.largest else np.ones(len(found))
-            weights /= weights.sum()
-            value = float(weights @ found)
-            smooth = float(found.max() * (relative**power).mean() ** (1 / power)) if self.largest else value
-            # What is known without any uncertainty stays so.
-            known = found > 0.0
             return (
-                smooth,
-                value,
-                self.functions.squares(np.where(known, 0.5 * weights, 0.0) / np.where(known, found, 1.0)),
+                _largest_tangent(self.functions, root, power) if self.largest else _mean_tangent(self.functions, root)
             )
         left, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
         n, value = len(sizes), self.value(root)
@@ -154,114 +162,228 @@ class Criterion:
         return smooth, value, half.T @ half / (2 * value)
 
 
+def _mean_tangent(functions: Functions, root: Array) -> tuple[float, float, Array]:
+    def weigh(found: Array) -> Array:
+        return np.stack([_halved(np.ones(len(found)), found), found])
+
+    (_, total), squares = functions.squares(functions.uncertainties(root), weigh)
+    value = float(total) / functions.count
+    return value, value, squares / functions.count
+
+
+def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[float, float, Array]:
+    found: Iterable[Array] = functions.uncertainties(root)
+    found = list(found) if functions.count <= KEPT else found
+    largest = max(float(some.max(initial=0.0)) for some in found)
+    size = max(largest, np.finfo(float).tiny)
+
+    def weigh(some: Array) -> Array:
+        relative = some / size
+        weights = relative ** (power - 1)
+        return np.stack([_halved(weights, some), weights, weights * some, relative**power])
+
+    again = found if isinstance(found, list) else functions.uncertainties(root)
+    (_, weight, weighted, powers), squares = functions.squares(again, weigh)
+    return largest * float(powers / functions.count) ** (1 / power), float(weighted / weight), squares / weight
+
+
+def _halved(weights: Array, found: Array) -> Array:
+    """Half of `weights` for each uncertainty; what is known without any stays so."""
+    known = found > 0.0
+    return np.where(known, 0.5 * weights, 0.0) / np.where(known, found, 1.0)
+
+
 @dataclass(frozen=True)
 class Linear:
-    """Functions with rows (count, z), in metres, of `lengths` (count,)."""
+    """Functions with rows (count, z), in metres, of `sizes` (count,): the lengths that they are.
+
+    `excluded` counts others, which the pool leaves open.
+    """
 
     rows: Array
-    lengths: Array
+    sizes: Array
+    excluded: int = 0
 
     @property
     def count(self) -> int:
         return len(self.rows)
 
-    def uncertainties(self, root: Array) -> Array:
-        return np.asarray(np.sqrt(((self.rows @ root) ** 2).sum(axis=1)))
+    def lengths(self) -> Iterator[Array]:
+        yield self.sizes
 
-    def squares(self, weights: Array) -> Array:
-        return np.asarray((self.rows * weights[:, None]).T @ self.rows)
+    def uncertainties(self, root: Array) -> Iterator[Array]:
+        yield np.sqrt(((self.rows @ root) ** 2).sum(axis=1))
+
+    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+        found = next(iter(uncertainties))
+        weighed = weigh(found)
+        return weighed.sum(axis=1), (self.rows * weighed[0][:, None]).T @ self.rows
+
+
+@dataclass(frozen=True)
+class PairBlock:
+    """Pairs of two runs of places, those of `first` (rows) and of `second` (columns).
+
+    `chosen` (rows, columns) tells which pairs count, `length` (rows, columns) is their distance, and `weights` have,
+    for components i and j >= i, the products of these components of all directions, those of i < j twice.
+    """
+
+    first: slice
+    second: slice
+    chosen: NDArray[np.bool_]
+    length: Array
+    weights: tuple[tuple[int, int, Array], ...]
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Distances between all pairs of places, or those `chosen` (pairs,) of them.
+    """Distances between all pairs of places that are apart, less those that the pool leaves open.
 
-    `places` (n, d) in metres; `displacement` (n, d, z) of them. Pairs are in the order of `numpy.triu_indices`.
+    `places` (n, d) in metres; `displacement` (n, d, z) of them, and `open_` (n, d, k) what the pool leaves open of it,
+    both without the motion of all places together. Pairs are worked through in blocks of bounded size.
     """
 
     places: Array
     displacement: Array
-    chosen: Integers
+    open_: Array
+
+    @cached_property
+    def _counts(self) -> tuple[int, int]:
+        """How many pairs count, and how many the pool leaves open."""
+        chosen = apart = 0
+        for block in self._blocks():
+            chosen += int(block.chosen.sum())
+            apart += int(self._apart(block.first, block.second)[1].sum())
+        return chosen, apart - chosen
 
     @property
     def count(self) -> int:
-        return len(self.chosen)
+        return self._counts[0]
+
+    @property
+    def excluded(self) -> int:
+        """Pairs that are apart, and left open whatever is chosen."""
+        return self._counts[1]
 
     @cached_property
-    def _weights(self) -> tuple[tuple[int, int, Array], ...]:
-        """Products (n, n) of the components i and j of all directions, those of i < j twice."""
-        n, d = self.places.shape
-        apart = self.places[:, None] - self.places[None]
-        length = np.sqrt((apart**2).sum(axis=2))
-        apart /= np.where(length > 0, length, 1.0)[:, :, None]
-        return tuple(
-            (i, j, (1.0 if i == j else 2.0) * apart[:, :, i] * apart[:, :, j]) for i in range(d) for j in range(i, d)
-        )
+    def _kept(self) -> tuple[PairBlock, ...]:
+        return tuple(self._made())
 
-    @cached_property
-    def _flat(self) -> Integers:
+    def _blocks(self) -> Iterable[PairBlock]:
+        return self._kept if len(self.places) <= MOST_PLACES_KEPT else self._made()
+
+    def _made(self) -> Iterator[PairBlock]:
         n = len(self.places)
-        first, second = np.triu_indices(n, 1)
-        return (first * n + second)[self.chosen]
+        runs = [slice(start, min(start + BLOCK, n)) for start in range(0, n, BLOCK)]
+        for i, first in enumerate(runs):
+            for second in runs[i:]:
+                yield self._block(first, second)
 
-    @cached_property
-    def lengths(self) -> Array:
-        apart = self.places[:, None] - self.places[None]
-        return np.asarray(np.sqrt((apart**2).sum(axis=2)).ravel()[self._flat])
+    def _apart(self, first: slice, second: slice) -> tuple[Array, NDArray[np.bool_]]:
+        """Vectors (rows, columns, d) between places, and which of them are distances, each of them once."""
+        vector = self.places[first, None] - self.places[None, second]
+        apart = (vector**2).sum(axis=2) > 0.0
+        return vector, np.triu(apart, 1) if first == second else apart
 
-    def uncertainties(self, root: Array) -> Array:
+    def _block(self, first: slice, second: slice) -> PairBlock:
+        vector, chosen = self._apart(first, second)
+        length = np.sqrt((vector**2).sum(axis=2))
+        change = np.zeros_like(length)
+        for k in range(self.open_.shape[2]):
+            moved = self.open_[first, None, :, k] - self.open_[None, second, :, k]
+            np.maximum(change, np.abs((vector * moved).sum(axis=2)), out=change)
+        chosen &= change <= OPEN * STEP * np.where(length > 0.0, length, 1.0)
+        vector /= np.where(length > 0.0, length, 1.0)[:, :, None]
+        d = self.places.shape[1]
+        weights = tuple(
+            (i, j, (1.0 if i == j else 2.0) * vector[:, :, i] * vector[:, :, j]) for i in range(d) for j in range(i, d)
+        )
+        return PairBlock(first, second, chosen, length, weights)
+
+    def lengths(self) -> Iterator[Array]:
+        for block in self._blocks():
+            yield block.length[block.chosen]
+
+    def uncertainties(self, root: Array) -> Iterator[Array]:
         n, d = self.places.shape
         spread = (self.displacement.reshape(n * d, -1) @ root).reshape(n, d, -1)
-        total = np.zeros((n, n))
-        for i, j, weight in self._weights:
-            product = spread[:, i] @ spread[:, j].T
-            own = np.diagonal(product)
-            apart = own[:, None] + own[None] - product
-            apart -= product.T
-            apart *= weight
-            total += apart
-        return np.asarray(np.sqrt(np.maximum(total.ravel()[self._flat], 0.0)))
+        own = [[(spread[:, i] * spread[:, j]).sum(axis=1) for j in range(d)] for i in range(d)]
+        for block in self._blocks():
+            one, other = spread[block.first], spread[block.second]
+            total = np.zeros(block.length.shape)
+            for i, j, weight in block.weights:
+                apart = own[i][j][block.first, None] + own[i][j][None, block.second]
+                product = one[:, i] @ other[:, j].T
+                apart -= product
+                apart -= product if i == j else one[:, j] @ other[:, i].T
+                apart *= weight
+                total += apart
+            yield np.sqrt(np.maximum(total[block.chosen], 0.0))
 
-    def squares(self, weights: Array) -> Array:
-        n = len(self.places)
-        total = np.zeros((self.displacement.shape[2],) * 2)
-        each = np.zeros((n, n))
-        each.ravel()[self._flat] = weights
-        for i, j, weight in self._weights:
-            amount = each * weight
-            amount += amount.T
-            between = np.diag(amount.sum(axis=1)) - amount
-            part = self.displacement[:, i].T @ (between @ self.displacement[:, j])
-            total += part if i == j else 0.5 * (part + part.T)
-        return total
+    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+        sums: list[Array] = []
+        # The squares' sum is that of displacements times these.
+        moved = np.zeros_like(self.displacement)
+        # What follows belongs to other functions.
+        for block, found in zip(self._blocks(), uncertainties, strict=False):
+            weighed = weigh(found)
+            sums.append(weighed.sum(axis=1))
+            each = np.zeros(block.length.shape)
+            each[block.chosen] = weighed[0]
+            one, other = self.displacement[block.first], self.displacement[block.second]
+            for i, j, weight in block.weights:
+                amount = each * weight
+                moved[block.first, i] += amount.sum(axis=1)[:, None] * one[:, j] - amount @ other[:, j]
+                moved[block.second, i] += amount.sum(axis=0)[:, None] * other[:, j] - amount.T @ one[:, j]
+        size = self.displacement.shape[2]
+        total = self.displacement.reshape(-1, size).T @ moved.reshape(-1, size)
+        return np.sum(sums, axis=0), 0.5 * (total + total.T)
 
 
 @dataclass(frozen=True)
 class Several:
     """Functions of several kinds, one after the other."""
 
-    parts: tuple[Functions, ...]
+    parts: tuple[Pairs | Linear, ...]
+
+    @property
+    def excluded(self) -> int:
+        return sum(part.excluded for part in self.parts)
 
     @property
     def count(self) -> int:
         return sum(part.count for part in self.parts)
 
-    @property
-    def lengths(self) -> Array:
-        return np.concatenate([part.lengths for part in self.parts])
+    def lengths(self) -> Iterator[Array]:
+        return chain.from_iterable(part.lengths() for part in self.parts)
 
-    def uncertainties(self, root: Array) -> Array:
-        return np.concatenate([part.uncertainties(root) for part in self.parts])
+    def uncertainties(self, root: Array) -> Iterator[Array]:
+        return chain.from_iterable(part.uncertainties(root) for part in self.parts)
 
-    def squares(self, weights: Array) -> Array:
-        ends = np.cumsum([part.count for part in self.parts])[:-1]
-        each = zip(self.parts, np.split(weights, ends), strict=True)
-        return np.asarray(sum(part.squares(own) for part, own in each))
+    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+        left = iter(uncertainties)
+        found = [part.squares(left, weigh) for part in self.parts]
+        return np.sum([sums for sums, _ in found], axis=0), np.sum([squares for _, squares in found], axis=0)
 
 
 def is_about_balls(name: CriterionName) -> bool:
     """Whether a criterion needs all balls, and not only what they tell of the machine."""
-    return name.startswith("U5")
+    kind = QUANTITIES.get(name.removesuffix(MAXIMUM))
+    return kind is not None and kind.about_balls
+
+
+def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
+    """Refuse more evaluation points than a search can go through.
+
+    :raises ExperimentError: there are more than 1000 and the criterion concerns them.
+    """
+    count = len(experiment.evaluation.points)
+    if name.startswith("U6") and count > MOST_POINTS:
+        text = (
+            f"{count} points make {count * (count - 1) // 2} distances, which a search for {name} computes some "
+            f"thousand times, which takes too long; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
+        )
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
 
 
 def criterion(information: Information, experiment: Experiment, name: CriterionName) -> Criterion:
@@ -269,51 +391,36 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
 
     :raises ExperimentError: it is about something that the experiment does not have, or that no selection determines.
     """
-    drawn, basis = information.drawn, information.basis
-    scale = drawn.scale
-    model = slice(0, len(drawn.design.model.parameters))
+    drawn = information.drawn
     scaled = np.zeros((0, information.basis.size))
-    functions: Functions | None = None
-    about_balls, excluded = is_about_balls(name), 0
+    functions: Several | None = None
     needed: list[tuple[str, tuple[int, ...]]] = []
-    kind = name.partition("-")[0]
-    if kind == "U6":
-        displacement, touched = _of_points(information)
-        functions, excluded = _pairs(drawn.design.points, displacement, touched)
-    elif kind == "U5":
-        parts = []
-        for artefact in np.flatnonzero(drawn.design.is_plate):
-            plate = drawn.design.artefact_names[artefact]
-            placing = information.placing(plate)
-            if not placing:
-                continue
-            needed.append((plate, placing))
-            own = np.flatnonzero(drawn.design.ball_artefact == artefact)
-            n, d = drawn.design.balls[own].shape
-            amounts = basis.balls[own].reshape(n * d, -1)
-            displacement = STEP * basis.rows(amounts, np.zeros((n * d, drawn.shared))).reshape(n, d, -1)
-            open_ = np.concatenate([basis.ball_open, -basis.ball_shared @ information.open_], axis=1)
-            part, left = _pairs(drawn.design.balls[own], displacement, STEP * (amounts @ open_).reshape(n, d, -1))
-            parts.append(part)
-            excluded += left
-        functions = Several(tuple(parts))
-    elif kind == "tasks":
-        rows = task_rows(drawn.design, drawn.layout, drawn.state)[:, drawn.own]
-        rows = np.concatenate([rows, np.zeros((len(rows), drawn.certificates))], axis=1) * scale
-        kept = np.abs(rows @ information.open_).max(axis=1, initial=0.0) <= OPEN * STEP
-        lengths = np.linalg.norm(task_differences(drawn.design, drawn.state), axis=1)
-        functions = Linear(_of_shared(information, rows[kept]), lengths[kept])
-        excluded = int((~kept).sum())
-    else:
-        units = np.eye(drawn.shared)[model]
+    kind = QUANTITIES.get(name.removesuffix(MAXIMUM))
+    if kind is None:
+        model = slice(0, len(drawn.design.model.parameters))
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
         if not kept.all():
             raise _impossible(experiment, f"{name} takes in parameters that even all candidates leave undetermined")
-        scaled = _of_shared(information, STEP * units)
-    if functions is not None and not functions.count:
-        raise _impossible(experiment, f"{name} has nothing to make small: " + _nothing(kind, excluded))
+        scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
+    else:
+        parts: list[Pairs | Linear] = []
+        for given in kind.functions(drawn.design, drawn.layout):
+            assert isinstance(given, Distances)
+            if isinstance(given.places, Balls):
+                plate = drawn.design.artefact_names[drawn.design.ball_artefact[given.places.index[0]]]
+                placing = information.placing(plate)
+                if not placing:
+                    continue
+                needed.append((plate, placing))
+            parts.append(_distances(information, given))
+        functions = Several(tuple(parts))
+        if not functions.count:
+            left = "no selection determines any of it; offer other candidates"
+            lacks = left if functions.excluded else f"the experiment has no {kind.needs}"
+            raise _impossible(experiment, f"{name} has nothing to make small: {lacks}")
+    excluded = 0 if functions is None else functions.excluded
     target = _target(experiment, name, functions)
-    return Criterion(name, about_balls, functions, scaled, excluded, target, tuple(needed))
+    return Criterion(name, is_about_balls(name), functions, scaled, excluded, target, tuple(needed))
 
 
 def _target(experiment: Experiment, name: str, functions: Functions | None) -> float | None:
@@ -321,9 +428,9 @@ def _target(experiment: Experiment, name: str, functions: Functions | None) -> f
     target = experiment.target_accuracy
     if functions is None or target is None:
         return None
-    if name.endswith("-maximum"):
+    if name.endswith(MAXIMUM):
         return target.standard.constant if target.standard.slope == 0 else None
-    return float(target.at(functions.lengths).mean())
+    return sum(float(target.at(some).sum()) for some in functions.lengths()) / functions.count
 
 
 def _of_shared(information: Information, rows: Array) -> Array:
@@ -331,44 +438,43 @@ def _of_shared(information: Information, rows: Array) -> Array:
     return np.asarray(rows @ information.basis.shared_root)
 
 
-def _of_points(information: Information) -> tuple[Array, Array]:
-    """Displacements of corrected evaluation points (n, d, z), and those that the pool leaves open, in metres."""
-    drawn = information.drawn
-    design = drawn.design
-    n, d = design.points.shape
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    rows = np.zeros((n, d, drawn.shared))
-    rows[:, :, : len(design.model.parameters)] = design.model.jacobian(design.points, drawn.state.a, offsets)
-    columns = drawn.layout.offset_columns[design.point_probe]
-    if (columns >= 0).any():
-        by_offset = offset_sensitivity(design.model, design.points, drawn.state.a, offsets)
-        rows[:, :, columns[columns >= 0] - drawn.own.start] = by_offset[:, :, columns >= 0]
-    rows *= drawn.scale
-    displacement = _of_shared(information, rows.reshape(n * d, -1)).reshape(n, d, -1)
-    return displacement, (rows.reshape(n * d, -1) @ information.open_).reshape(n, d, -1)
-
-
-def _pairs(places: Array, displacement: Array, open_: Array) -> tuple[Pairs, int]:
-    """All pairs of places that are apart and determined, and the number of those that are not."""
-    first, second = np.triu_indices(len(places), 1)
-    apart = places[first] - places[second]
-    length = np.sqrt((apart**2).sum(axis=1))
-    used = length > 0
-    moved = without_rigid_motion(places, open_)
-    change = np.einsum("md,mdk->mk", apart, moved[first] - moved[second])
-    touched = used & (np.abs(change).max(axis=1, initial=0.0) > OPEN * STEP * np.where(used, length, 1.0))
+def _distances(information: Information, given: Distances) -> Pairs | Linear:
+    """Distances that are determined, between all places or those pairs that have names."""
+    of = given.places
+    places = of.at(information.drawn.design, information.drawn.state)
+    moved = _of_balls(information, of) if isinstance(of, Balls) else _of_points(information, of)
     # Without the motion of all places together, no digits are lost where distances are formed.
-    return Pairs(places, without_rigid_motion(places, displacement), np.flatnonzero(used & ~touched)), int(
-        touched.sum()
-    )
+    displacement, open_ = (without_rigid_motion(places, amount) for amount in moved)
+    if given.pairs is None:
+        return Pairs(places, displacement, open_)
+    first, second = given.pairs.T
+    unit = places[first] - places[second]
+    length = np.sqrt((unit**2).sum(axis=1))
+    unit /= length[:, None]
+    change, rows = (np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement))
+    kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP
+    return Linear(rows[kept], length[kept], int((~kept).sum()))
+
+
+def _of_balls(information: Information, places: Balls) -> tuple[Array, Array]:
+    """Displacements of balls (n, d, z), and those that the pool leaves open, in metres."""
+    basis, n, d = information.basis, len(places.index), information.drawn.design.dimension
+    amounts = basis.balls[places.index].reshape(n * d, -1)
+    displacement = basis.rows(amounts, np.zeros((n * d, information.drawn.shared)))
+    open_ = np.concatenate([basis.ball_open, -basis.ball_shared @ information.open_], axis=1)
+    return STEP * displacement.reshape(n, d, -1), STEP * (amounts @ open_).reshape(n, d, -1)
+
+
+def _of_points(information: Information, places: Points) -> tuple[Array, Array]:
+    """Displacements of corrected points (n, d, z), and those that the pool leaves open, in metres."""
+    drawn, (n, d) = information.drawn, places.points.shape
+    rows = np.zeros((n * d, drawn.shared))
+    for some, found in point_rows(drawn.design, drawn.layout, drawn.state, places):
+        own = found[:, :, drawn.own].reshape(-1, drawn.own.stop - drawn.own.start)
+        rows[some.start * d : some.start * d + len(own), : own.shape[1]] = own
+    rows *= drawn.scale
+    return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(n, d, -1)
 
 
 def _impossible(experiment: Experiment, text: str) -> ExperimentError:
     return ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
-
-
-def _nothing(kind: str, excluded: int) -> str:
-    if excluded:
-        return "no selection determines any of it; offer other candidates"
-    what = {"U6": "two evaluation points", "U5": "plates of two balls", "tasks": "evaluation.tasks"}[kind]
-    return f"the experiment has no {what}"

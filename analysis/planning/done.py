@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from simulator.design import Readings
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment, Position, ReadingGroup
-from simulator.experiment.pool import Candidate, with_chosen
-from simulator.experiment.tables import column_names, read_table
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.quantities import length_text
-from simulator.readings import AXES, read_readings
-from simulator.settings import hint
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position, ReadingGroup
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.quantities import length_text
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.tables import column_names, read_table
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.reading_files import AXES, read_readings
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")

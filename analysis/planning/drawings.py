@@ -5,11 +5,9 @@ from __future__ import annotations
 from html import escape
 
 import numpy as np
-
-from simulator.experiment.messages import in_one_line
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate
-from simulator.geometry.positions import AXIS_INDEX, ball_coordinates
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.geometry.positions import AXIS_INDEX, ball_coordinates
+from ballplate.simulator.inputs.messages import in_one_line
 
 SIZE, MARGIN = 170.0, 22.0
 # Of more balls only those at the corners are drawn.

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
-
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Calibration, Experiment, Position
-from simulator.settings import hint
+from ballplate.simulator.experiment.model import Calibration, Experiment, Position
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.settings import hint
 
 from .offer import Offer
 

@@ -12,24 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-
-from simulator.experiment.messages import ExperimentError, format_path, in_one_line
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate
-from simulator.experiment.problems import Problems
-from simulator.experiment.sections import ExperimentSettings
-from simulator.experiment.variants import variant_trees
-from simulator.experiment.yamltree import (
-    LOADER,
-    parse_tree,
-    read_text,
-    resolve_scalar,
-    to_python,
-)
-from simulator.experiment.yamltree import (
-    Mapping as MappingNode,
-)
-from simulator.machines.custom import module_file
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.sections import ExperimentSettings
+from ballplate.simulator.experiment.variants import variant_trees
+from ballplate.simulator.inputs.messages import ExperimentError, format_path, in_one_line
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.yamltree import LOADER, parse_tree, read_text, resolve_scalar, to_python
+from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
+from ballplate.simulator.machines.custom import module_file
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 SCHEMA_LINE = "# yaml-language-server:"
@@ -71,7 +61,7 @@ def experiment_text(
         for key in root.items
     }
     kept = {key: chunk for key, chunk in chunks.items() if is_same[key]}
-    first = text.split("\n", 1)[0]
+    first = text.splitlines()[0]
     head = [first] if first.startswith(SCHEMA_LINE) and folder.resolve() == source.parent.resolve() else []
     head += [f"# {in_one_line(line)}".rstrip() for line in header.splitlines()]
     for parts in (kept, {}):
@@ -126,7 +116,12 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
     def there(name: Any) -> Any:
         if not isinstance(name, str) or Path(name).is_absolute():
             return name
-        return Path(os.path.relpath((source / name).resolve(), folder.resolve())).as_posix()
+        target = (source / name).resolve()
+        try:
+            return Path(os.path.relpath(target, folder.resolve())).as_posix()
+        except ValueError:
+            # On Windows nothing leads from one drive to another.
+            return target.as_posix()
 
     def model(settings: Any) -> Any:
         settings = _with(settings, "file", there)

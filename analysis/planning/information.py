@@ -15,19 +15,18 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.covariance import EXACT
+from ballplate.simulator.estimation.elimination import ALIKE
+from ballplate.simulator.estimation.graded import Collected, Triangle
+from ballplate.simulator.estimation.graded import triangle as triangular
+from ballplate.simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.threads import scipy_linalg, single_threaded
 
-from simulator.design import Design
-from simulator.estimation.covariance import EXACT
-from simulator.estimation.elimination import ALIKE
-from simulator.estimation.graded import Collected, Triangle
-from simulator.estimation.graded import triangle as triangular
-from simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate
-from simulator.machines.protocol import Array
-from simulator.threads import scipy_linalg, single_threaded
-
+from ..running.steps import Report, counted, unreported
 from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_rows
 
 # Ball combinations below this fraction of the largest are rounding.
@@ -41,8 +40,8 @@ EXACTLY = 1e8
 # Kinds of reading (which balls, how often) beyond which all combinations of balls are kept.
 MOST_KINDS = 24
 
-# Matrices of all candidates together, in bytes.
-MOST_BYTES = 4 << 30
+# Matrices of all candidates together, in bytes; a plan takes two and a half times as much.
+MOST_BYTES = 800_000_000
 
 
 @dataclass(frozen=True)
@@ -162,6 +161,7 @@ def pool_information(
     candidates: Sequence[Candidate],
     all_balls: bool = False,
     completed: Mapping[int, int] | None = None,
+    report: Report = unreported,
 ) -> Information:
     """Information of every candidate of a pool.
 
@@ -195,16 +195,20 @@ def pool_information(
     certificates = [*even_known, *chain(*even_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
-    if len(candidates) * size**2 * 8 > MOST_BYTES:
-        limit = f"more than {MOST_BYTES >> 30} GB"
-        text = f"{len(candidates)} candidates with {size} parameters each take {limit}; offer fewer"
+    each = 8 * size**2
+    if len(candidates) * each > MOST_BYTES:
+        taken = f"{len(candidates) * each / 1e9:.3g} GB of memory"
+        text = (
+            f"{len(candidates)} candidates with {size} parameters each take {taken}; offer at most "
+            f"{MOST_BYTES // each}, positions of the experiment and certificates counted"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in known])
     of_positions = position_rows(drawn)
     own: list[Array] = []
     pose_ranks: list[int] = []
-    for k in range(len(candidates)):
+    for k in counted(range(len(candidates)), "candidates", len(candidates), report):
         if k in items:
             own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
             pose_ranks.append(0)

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import AtMost, Candidate, Pool
+from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 
 from .done import REST, SetUp, base_name, next_name, renamed
 from .information import Information

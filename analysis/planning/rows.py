@@ -10,20 +10,25 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from simulator.design import Design, Integers, State, nominal_state
-from simulator.estimation.observations import (
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
     length_derivative,
     prior_rows,
     reading_blocks,
 )
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Calibration, CoordinateCalibration, Experiment, Position, RadiusCalibration
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.model import (
+    Calibration,
+    CoordinateCalibration,
+    Experiment,
+    Position,
+    RadiusCalibration,
+)
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.machines.protocol import Array, Integers
 
 # A micrometre: columns are scaled so that a unit step moves some point by up to this.
 STEP = 1e-6

@@ -7,9 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from simulator.experiment.model import Position
-from simulator.experiment.pool import Candidate, ChangeTimes
-from simulator.settings import listing
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
+from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of
 

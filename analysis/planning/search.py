@@ -13,11 +13,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-
-from simulator.design import Integers
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
-from simulator.threads import scipy_linalg, single_threaded
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.numerics.threads import scipy_linalg, single_threaded
 
 from .constraints import Constraints
 from .criteria import Criterion

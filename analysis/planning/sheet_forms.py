@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from simulator.experiment.messages import in_one_line
-from simulator.experiment.model import Experiment
-from simulator.quantities import format_duration
-from simulator.spreadsheets import CsvWriter
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.quantities import format_duration
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
 
-from ..tables import aligned
+from ..results.formatting import aligned
 from .drawings import place_drawing
 from .schedule import RunSheet, Step
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..planning.campaign import Campaign, Gain
+from ..planning.choice import Gain, Selection
 from ..planning.constraints import HOUR, Budget, Spent
 from ..planning.criteria import DESCRIPTIONS
-from ..tables import number
+from ..results.formatting import number
 from .pictures import draw_scene
 from .scene import scene
 from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, placed_axes, save
@@ -40,9 +40,13 @@ MOST_CHOSEN, MOST_LEFT_OUT, MOST_LETTERS = 24, 5, 66
 WIDE, FAR = 5.0, 4.0
 
 
-def draw_campaign(found: Campaign, path: Path) -> None:
-    """Write a picture of the criterion against the budget, of the gain of each candidate, and of the positions.
+def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
+    """A picture of the criterion against the budget, of the gain of each candidate, and of the positions.
 
+    It is written to the path, if there is one.
+
+    :raises ImportError: matplotlib is missing.
+    :raises ValueError: the name ends in none of the kinds of pictures.
     :raises OSError: the file cannot be written.
     """
     rows, marks = _rows(found), _marks(found)
@@ -63,10 +67,10 @@ def draw_campaign(found: Campaign, path: Path) -> None:
         axes.set_axis_off()
         axes.set_aspect("equal")
         draw_scene(axes, scene(found.plan.design), by_number=True)
-        save(figure, path, words(found))
+        return save(figure, path, words(found))
 
 
-def words(found: Campaign) -> str:
+def words(found: Selection) -> str:
     """The picture for those who do not see it."""
     told = [f"{found.criterion}, no more than {found.budget}: chosen {_told(found, found.value)}"]
     if not math.isnan(found.bound):
@@ -78,7 +82,7 @@ def words(found: Campaign) -> str:
     return f"{', '.join(told)}; {len(found.chosen)} chosen of {len(found.pool.candidates)} candidates"
 
 
-def _told(found: Campaign, value: float) -> str:
+def _told(found: Selection, value: float) -> str:
     if math.isinf(value):
         return "deficient"
     return number(value, 3) if found.unit == "1" else f"{number(1e6 * value, 3)} µm"
@@ -123,11 +127,11 @@ class _Mark:
         return number(self.value, 3) if math.isfinite(self.value) else "deficient"
 
 
-def _factor(found: Campaign) -> float:
+def _factor(found: Selection) -> float:
     return 1.0 if found.unit == "1" else 1e6
 
 
-def _marks(found: Campaign) -> list[_Mark]:
+def _marks(found: Selection) -> list[_Mark]:
     """What a choice is compared with, the choice first."""
     marks = [_Mark(CHOSEN, found.value, SERIES[0], MARKERS[0])]
     if not math.isnan(found.bound):
@@ -139,7 +143,7 @@ def _marks(found: Campaign) -> list[_Mark]:
     return [replace(mark, value=_factor(found) * mark.value) for mark in marks]
 
 
-def _strip(axes: Axes, found: Campaign, marks: Sequence[_Mark]) -> None:
+def _strip(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
     """The marks one below the other, with what no choice can reach."""
     target = next((mark.value for mark in marks if mark.name == TARGET), None)
     low, high = _limits([mark.value for mark in marks if mark.name != TARGET], target)
@@ -165,7 +169,7 @@ def _strip(axes: Axes, found: Campaign, marks: Sequence[_Mark]) -> None:
     _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
-def _curve(axes: Axes, found: Campaign, marks: Sequence[_Mark]) -> None:
+def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
     """Criterion against budget: choices, their bounds, the positions as drawn, and the target."""
     from matplotlib.ticker import MaxNLocator
 
@@ -253,7 +257,7 @@ class _Row:
     colour: str
 
 
-def _rows(found: Campaign) -> list[_Row]:
+def _rows(found: Selection) -> list[_Row]:
     """The chosen ones with their numbers in the drawing, those first that gain most, then the best of the others."""
     numbers = {name: k + 1 for k, name in enumerate(found.plan.design.position_names)}
     rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in found.gains[:MOST_CHOSEN]]

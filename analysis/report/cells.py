@@ -6,14 +6,14 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.yamltree import read_tree
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import read_tree
 
 from ..sweeps.bundle import Bundle, has_code, unpack
 from ..sweeps.load import experiment_of, load_sweep
-from ..sweeps.named_files import MODULE
-from ..sweeps.store import Store, files
+from ..sweeps.named_files import MODULE, YAML, axis_paths, leads_out, path_scalars
+from ..sweeps.store import Store, StoreError, files
 from .results import Results
 
 
@@ -27,9 +27,15 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
     Error models of a user's own are Python code, which a store from elsewhere must not run unasked: only with
     `run_modules` are they loaded.
 
-    :raises NoExperimentError: the files are not there, have changed their meaning, or would run code.
+    Files outside the store are not read, whatever the experiment names.
+
+    :raises NoExperimentError: the files are not there, have changed their meaning, name others, or would run code.
     """
-    bundle = Bundle(results.definition["source"], results.definition["base"], files(store, results.number))
+    try:
+        kept = files(store, results.number)
+    except StoreError as error:
+        raise NoExperimentError(str(error).removeprefix(f"{store.path}: ")) from None
+    bundle = Bundle(results.definition["source"], results.definition["base"], kept)
     names = [name for name, _ in bundle.files]
     if bundle.source not in names or bundle.base not in names:
         raise NoExperimentError("the store does not hold the sweep's files")
@@ -38,7 +44,11 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
             source = unpack(bundle, Path(folder))
         except ValueError as error:
             raise NoExperimentError(f"the store is not to be trusted: {error}") from None
+        except OSError as error:
+            raise NoExperimentError(f"the store's files cannot be unpacked ({error.strerror})") from None
         try:
+            if _leads_out(bundle, Path(folder)):
+                raise NoExperimentError("the experiment names files that are not in the store")
             if not run_modules and _has_code(bundle, Path(folder)):
                 text = "the experiment has an error model in Python, which is run only with --run-modules"
                 raise NoExperimentError(text)
@@ -49,6 +59,17 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
             return [experiment_of(sweep, cell) for cell in cells]
         except ExperimentError as error:
             raise NoExperimentError(error.messages[0].text) from None
+
+
+def _leads_out(bundle: Bundle, folder: Path) -> bool:
+    """Whether a file of the store names one that is not in it."""
+    base = folder / PurePosixPath(bundle.base)
+    axes = axis_paths(read_tree(folder / PurePosixPath(bundle.source)))
+    if leads_out(axes, base.parent, folder):
+        return True
+    paths = [base, *(folder / PurePosixPath(name) for name, _ in bundle.files if name.lower().endswith(YAML))]
+    source = folder / PurePosixPath(bundle.source)
+    return any(leads_out(path_scalars(read_tree(path), ""), path.parent, folder) for path in paths if path != source)
 
 
 def _has_code(bundle: Bundle, folder: Path) -> bool:

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.splines.read import Points
 
-from simulator.rounding import comparable
-from simulator.splines.read import Points
-
-from ..curve import Curve, whole_profile
-from ..curve_tables import derivative_unit, shown
+from ..error_curve.curve_tables import derivative_unit, shown
+from ..error_curve.error_curve import Curve, whole_profile
 from .svg import INK, MUTED, PAPER, SERIES, drawing, micro, placed_axes, round_number, save
 
 if TYPE_CHECKING:

@@ -8,10 +8,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables import number
+from ..results.formatting import number
+from ..results.table import Entry
 from .measures import Measure, uncertainty_measures
 from .results import Axis, Results, criterion, partly_open
-from .tables import DIGITS, NOT_DONE, STAR, Entry
+from .tables import DIGITS, NOT_DONE, STAR
 
 # Values of an axis that are shown, shades that can be told apart, and pairs of axes.
 MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from simulator.machines.protocol import Array
-
-from ..length_tables import target_words
-from ..lengths import LengthMap
-from ..tables import percent
+from ..length_map.length_map import LengthMap
+from ..length_map.length_tables import target_words
+from ..results.formatting import percent
 from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..results.formatting import shown_unit
 from ..sweeps.columns import symbol_column
-from ..tables import shown_unit
-from ..uncertainty import DESCRIPTIONS
+from ..uncertainty.quantities import DESCRIPTIONS
 from .results import Results
 
 STATISTICS = ("maximum", "average")
@@ -104,8 +104,9 @@ def trial_symbols(results: Results) -> list[str]:
     found = []
     for column in results.frame.columns:
         name, mark, _ = column.partition("_spread_ratio")
-        if mark and column.endswith("_spread_ratio"):
-            found.append(name.replace("_more", "'").replace("_", " "))
+        symbol = name.replace("_more", "'").replace("_", " ")
+        if mark and column.endswith("_spread_ratio") and symbol.rstrip("'") in DESCRIPTIONS:
+            found.append(symbol)
     order = list(DESCRIPTIONS)
     return sorted(found, key=lambda symbol: (order.index(symbol.rstrip("'")), symbol))
 

@@ -10,23 +10,24 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.settings import listing
 
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.settings import listing
-
+from ..results.formatting import number, percent, uncertainty_words
+from ..results.table import Block, Entry, Row, Table
+from ..running.steps import Report, counted, unreported
 from ..sweeps.store import Store
-from ..tables import number, percent, uncertainty_words
-from ..uncertainty import DESCRIPTIONS
+from ..uncertainty.quantities import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
 from .plots import plot_svg
-from .results import Results, best_and_worst, criterion, one_line
+from .results import Results, best_and_worst, cell_list, criterion, one_line
 from .scene import MOST_BALLS, Scene, scene
 from .series import Plot, plots
 from .svg import micro
-from .tables import Block, Entry, Row, Table, report_tables
+from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
 from .volume import error_map
 
@@ -62,8 +63,8 @@ class DrawnMap:
     figures: tuple[Drawn, ...]
 
 
-def page(store: Store, results: Results, run_modules: bool = False) -> str:
-    """The page. Experiments with code of their own are drawn only with `run_modules`.
+def page(store: Store, results: Results, run_modules: bool = False, report: Report = unreported) -> str:
+    """The page. Experiments with code of their own are drawn only with `run_modules`; `report` is told what is drawn.
 
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
@@ -82,13 +83,13 @@ def page(store: Store, results: Results, run_modules: bool = False) -> str:
         "facts": _facts(results),
         "failures": failures(results),
         "tables": report_tables(results),
-        "plots": _plots(drawn),
+        "plots": _plots(drawn, report),
         "has_trials": any(len(line.actual) for plot in drawn for line in plot.panels[0].lines),
         "heats": heat_maps(results),
         "ranks": ranks(results),
         "weak": weak(results),
         "flags": flags(results),
-        **_designs(store, results, run_modules),
+        **_designs(store, results, run_modules, report),
     }
     context["sections"] = _sections(context)
     return re.sub(r"\n{2,}", "\n", template.render(context)).lstrip() + "\n"
@@ -112,6 +113,8 @@ def _summary(results: Results) -> str:
     parts = [f"{results.count('done')} of {len(results.cells)} cells done"]
     parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
     parts += [f"{results.left} left"] if results.left else []
+    unreadable = len(results.found.unreadable)
+    parts += [f"{unreadable} could not be read from the damaged store"] if unreadable else []
     return ", ".join(parts) + "."
 
 
@@ -129,7 +132,9 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         facts.append((f"Axis {axis.name}", ", ".join(labels)))
     facts += [
         ("Cells", f"{len(results.cells)}: {results.count('done')} done, {results.count('failed')} failed, "
-                  f"{results.left} left"),
+                  f"{results.left} left"
+                  + (f", {len(results.found.unreadable)} could not be read: {_unreadable(results)}"
+                     if results.found.unreadable else "")),
         ("Recorded", ", ".join(stored["record"])),
         ("Monte Carlo", f"{stored['trials']} data sets of each cell" if stored["trials"] else "none"),
     ]  # fmt: skip
@@ -142,10 +147,16 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     return facts
 
 
-def _plots(drawn: list[Plot]) -> list[tuple[str, list[Drawn]]]:
+def _unreadable(results: Results) -> str:
+    """Which cells could not be read, and why the first of them."""
+    cells = sorted(results.found.unreadable)
+    return f"{cell_list(cells)} ({one_line(results.found.unreadable[cells[0]])})"
+
+
+def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawn]]]:
     found = []
     number_of = 0
-    for axis, some in groupby(drawn, lambda plot: plot.axis.name):
+    for axis, some in groupby(counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name):
         figures = []
         for plot in some:
             number_of += 1
@@ -155,7 +166,7 @@ def _plots(drawn: list[Plot]) -> list[tuple[str, list[Drawn]]]:
     return found
 
 
-def _designs(store: Store, results: Results, run_modules: bool) -> dict[str, Any]:
+def _designs(store: Store, results: Results, run_modules: bool, report: Report) -> dict[str, Any]:
     """The best and the worst cell's design, and the best one's error map."""
     empty: dict[str, Any] = {"designs": [], "no_designs": "", "error_map": None}
     cells, judged = best_and_worst(results), criterion(results)
@@ -167,7 +178,7 @@ def _designs(store: Store, results: Results, run_modules: bool) -> dict[str, Any
         return {**empty, "no_designs": str(error)}
     symbol = judged[1].replace("_", " ")
     designs = []
-    for k, (cell, experiment) in enumerate(zip(cells, found, strict=True)):
+    for k, (cell, experiment) in enumerate(counted(zip(cells, found, strict=True), "designs", len(cells), report)):
         which = ("Smallest", "Largest")[k] if len(cells) > 1 else "The only"
         row = int(np.flatnonzero(results.frame["cell"] == cell)[0])
         value, open_ = (results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined"))

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.machines.protocol import Array
 
-from simulator.machines.protocol import Array
-
-from ..tables import number
-from .scene import Place, Scene
-from .svg import DASHES, INK, MUTED, PAPER, SERIES, WIDTH, as_svg, blank_axes, drawing, placed_axes
+from ..results.formatting import number
+from .scene import Place, Scene, scene
+from .svg import DASHES, INK, MUTED, PAPER, SERIES, WIDTH, as_svg, blank_axes, drawing, placed_axes, save
 from .volume import ErrorMap, Slice
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Points around a map.
 LEFT, RIGHT, BELOW, ABOVE = 50.0, 18.0, 40.0, 10.0
@@ -34,6 +36,19 @@ def scene_svg(drawn: Scene, name: str, words: str) -> str:
     with drawing(330.0) as figure:
         draw_scene(blank_axes(figure), drawn, len(drawn.places) > MOST_NAMES)
         return as_svg(figure, name, words)
+
+
+def draw_design(design: Design, words: str, path: str | Path | None = None) -> Figure:
+    """The positions of a design in the volume as a picture of its own, which is written to the path if there is one.
+
+    :raises ImportError: matplotlib is missing.
+    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises OSError: the file cannot be written.
+    """
+    drawn = scene(design)
+    with drawing(330.0) as figure:
+        draw_scene(blank_axes(figure), drawn, len(drawn.places) > MOST_NAMES)
+        return save(figure, path, words)
 
 
 def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:

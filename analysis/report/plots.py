@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..tables import number
+from ..results.formatting import number
 from .series import Line, Panel, Plot
 from .svg import DASHES, INK, MARKERS, PAPER, SERIES, WIDTH, as_svg, drawing, micro, placed_axes
 

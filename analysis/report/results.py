@@ -9,13 +9,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.inputs.quantities import QUANTITY, exact_number
 from numpy.typing import NDArray
 
-from simulator.quantities import QUANTITY, exact_number
-
 from ..sweeps.columns import MORE, symbol_column
-from ..sweeps.frame import frame
-from ..sweeps.store import Store, all_details, chosen_sweep, definition_of
+from ..sweeps.frame import frame_of
+from ..sweeps.store import Results as Found
+from ..sweeps.store import Store, chosen_sweep, definition_of, results
+from ..uncertainty.quantities import RECORDED
 
 if TYPE_CHECKING:
     import pandas
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 Integers = NDArray[np.int64]
 
 # The quantities whose average makes one cell better than another; the first of these that is recorded.
-CRITERIA = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
+PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
+CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERRED))
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,8 @@ class Results:
     """A sweep and what has come of it.
 
     `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows of those that are
-    done or have failed, `chosen` (rows, axes) their indices, and `texts` what was told of them, by cell.
+    done or have failed, `chosen` (rows, axes) their indices, and `texts` what was told of them, by cell. `found` is
+    what the store holds of them.
     """
 
     number: int
@@ -66,6 +69,7 @@ class Results:
     frame: pandas.DataFrame
     chosen: Integers
     texts: dict[int, dict[str, Any]]
+    found: Found
 
     @property
     def title(self) -> str:
@@ -77,7 +81,7 @@ class Results:
 
     @property
     def left(self) -> int:
-        return len(self.cells) - len(self.frame)
+        return len(self.cells) - len(self.frame) - len(self.found.unreadable)
 
     def label(self, cell: int) -> str:
         """A cell in words."""
@@ -86,8 +90,8 @@ class Results:
         )
 
     def value(self, name: str, row: int) -> float:
-        """A figure of a row of the frame."""
-        return float(self.frame[name].to_numpy()[row])
+        """A figure of a row of the frame; NaN where none was recorded."""
+        return float(self.frame[name].to_numpy()[row]) if name in self.frame else math.nan
 
     @cached_property
     def statuses(self) -> list[str]:
@@ -100,8 +104,8 @@ class Results:
         return np.array([status == "done" for status in self.statuses], bool)
 
     def figure(self, name: str) -> NDArray[np.float64]:
-        """A column of the frame (rows,)."""
-        return np.asarray(self.frame[name], float)
+        """A column of the frame (rows,); NaN where none was recorded."""
+        return np.asarray(self.frame[name], float) if name in self.frame else np.full(len(self.frame), np.nan)
 
 
 def read_results(store: Store, sweep: int | None) -> Results:
@@ -113,8 +117,9 @@ def read_results(store: Store, sweep: int | None) -> Results:
     definition = definition_of(store, number)
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
-    found = frame(store, number)
-    return Results(number, definition, axes, cells, found, cells[found["cell"]], dict(all_details(store, number)))
+    found = results(store, number, len(cells))
+    texts = dict(zip(found.cells.tolist(), found.details, strict=True))
+    return Results(number, definition, axes, cells, frame_of(found, definition), cells[found.cells], texts, found)
 
 
 def _axis(stored: dict[str, Any]) -> Axis:

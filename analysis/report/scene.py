@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, locations, nominal_state
+from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
-
-from simulator.design import Design, locations, nominal_state
-from simulator.machines.protocol import Array
 
 # The eye: turned about z, then raised, in degrees.
 TURN, RISE = -35.0, 24.0

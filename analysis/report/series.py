@@ -63,6 +63,8 @@ def plots(results: Results) -> list[Plot]:
             continue
         for symbol in dict.fromkeys(m.symbol for m in measures):
             mine = {m.statistic: m for m in measures if m.symbol == symbol}
+            if len(mine) < 2:
+                continue
             plot = _plot(results, k, symbol, [mine["average"], mine["maximum"]])
             if any(np.isfinite(line.y).any() for panel in plot.panels for line in panel.lines):
                 found.append(plot)

@@ -76,9 +76,16 @@ def round_number(value: float) -> float:
 
 @contextmanager
 def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
-    """A figure of a size in points. Its parts are placed by hand, which takes half the time of a layout found."""
-    import matplotlib
-    from matplotlib.figure import Figure
+    """A figure of a size in points. Its parts are placed by hand, which takes half the time of a layout found.
+
+    :raises ImportError: matplotlib is missing; the text has the command that installs it.
+    """
+    try:
+        import matplotlib
+    except ImportError as error:
+        text = "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
+        raise ImportError(text, name="matplotlib") from error
+    from .figures import Picture
 
     # A user's own settings must not change the page.
     with matplotlib.rc_context(), warnings.catch_warnings():
@@ -86,7 +93,9 @@ def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
         matplotlib.rcParams.update(SETTINGS)
         # Letters that the measuring font lacks are drawn by the reader's.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
-        yield Figure(figsize=(width / 72.0, height / 72.0), facecolor="none")
+        figure = Picture(figsize=(width / 72.0, height / 72.0), facecolor="none")
+        figure.settings = SETTINGS
+        yield figure
 
 
 def placed_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
@@ -141,8 +150,10 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
 PICTURES = (".svg", ".png", ".pdf")
 
 
-def save(figure: Figure, path: Path, words: str) -> None:
+def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
     """Write the figure to a file of its own, of the kind its name ends in, with words for those who do not see it.
+
+    The figure is given back, with the words as its label; without a path nothing is written.
 
     It has a white ground and needs no fonts of the reader's; the same figure gives the same bytes.
 
@@ -151,6 +162,10 @@ def save(figure: Figure, path: Path, words: str) -> None:
     """
     import matplotlib
 
+    figure.set_label(words)
+    if path is None:
+        return figure
+    path = Path(path)
     kind = path.suffix.lower()
     if kind not in PICTURES:
         raise ValueError(f"{path} should end in one of {', '.join(PICTURES)}")
@@ -162,4 +177,8 @@ def save(figure: Figure, path: Path, words: str) -> None:
     else:
         metadata = {"Title": words, "Software": None}
     with matplotlib.rc_context({"svg.fonttype": "path"}):
-        figure.savefig(path, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
+        # Not to the file itself: where a disk is full, errors of the compression hide that of the file.
+        whole = io.BytesIO()
+        figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
+    path.write_bytes(whole.getvalue())
+    return figure

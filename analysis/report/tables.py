@@ -1,15 +1,15 @@
-"""The tables of a report, before any of the forms that they are written in."""
+"""The tables of a report."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from ..montecarlo.comparison_tables import with_error
 from ..montecarlo.figures import Figure
-from ..montecarlo.tables import with_error
+from ..results.formatting import number, percent
+from ..results.table import Block, Entry, Row, Table
 from ..sweeps.columns import symbol_column
-from ..tables import number, percent
 from .measures import (
     Measure,
     descriptions,
@@ -26,58 +26,10 @@ MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
 MOST_BEST = 10
 
 NOT_DONE = "left"
+UNREADABLE = "unreadable"
 
 # Behind a value that leaves out what is undetermined.
 STAR = "*"
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A place in a table; `value` is the figure of the cell as it is stored, None where a text stands alone."""
-
-    text: str
-    value: float | None = None
-    cell: int | None = None
-    figure: str = ""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row: what it is about, then its entries."""
-
-    headings: tuple[str, ...]
-    entries: tuple[Entry, ...]
-
-
-@dataclass(frozen=True)
-class Block:
-    """Rows that belong together; `title` is empty where a table has no blocks."""
-
-    title: str
-    rows: tuple[Row, ...]
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table.
-
-    `headings` stand above what rows are about, `columns` above the entries, `spanner` above all of these, and `block`
-    says what the blocks' titles are values of.
-    """
-
-    name: str
-    caption: str
-    headings: tuple[str, ...]
-    columns: tuple[str, ...]
-    blocks: tuple[Block, ...]
-    spanner: str = ""
-    block: str = ""
-    notes: tuple[str, ...] = ()
-
-    @property
-    def size(self) -> int:
-        """Number of rows."""
-        return sum(len(block.rows) for block in self.blocks)
 
 
 def report_tables(results: Results) -> tuple[Table, ...]:
@@ -185,7 +137,8 @@ def _below(
 
 def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> Entry:
     if row is None:
-        return Entry(NOT_DONE, None, cell, measure.figure)
+        text = UNREADABLE if cell in results.found.unreadable else NOT_DONE
+        return Entry(text, None, cell, measure.figure)
     if results.statuses[row] != "done":
         return Entry(results.statuses[row], None, cell, measure.figure)
     value = results.value(measure.figure, row)

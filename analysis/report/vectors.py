@@ -5,15 +5,15 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.machines.protocol import Array
 
-from simulator.machines.protocol import Array
-from simulator.readings import ObservedReadings
-
-from ..reversal import ReversalFit
-from ..study import Fit, reading_residuals
 from .svg import INK, MARKERS, MUTED, SERIES, WIDTH, drawing, placed_axes, round_number, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Of the drawing's extent, the longest vector takes this part at most.
 LONGEST = 0.2
@@ -36,28 +36,6 @@ class Vectors:
     names: tuple[str, ...] = ()
 
 
-def of_fit(fit: Fit, observed: ObservedReadings) -> tuple[Vectors, ...]:
-    """Residuals of a two-dimensional fit that has converged, for each position."""
-    design = fit.design
-    readings, residuals, _ = reading_residuals(design, fit.solution, observed.x)
-    places = observed.x[design.plate_readings]
-    return tuple(
-        Vectors(
-            design.position_names[k],
-            places[mine],
-            residuals[mine],
-            tuple(design.ball_names[ball] for ball in readings.ball[mine]),
-        )
-        for k in np.unique(readings.position)
-        for mine in [readings.position == k]
-    )
-
-
-def of_reversal(fit: ReversalFit) -> tuple[Vectors, ...]:
-    """Residuals of a reversal: readings in the first position less what those in the second predict."""
-    return (Vectors(f"{fit.first}, less what {fit.second} predicts", fit.places, fit.found.residuals, fit.names),)
-
-
 def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
     """The largest of 1, 2, 5, 10, ... with which the longest vector takes no more than its part of `extent` metres.
 
@@ -71,9 +49,12 @@ def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
     return round_number(LONGEST * extent / longest)
 
 
-def draw_vectors(groups: tuple[Vectors, ...], title: str, path: Path) -> None:
-    """Write residual vectors as a picture, each from the place that was read, with a bar of known length below.
+def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | None = None) -> Figure:
+    """Residual vectors as a picture, each from the place that was read, with a bar of known length below.
 
+    It is written to the path, if there is one.
+
+    :raises ImportError: matplotlib is missing.
     :raises ValueError: the name ends in none of the kinds of pictures.
     :raises OSError: the file cannot be written.
     """
@@ -116,7 +97,7 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: Path) -> None:
                 fontsize=7.0,
             )
         _legend(figure, groups, times, width / (1e3 * across))
-        save(figure, path, f"{title}: residuals as vectors, magnified {times:g} times")
+        return save(figure, path, f"{title}: residuals as vectors, magnified {times:g} times")
 
 
 def _named(groups: tuple[Vectors, ...]) -> list[tuple[str, Array, Array]]:
@@ -135,7 +116,7 @@ def _style(k: int) -> tuple[str, str]:
     return SERIES[k % len(SERIES)], MARKERS[(k + k // len(SERIES)) % len(MARKERS)]
 
 
-def _legend(figure, groups: tuple[Vectors, ...], times: float, per_millimetre: float) -> None:  # type: ignore[no-untyped-def]
+def _legend(figure: Figure, groups: tuple[Vectors, ...], times: float, per_millimetre: float) -> None:
     """Names of the groups, and a bar of one, two or five of some unit, that long in the drawing as a residual is."""
     longest = max(float(np.sqrt((g.residuals**2).sum(axis=1)).max()) for g in groups)
     length = round_number(longest) if longest > 0.0 else 1e-6

@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.design import nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
-
-from ..uncertainty import point_pairs
+from ..uncertainty.summaries import point_pairs
 
 # Points along x and y of a slice.
 POINTS = 21
@@ -58,12 +54,9 @@ def error_map(experiment: Experiment) -> ErrorMap:
         levels = [(name, height) for (name, _), height in zip(LEVELS, heights, strict=True)]
         grid = np.stack(np.meshgrid(heights, y, x, indexing="ij")[::-1], axis=-1)
     design = replace(design, points=grid.reshape(-1, design.dimension))
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    spread = covariance(design, factor, spectrum(factor))
     target = experiment.target_accuracy
     limit = None if target is None else target.standard
-    of_points, pairs = point_pairs(design, layout, state, spread, limit)
+    of_points, pairs = point_pairs(linearise(design), limit)
     values = np.sqrt((of_points**2).mean(axis=1)).reshape(grid.shape[:-1])
     slices = [Slice(name, level, found) for (name, level), found in zip(levels, values, strict=True)]
     within = None if target is None else pairs.within / pairs.count

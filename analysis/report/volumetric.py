@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.volumetric import meaning, symbol
+from ballplate.simulator.numerics.rounding import comparable
 
-from simulator.design import Integers
-from simulator.machines.protocol import Array
-from simulator.machines.volumetric import meaning, symbol
-from simulator.rounding import comparable
-
-from ..tables import SHOWN, number
-from ..volumetric import AlongAxis, LengthErrors, VolumetricErrors
+from ..results.formatting import SHOWN, number
+from ..volumetric.volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 from .scene import box_edges, projection
 from .svg import (
     DASHES,

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from ..estimators import Comparison, compare_estimators, share_below
-from ..uncertainty import Quantity
+from ..estimators.distances import Comparison, compare_estimators, share_below
+from ..running.steps import Report, unreported
+from ..uncertainty.summaries import Quantity
 from .published import (
     REPEATABILITY,
     SUM_OF_SQUARES,
@@ -28,8 +29,6 @@ from .published import (
     section_of,
 )
 from .shipped import Shipped, fitted_exactly, planned, shipped_experiment, sums_of_squares, tabulated, variants
-
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -266,7 +265,7 @@ def reproduce(
     shipped: Shipped,
     sections: Iterable[str] = (),
     trials: int | None = 100,
-    report: Report = lambda what, done, wanted: None,
+    report: Report = unreported,
 ) -> Reproduction:
     """Compute the experiments of a document's sections, all of them if none are named.
 
@@ -467,6 +466,6 @@ def compare_difference(
         experiment,
         trials,
         across_probes=True,
-        progress=lambda done: report(f"data sets of {experiment.label}", done, trials),
+        report=report,
     )
     return ComparedDifference(difference, comparison, document.statements.limits.median)

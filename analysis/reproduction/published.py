@@ -8,8 +8,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Literal
 
-from simulator.experiment.yamltree import parse_tree, to_python
-from simulator.settings import Settings
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.inputs.yamltree import parse_tree, to_python
 
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 Statistic = Literal["maximum", "average"]

@@ -6,19 +6,18 @@ Three of its six quantities depend on choices that it does not state; these give
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, pose_size
+from ballplate.simulator.estimation.functions import Balls, displacements
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.estimation.observations import rotation_sensitivity
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.threads import single_threaded
 from numpy.typing import NDArray
 
-from simulator.design import Design, State, nominal_state, pose_size
-from simulator.estimation.covariance import Covariance, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.observations import rotation_sensitivity
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
-
-from ..pairs import pair_tiles
-from ..uncertainty import Quantity, summarise
+from ..uncertainty.pairs import pairs_of
+from ..uncertainty.summaries import Quantity, summarise
 
 
 @single_threaded
@@ -28,14 +27,13 @@ def tabulated_quantities(design: Design) -> dict[str, Quantity]:
     U2 is that of transformations about the machine's origin, U3 that of the coefficients of t, t - t^2, t^2 - t^3, ...
     for positional errors, and U5 that of the distances from an artefact's first ball to all others.
     """
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    spread = covariance(design, factor, spectrum(factor))
+    at = linearise(design)
+    layout = at.layout
     names = [parameter.name for parameter in layout.parameters[layout.poses]]
-    found = {"U2": summarise("U2", spread.of_shared(pose_rows(design, layout)), "m, rad", names)}
+    found = {"U2": summarise("U2", at.of_shared(pose_rows(design, layout)), "m, rad", names)}
     coefficients, rows = coefficient_rows(design, layout)
-    found["U3"] = summarise("U3", spread.of_shared(rows), "m, rad", coefficients)
-    lengths, balls = first_ball_lengths(design, state, spread)
+    found["U3"] = summarise("U3", at.of_shared(rows), "m, rad", coefficients)
+    lengths, balls = first_ball_lengths(at)
     if balls:
         found["U5"] = summarise("U5", lengths, "m", balls)
     return found
@@ -82,17 +80,18 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
     return [names[i] for i in kept], rows
 
 
-def first_ball_lengths(design: Design, state: State, spread: Covariance) -> tuple[Array, list[str]]:
+def first_ball_lengths(at: Linearisation) -> tuple[Array, list[str]]:
     """Standard uncertainties (m,) of the distances from the first ball of each artefact to all others, and their names.
 
     They are NaN where they are undetermined.
     """
+    design = at.design
     values, names = [], []
     for artefact in np.flatnonzero(design.is_plate):
         own = np.flatnonzero(design.ball_artefact == artefact)
-        for tile in pair_tiles(state.balls[own], spread.ball[own], spread.ball_own[own], spread.ball_null[own]):
-            chosen = tile.first == 0
-            values.append(np.where(tile.is_open, np.nan, tile.uncertainties)[chosen])
-            for second in tile.second[chosen]:
-                names.append(f"ball {design.ball_label(own[0])} to ball {design.ball_label(own[second])}")
+        pairs = np.stack([np.zeros(len(own) - 1, np.int64), np.arange(1, len(own))], axis=1)
+        tile = pairs_of(displacements(at, Balls(own)), pairs)
+        values.append(np.where(tile.is_open, np.nan, tile.uncertainties))
+        for second in own[1:]:
+            names.append(f"ball {design.ball_label(own[0])} to ball {design.ball_label(second)}")
     return np.concatenate(values) if values else np.zeros(0), names

@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings
-from simulator.settings import hint
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import exact_readings, on_true_machine
+from ballplate.simulator.readings.reading_files import ObservedReadings
 
-from ..study import Fit, Plan, fit, plan
-from ..uncertainty import Quantity
+from ..results.fit import Fit
+from ..results.prediction import Prediction
+from ..results.study import fit, predict
+from ..uncertainty.summaries import Quantity
 from .quantities import tabulated_quantities
 
 
@@ -25,7 +27,7 @@ class Shipped:
 
     folder: Path
     loaded: dict[str, dict[str, Experiment]] = field(default_factory=dict)
-    plans: dict[str, Plan] = field(default_factory=dict)
+    plans: dict[str, Prediction] = field(default_factory=dict)
     tabulated: dict[str, dict[str, Quantity]] = field(default_factory=dict)
 
 
@@ -57,10 +59,10 @@ def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
     return found[label]
 
 
-def planned(shipped: Shipped, label: str) -> Plan:
+def planned(shipped: Shipped, label: str) -> Prediction:
     """The plan of a shipped design, at zero machine error."""
     if label not in shipped.plans:
-        shipped.plans[label] = plan(shipped_experiment(shipped, label))
+        shipped.plans[label] = predict(shipped_experiment(shipped, label))
     return shipped.plans[label]
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
-from simulator.experiment.messages import Steps
-from simulator.experiment.problems import Problems, written
-from simulator.experiment.variants import node_at, override
-from simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python
-from simulator.settings import hint, listing
+from ballplate.simulator.experiment.variants import node_at, override
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python, written
 
 from .model import Axis, Choice, Unit
 from .settings import AxisSettings

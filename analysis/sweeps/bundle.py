@@ -5,17 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.modules import python_models
-from simulator.experiment.yamltree import Node, read_tree, to_python
+from ballplate.simulator.experiment.modules import python_models
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.yamltree import Node, read_tree, to_python
 
 from .model import Sweep
-from .named_files import named_files
+from .named_files import is_rooted, named_files
 
 # Of all files together, as they are kept in the store and sent to workers.
 MOST_BYTES = 100_000_000
@@ -46,8 +46,11 @@ def bundle_of(sweep: Sweep) -> Bundle:
     """
     source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
     paths = files_of(sweep)
-    root = Path(os.path.commonpath([path.parent for path in paths]))
-    names = {path: path.relative_to(root).as_posix() for path in paths}
+    try:
+        names = names_of(paths)
+    except ValueError:
+        text = f"{sweep.base} lies on another drive than the sweep file; put both on the same one"
+        raise ExperimentError([Message(str(sweep.source), 0, 0, "base", text)]) from None
     try:
         size = sum(path.stat().st_size for path in paths)
         if size > MOST_BYTES:
@@ -56,11 +59,28 @@ def bundle_of(sweep: Sweep) -> Bundle:
                 "of what a store takes; name large files from the root of the file system"
             )
             raise ExperimentError([Message(str(sweep.source), 0, 0, "", text)])
-        files = tuple((name, path.read_bytes()) for path, name in names.items())
+        files = tuple((name, Path(path).read_bytes()) for path, name in names.items())
     except OSError as error:
         text = f"cannot be read ({error.strerror}); check its name and permissions"
         raise ExperimentError([Message(str(error.filename), 0, 0, "", text)]) from None
     return Bundle(names[source], names[base], files)
+
+
+def names_of(paths: Sequence[PurePath]) -> dict[PurePath, str]:
+    """Names of absolute paths below the lowest folder that has them all, in the same order on every system.
+
+    :raises ValueError: they lie on several drives.
+
+    >>> from pathlib import PureWindowsPath
+    >>> list(names_of([PureWindowsPath("C:/plan/b.yaml"), PureWindowsPath("c:/PLAN/tables/A.csv")]).values())
+    ['b.yaml', 'tables/A.csv']
+    """
+    top = next((one for one in paths[0].parents if all(path.is_relative_to(one) for path in paths)), None)
+    if top is None:
+        raise ValueError("no folder has files of several drives")
+    names = {path: path.relative_to(top).as_posix() for path in paths}
+    # Paths of Windows are ordered whatever their case.
+    return dict(sorted(names.items(), key=lambda item: PurePosixPath(item[1])))
 
 
 def files_of(sweep: Sweep) -> list[Path]:
@@ -79,15 +99,19 @@ def files_of(sweep: Sweep) -> list[Path]:
 def unpack(bundle: Bundle, folder: Path) -> Path:
     """Write the files below a folder and return the sweep file there.
 
-    :raises ValueError: a path that leads out of the folder.
+    :raises ValueError: a path that leads out of the folder, or two that are one file where case makes no difference.
     """
     for name, content in bundle.files:
         place = PurePosixPath(name)
-        if place.is_absolute() or ".." in place.parts or "\\" in name:
+        if is_rooted(name) or ".." in place.parts or "\\" in name:
             raise ValueError(f'"{name}" leads out of the folder')
         path = folder / place
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        try:
+            with path.open("xb") as stream:
+                stream.write(content)
+        except FileExistsError:
+            raise ValueError(f'"{name}" is the same file here as one whose name differs in case only') from None
     return folder / PurePosixPath(bundle.source)
 
 

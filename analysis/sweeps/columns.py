@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from ..uncertainty.quantities import RECORDED
+
 # Besides those of quantities, versions and sums of squares.
 NAMES = (
     *("cell", "status", "reason", "data_set_seed", "fingerprint", "duration_s", "parameters", "observations"),
@@ -22,7 +24,8 @@ def is_reserved(column: str) -> bool:
     >>> is_reserved("U4_average_m"), is_reserved("size_m")
     (True, False)
     """
-    return column in NAMES or re.fullmatch(r"U[1-6]([ _].*)?|.*_version|sum_of_squares.*", column) is not None
+    own = "|".join(RECORDED)
+    return column in NAMES or re.fullmatch(rf"({own})([ _].*)?|.*_version|sum_of_squares.*", column) is not None
 
 
 def symbol_column(symbol: str) -> str:

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.machines.settings import PythonSettings
 from pydantic import BaseModel
-
-from simulator.experiment.model import Experiment
-from simulator.machines.settings import PythonSettings
-from simulator.settings import Settings
 
 # The methods that figures and verdicts have been computed by, and what each corrected of the one before. A new one
 # begins whenever any experiment comes to other figures or another verdict; its number is part of every cell's key.
@@ -26,7 +25,7 @@ METHODS = {
 METHOD = max(METHODS)
 
 # What says nothing about the result: names, and where things stand.
-LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "_folder")
+LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "tree", "builder", "_folder")
 
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)
@@ -44,7 +43,7 @@ def method_of(key: str) -> int:
     (2, 1, 1)
     """
     number, space, _ = key.partition(" ")
-    return int(number) if space and number.isdigit() else 1
+    return int(number) if space and number.isdecimal() and number.isascii() and len(number) < 10 else 1
 
 
 def without_method(key: str) -> str:

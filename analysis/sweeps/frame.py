@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Store, chosen_sweep, definition_of, results
+from .store import Results, Store, chosen_sweep, definition_of, results
 
 if TYPE_CHECKING:
     import pandas
+
+# Whole numbers up to this are exact in the double precision that a definition keeps them in.
+MOST_WHOLE = 2.0**53
 
 
 def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
@@ -17,23 +20,28 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
 
     Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name, or texts),
     `status`, `reason`, the figures by name, `data_set_seed`, `fingerprint`, `duration_s`, and the versions. Figures
-    that a cell lacks are NaN.
+    that a cell lacks are NaN. Cells that cannot be read are not in it either.
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """
-    import pandas
-
     number = chosen_sweep(store, sweep)
     defined = definition_of(store, number)
-    axes, cells = defined["axes"], defined["cells"]
-    found = results(store, number)
+    return frame_of(results(store, number, len(defined["cells"])), defined)
+
+
+def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame:
+    """The table of `frame`; without a definition it has no columns for the axes."""
+    import pandas
+
+    axes, cells = (defined["axes"], defined["cells"]) if defined is not None else ([], [])
     columns: dict[str, Any] = {"cell": found.cells}
-    chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells]
+    chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells] if axes else None
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
-        if axis["unit"] == "1" and all(float(value).is_integer() for value in axis["values"]):
+        is_whole = all(abs(value) < MOST_WHOLE and float(value).is_integer() for value in axis["values"])
+        if axis["unit"] == "1" and is_whole:
             values = values.astype(np.int64)
-        columns[axis["column"]] = values[chosen[:, k]]
+        columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
     columns |= {"status": found.statuses, "reason": found.reasons, **found.figures}
     columns |= {"data_set_seed": found.seeds, "fingerprint": found.keys, "duration_s": found.seconds}
     columns |= {f"{name}_version": texts for name, texts in found.versions.items()}

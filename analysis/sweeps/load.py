@@ -11,16 +11,15 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from ballplate.simulator.experiment.load import build
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import is_same_place, node_at, override, variant_trees
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.wording import explain
+from ballplate.simulator.inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, read_tree, to_python, walk
 from pydantic import TypeAdapter, ValidationError
-
-from simulator.experiment.load import build
-from simulator.experiment.messages import ExperimentError, Message
-from simulator.experiment.model import Experiment
-from simulator.experiment.problems import Problems
-from simulator.experiment.variants import is_same_place, node_at, override, variant_trees
-from simulator.experiment.wording import explain
-from simulator.experiment.yamltree import Mapping, Mark, Node, Scalar, Sequence, read_tree, to_python, walk
-from simulator.settings import hint, listing
 
 from .axes import read_axis
 from .bundle import bundle_of, code_digest, has_code

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from simulator.experiment.messages import ExperimentError
+from ballplate.simulator.inputs.messages import ExperimentError
 
-from ..processes import in_processes
+from ..running.processes import begin_worker, in_processes
 from .bundle import Bundle, bundle_of, files_of
 from .execute import Runner
 from .load import load_sweep
@@ -83,7 +83,7 @@ def _alone(source: _Source, digest: str, task: Task) -> Row | None:
     """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
-        with ProcessPoolExecutor(1, mp_context=context) as pool:
+        with ProcessPoolExecutor(1, context, initializer=begin_worker, initargs=(os.getpid(),)) as pool:
             try:
                 return pool.submit(compute_unchanged, source, digest, task).result()
             except BrokenProcessPool:
@@ -131,7 +131,7 @@ def told(row: Row, source: Path) -> Row:
     """The row with files told from the sweep file's folder, wherever that is."""
     if not row.reason or source.parent == Path("."):
         return row
-    return replace(row, reason=row.reason.replace(f"{source.parent}/", ""))
+    return replace(row, reason=row.reason.replace(f"{source.parent}{os.sep}", ""))
 
 
 @cache

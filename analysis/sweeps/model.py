@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from simulator.experiment.yamltree import Mark, Node
+from ballplate.simulator.inputs.yamltree import Mark, Node
 
 Unit = Literal["m", "rad", "1", ""]
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import ast
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.modules import python_models
-from simulator.experiment.yamltree import Mapping, Node, Scalar, read_tree
-from simulator.experiment.yamltree import Sequence as Entries
+from ballplate.simulator.experiment.modules import python_models
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, read_tree
+from ballplate.simulator.inputs.yamltree import Sequence as Entries
 
 from .model import Sweep
 
@@ -42,7 +42,7 @@ def named_files(sweep: Sweep) -> list[Path]:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
     found: dict[Path, Scalar] = {}
     for start, node in nodes:
-        for scalar in _paths(node, start):
+        for scalar in path_scalars(node, start):
             for path in _there(base.parent, str(scalar.value)):
                 # A machine file names tables beside it.
                 for one in (path, *_of_machine_file(path)):
@@ -60,28 +60,88 @@ def named_files(sweep: Sweep) -> list[Path]:
     return sorted(found)
 
 
+def named_by(source: Path) -> list[Path]:
+    """Files that an experiment or machine file names, those that they name, and its modules, as far as they are there.
+
+    Empty where the file cannot be read: loading it tells why.
+    """
+    try:
+        root = read_tree(source)
+    except ExperimentError:
+        return []
+    found: set[Path] = set()
+    for scalar in path_scalars(root, ""):
+        text = str(scalar.value)
+        named = [Path(text)] if Path(text).is_absolute() else _there(source.parent, text)
+        for path in named:
+            found |= {path, *_of_machine_file(path)}
+    for folder, scalar in _modules([("", root)], source.parent):
+        found |= _imported(folder, str(scalar.value).partition(":")[0])
+    return sorted(found)
+
+
 def _last(path: str) -> str:
     """The last key of a path such as those of variants and axes."""
     return path.rpartition(".")[2].partition("[")[0]
 
 
-def _paths(node: Node, key: str) -> Iterator[Scalar]:
+def path_scalars(node: Node, key: str) -> Iterator[Scalar]:
     """Texts below a node that are paths by the last key above them."""
     if isinstance(node, Mapping):
         for inner, item in node.items.items():
-            yield from _paths(item, inner)
+            yield from path_scalars(item, inner)
     elif isinstance(node, Entries):
         for item in node.items:
-            yield from _paths(item, key)
+            yield from path_scalars(item, key)
     elif isinstance(node, Scalar) and isinstance(node.value, str) and _last(key) in PATH_KEYS:
         yield node
 
 
+def is_rooted(text: str) -> bool:
+    """Whether a path begins at the root of a file system or of a drive, or at a home."""
+    windows = PureWindowsPath(text)
+    return text.startswith("~") or Path(text).is_absolute() or bool(windows.anchor or windows.drive)
+
+
+def leads_out(scalars: Iterable[Scalar], start: Path, folder: Path) -> bool:
+    """Whether any path, as it is meant from the folder `start`, is not one below `folder`."""
+    top = os.path.abspath(folder)
+    for scalar in scalars:
+        text = str(scalar.value)
+        if is_rooted(text) or os.path.commonpath([top, os.path.abspath(start / text)]) != top:
+            return True
+    return False
+
+
+def axis_paths(root: Node) -> Iterator[Scalar]:
+    """Texts of a sweep file's axes that are paths, by what the axes change."""
+    axes = root.items.get("axes") if isinstance(root, Mapping) else None
+    for axis in axes.items.values() if isinstance(axes, Mapping) else ():
+        if not isinstance(axis, Mapping):
+            continue
+        if "together" in axis.items:
+            for path, values in _entries(axis.items["together"]):
+                for _, value in _entries(values):
+                    yield from path_scalars(value, path)
+        changed = [scalar for name in ("path", "paths") for _, scalar in _entries(axis.items.get(name))]
+        for scalar in changed:
+            for _, value in _entries(axis.items.get("values")):
+                if isinstance(scalar, Scalar):
+                    yield from path_scalars(value, str(scalar.value))
+
+
+def _entries(node: Node | None) -> list[tuple[str, Node]]:
+    """Entries of a mapping or of a list, or the node itself."""
+    if isinstance(node, Mapping):
+        return list(node.items.items())
+    if isinstance(node, Entries):
+        return [("", item) for item in node.items]
+    return [] if node is None else [("", node)]
+
+
 def _there(folder: Path, text: str) -> Iterator[Path]:
     """The file that a text means, if it is one and not named from the root of a file system or of a drive."""
-    if not 0 < len(text) <= 4096 or "\0" in text or "\n" in text or text.startswith("~"):
-        return
-    if Path(text).is_absolute() or PureWindowsPath(text).anchor or PureWindowsPath(text).drive:
+    if not 0 < len(text) <= 4096 or "\0" in text or "\n" in text or is_rooted(text):
         return
     path = Path(os.path.abspath(folder / text))
     try:
@@ -99,7 +159,7 @@ def _of_machine_file(path: Path) -> Iterator[Path]:
     except ExperimentError:
         # Who uses the file is told about it when it is loaded.
         return
-    for scalar in _paths(root, ""):
+    for scalar in path_scalars(root, ""):
         yield from _there(path.parent, str(scalar.value))
 
 

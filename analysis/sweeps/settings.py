@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from ballplate.simulator.experiment.sections import Line, Seed
+from ballplate.simulator.geometry.artefacts import Name
+from ballplate.simulator.inputs.settings import FORM, Settings
 from pydantic import Field, Tag
 
-from simulator.experiment.sections import Line, Seed
-from simulator.geometry.artefacts import Name
-from simulator.settings import FORM, Settings
+from ..uncertainty.quantities import QUANTITIES, RECORDED
 
-Quantity = Literal["U1", "U2", "U3", "U4", "U5", "U6", "tasks"]
-QUANTITIES: tuple[Quantity, ...] = ("U1", "U2", "U3", "U4", "U5", "U6")
+if TYPE_CHECKING:
+    Quantity = str
+else:
+    Quantity = Literal[tuple(symbol for symbol in QUANTITIES if " " not in symbol)]
+
+KEPT = f"{RECORDED[0]} to {RECORDED[-1]}"
 
 Path = Annotated[str, Field(min_length=1)]
 Scalar = str | int | float | bool
@@ -24,6 +29,10 @@ Values = Annotated[
     FORM,
 ]
 VariantNames = Annotated[tuple[Name, ...], Field(min_length=1)]
+
+
+# Synthetic data sets of a cell, which are done in blocks, each of which is kept.
+MOST_TRIALS = 10_000_000
 
 
 class SubsetSettings(Settings):
@@ -95,10 +104,10 @@ class SweepSettings(Settings):
     only: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
         (), description="cells kept, in the same form; default: all"
     )
-    trials: Annotated[int, Field(ge=2, le=10_000_000)] | None = Field(
+    trials: Annotated[int, Field(ge=2, le=MOST_TRIALS)] | None = Field(
         None, description="synthetic data sets of each cell; default: none"
     )
     seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
     record: Annotated[tuple[Quantity, ...], Field(min_length=1)] = Field(
-        QUANTITIES, description="quantities that are kept, U1 to U6 and tasks; default: all of U1 to U6"
+        RECORDED, description=f"quantities that are kept, {KEPT} and tasks; default: all of {KEPT}"
     )

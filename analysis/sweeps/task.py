@@ -12,15 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.threads import single_threaded
-
+from ..montecarlo.experiments import Trials, block_of_trials, combined, trials
 from ..montecarlo.figures import Figure, Outcome
-from ..montecarlo.study import Trials, block_of_trials, combined, trials
 from ..montecarlo.tally import Tally
-from ..study import Plan, plan
+from ..results.prediction import Prediction
+from ..results.study import predict
+from ..running.memory import want_of_memory
 from .columns import symbol_column, unit_suffix
 from .fingerprint import fingerprint, with_method, without_method
 from .load import experiment_of
@@ -29,6 +30,9 @@ from .model import Sweep
 # Replicates of a block, a multiple of a batch's; a cell with no more is computed at one go.
 BLOCK = 8192
 
+
+# What helps a cell that found no memory.
+WITH_MEMORY = "with fewer --workers there is more for each, and --retry-failed tries it again"
 
 # Block of a task that is to tell the cell's key only.
 KEY_ONLY = -1
@@ -88,6 +92,8 @@ def _computed(sweep: Sweep, task: Task) -> Row:
         experiment = experiment_of(sweep, number)
     except ExperimentError as error:
         return Row(number, block, invalid_key(sweep, number), "failed", str(error))
+    except MemoryError as error:
+        return Row(number, block, invalid_key(sweep, number), "failed", _reason(error))
     key = key_of(sweep, experiment)
     seed = seed_of(sweep, key)
     if block == KEY_ONLY:
@@ -101,13 +107,19 @@ def _computed(sweep: Sweep, task: Task) -> Row:
         return Row(number, block, key, "failed", str(error), seed)
     except Exception as error:
         # Of an error model written in Python anything may come; the other cells do not suffer from it.
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        text = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
-        return Row(number, block, key, "failed", text, seed)
+        return Row(number, block, key, "failed", _reason(error), seed)
+
+
+def _reason(error: Exception) -> str:
+    want = want_of_memory(error)
+    if want is not None:
+        return f"it {want}; {WITH_MEMORY}"
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
 
 
 def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int) -> Row:
-    planned = plan(experiment)
+    planned = predict(experiment)
     figures, details = plan_figures(planned, sweep.record)
     if sweep.trials is not None:
         if task.total is not None:
@@ -149,7 +161,7 @@ def seed_of(sweep: Sweep, key: str) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
 
-def plan_figures(planned: Plan, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:
+def plan_figures(planned: Prediction, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:
     """Figures and texts of a plan."""
     judged = planned.verdict
     counted = judged.singular_values[: len(judged.singular_values) - judged.deficiency]

@@ -8,9 +8,16 @@ from fractions import Fraction
 from itertools import combinations
 from typing import Any
 
-from simulator.experiment.yamltree import Mapping, Node, Scalar, Sequence, child, to_python
-from simulator.quantities import QUANTITY, QuantityError, exact_number, parse_angle, parse_length, parse_ratio
-from simulator.settings import shorten
+from ballplate.simulator.inputs.quantities import (
+    QUANTITY,
+    QuantityError,
+    exact_number,
+    parse_angle,
+    parse_length,
+    parse_ratio,
+)
+from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, child, to_python
 
 from .model import Unit
 
@@ -24,7 +31,7 @@ KINDS: tuple[tuple[Unit, Callable[[object], float]], ...] = (
 def label(node: Node) -> str:
     """A value as a short text.
 
-    >>> from simulator.experiment.yamltree import parse_tree
+    >>> from ballplate.simulator.inputs.yamltree import parse_tree
     >>> label(parse_tree("[5, 750 mm]", ""))
     '[5, 750 mm]'
     """

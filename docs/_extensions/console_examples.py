@@ -7,7 +7,8 @@ Each page has a folder of its own with a copy of the designs, in which its examp
                  what follows the first such line, `:shown:` so many lines.
 `{file} NAME`    writes a file and shows it.
 `{edit} NAME`    changes a file, as a difference: lines with `-` go, lines with `+` come, others stay.
-`{python-run}`   runs a program and shows what it prints.
+`{python-run}`   runs a program and shows what it prints. `:continued:` goes on where the page's last program has ended,
+                 with its names, as the cells of a notebook do.
 `{picture} NAME` shows an SVG or PNG file that an example has written, with `:alt:` for those who do not see it and its
                  text below.
 """
@@ -15,10 +16,13 @@ Each page has a folder of its own with a copy of the designs, in which its examp
 from __future__ import annotations
 
 import base64
+import contextlib
 import errno
 import html
 import importlib
+import io
 import os
+import pickle
 import pty
 import re
 import shlex
@@ -28,6 +32,7 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 # One thread, so that the last digits are the same in every build; NumPy asks for it when it is loaded.
@@ -42,18 +47,20 @@ from sphinx.util.docutils import SphinxDirective
 
 TOP = Path(__file__).resolve().parents[2]
 PICTURES = {".svg": "image/svg+xml", ".png": "image/png"}
+# Where a program leaves its names for the next one, in the page's folder.
+NAMES = ".names"
 LANGUAGES = {".yaml": "yaml", ".yml": "yaml", ".py": "python"}
 TERMINAL = {"COLUMNS": "100", "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "PYTHONPATH": str(TOP), "TERM": "dumb"}
 # What the commands load when they are run; loaded before, it takes no time for each of them.
 LOADED_BEFORE = (
-    "analysis.annotations",
-    "analysis.cli",
-    "analysis.junit",
-    "analysis.montecarlo.study",
-    "analysis.montecarlo.tables",
+    "ballplate.checking.github",
+    "ballplate.cli",
+    "ballplate.checking.junit",
+    "ballplate.montecarlo.experiments",
+    "ballplate.montecarlo.comparison_tables",
     "matplotlib.figure",
-    "simulator.generate",
-    "simulator.readings",
+    "ballplate.simulator.readings.generate",
+    "ballplate.simulator.readings.reading_files",
     "scipy.interpolate",
     "scipy.linalg",
     "scipy.spatial",
@@ -85,7 +92,7 @@ class _Example(SphinxDirective):
             raise self.refuse(f"{what}\nexit status {status} instead of {expected}:\n{text}")
         text = text.replace("\r\n", "\n").replace(f"{self.folder}/", "")
         # What a progress bar has drawn is cleared again.
-        return [line.rpartition("\r\x1b[K")[2].rstrip() for line in text.rstrip("\n").split("\n")] if text else []
+        return [line.rpartition("\r")[2].rstrip() for line in text.rstrip("\n").split("\n")] if text else []
 
 
 class Console(_Example):
@@ -147,9 +154,14 @@ class Edit(_Example):
 
 
 class PythonRun(_Example):
+    option_spec = {"continued": directives.flag}
+
     def run(self) -> list[nodes.Node]:
         source = "\n".join(self.content)
-        lines = self.execute(source, lambda: exec(source, {"__name__": "__main__"}) or 0)
+        names = self.folder / NAMES
+        if "continued" not in self.options:
+            names.unlink(missing_ok=True)
+        lines = self.execute(source, lambda: _program(source, names))
         blocks: list[nodes.Node] = [nodes.literal_block("", source, language="python")]
         return blocks + ([nodes.literal_block("", "\n".join(lines), language="text")] if lines else [])
 
@@ -181,11 +193,31 @@ def _command(command: str) -> Callable[[], int]:
         return lambda: os.execvp("bash", ["bash", "-o", "pipefail", "-c", command])
 
     def run() -> int:
-        from analysis.cli import main
+        from ballplate.cli import main
 
         return main(shlex.split(command)[1:])
 
     return run
+
+
+class _Pickler(pickle.Pickler):
+    def reducer_override(self, value: Any) -> Any:
+        """Modules are imported again."""
+        return (importlib.import_module, (value.__name__,)) if isinstance(value, ModuleType) else NotImplemented
+
+
+def _program(source: str, path: Path) -> int:
+    """Run a program with the names that the last one has left in a file, and leave its own, but for what stays open."""
+    kept: dict[str, bytes] = pickle.loads(path.read_bytes()) if path.exists() else {}
+    names: dict[str, Any] = {"__name__": "__main__"} | {name: pickle.loads(value) for name, value in kept.items()}
+    exec(source, names)
+    for name in [name for name in names if not name.startswith("__")]:
+        found = io.BytesIO()
+        with contextlib.suppress(pickle.PicklingError, AttributeError, TypeError):
+            _Pickler(found).dump(names[name])
+            kept[name] = found.getvalue()
+    path.write_bytes(pickle.dumps(kept))
+    return 0
 
 
 def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
@@ -233,7 +265,7 @@ def _tools() -> str:
     if not _TOOLS:
         _TOOLS.append(tempfile.TemporaryDirectory(prefix="ballplate-docs-"))
         program = Path(_TOOLS[0].name, "ballplate")
-        code = "import sys; from analysis.cli import main; sys.exit(main())"
+        code = "import sys; from ballplate.cli import main; sys.exit(main())"
         program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -c {shlex.quote(code)} "$@"\n', "utf-8")
         program.chmod(0o755)
     return _TOOLS[0].name

@@ -11,18 +11,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-from sphinx.application import Sphinx
-
-from analysis.cli import parser as command_line
-from analysis.reproduction.compare import reproduce
-from analysis.reproduction.published import npl
-from analysis.reproduction.shipped import Shipped
-from analysis.reproduction.tables import reproduction_markdown
-from analysis.sweeps.schema import schema as sweep_schema
-from simulator.experiment.machine_sections import machine_schema
-from simulator.experiment.schema import schema
-from simulator.quantities import (
+from ballplate.cli import parser as command_line
+from ballplate.reproduction.compare import reproduce
+from ballplate.reproduction.published import npl
+from ballplate.reproduction.reproduction_tables import reproduction_markdown
+from ballplate.reproduction.shipped import Shipped
+from ballplate.simulator.experiment.machine_sections import machine_schema
+from ballplate.simulator.experiment.schema import schema
+from ballplate.simulator.inputs.quantities import (
     UNITS,
     Angle,
     Bending,
@@ -33,6 +29,9 @@ from simulator.quantities import (
     Ratio,
     TemperatureDifference,
 )
+from ballplate.sweeps.schema import schema as sweep_schema
+from pydantic import TypeAdapter
+from sphinx.application import Sphinx
 
 Schema = dict[str, Any]
 

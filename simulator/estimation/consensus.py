@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array
-from ..rounding import comparable
+from ..numerics.rounding import comparable
 
 # Subsets tried, and the points that each is judged by. With a third of the points wrong, three right ones are
 # drawn together more than once in four draws.

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design, State
+from ..design.arrays import Design
 from ..machines.protocol import Array
-from ..threads import scipy_linalg, single_threaded
+from ..numerics.threads import scipy_linalg, single_threaded
 from .elimination import Factor
 from .graded import triangle
 from .parameters import SharedLayout
@@ -120,49 +120,17 @@ def no_spectrum(layout: SharedLayout) -> Spectrum:
 
 
 @dataclass(frozen=True)
-class Covariance:
-    """Square root of the covariance, in units of the standard deviation of a unit-weight observation.
+class BallCovariance:
+    """Square root of the covariance of the balls, in units of the standard deviation of a unit-weight observation.
 
-    `shared` (s, r) for the shared parameters. For the balls: `ball` (n, d, r + kept) is the part common to all,
-    `ball_own` (n, d, d) the part each has alone; rows of balls that are no parameters are zero. The `..._null`
-    arrays say how the undetermined directions move the same parameters, (s, deficiency), (n, d, deficiency).
-
-    After a fit the latter are those of the design as drawn, since what is undetermined is a property of the design:
-    `drawn` then is the state at which functions are to be linearised to see whether a null direction changes them.
+    `common` (n, d, r + kept) is the part that they have in common with all else, of which the first r columns are those
+    of the shared parameters, and `own` (n, d, d) the part that each has alone; rows of balls that are no parameters are
+    zero. `null` (n, d, deficiency) says how the undetermined directions move the balls.
     """
 
-    shared: Array
-    ball: Array
-    ball_own: Array
-    shared_null: Array
-    ball_null: Array
-    scale: Array
-    ball_scale: float = MICROMETRE
-    drawn: State | None = None
-
-    def of_shared(self, linear: Array, drawn: Array | None = None) -> Array:
-        """Standard deviations (m,) of `linear` (m, s) applied to the shared parameters; NaN where open.
-
-        `drawn` (m, s) are the same functions linearised at the state `drawn`, if they are others there.
-        """
-        result = np.sqrt(((linear @ self.shared) ** 2).sum(axis=1))
-        if drawn is not None:
-            linear = drawn
-        return blank(result, linear @ self.shared_null, np.sqrt(((linear * self.scale) ** 2).sum(axis=1)))
-
-    def of_balls(self) -> Array:
-        """Standard deviations (n, d) of the ball co-ordinates; NaN where open."""
-        result = np.sqrt((self.ball**2).sum(axis=2) + (self.ball_own**2).sum(axis=2))
-        return blank(result, self.ball_null, np.full(result.shape, self.ball_scale))
-
-
-def shared_covariance(design: Design, found: Spectrum) -> Covariance:
-    """A covariance without that of the balls, of which nothing counts as open: of shared parameters alone."""
-    n, d = design.balls.shape
-    empty = np.zeros((n, d, 0))
-    return Covariance(
-        found.root, empty, np.zeros((n, d, d)), found.null, np.zeros((n, d, found.deficiency)), found.scale
-    )
+    common: Array
+    own: Array
+    null: Array
 
 
 def blank(values: Array, change: Array, size: Array) -> Array:
@@ -174,8 +142,8 @@ def blank(values: Array, change: Array, size: Array) -> Array:
 
 
 @single_threaded
-def covariance(design: Design, factor: Factor, found: Spectrum) -> Covariance:
-    """Square root of the covariance of all parameters."""
+def ball_covariance(design: Design, factor: Factor, found: Spectrum) -> BallCovariance:
+    """Square root of the covariance of all balls."""
     n, d = len(design.ball_names), design.dimension
     shared, null = found.root, found.null
     rank, nulls, k = shared.shape[1], null.shape[1], d * len(factor.kept)
@@ -192,4 +160,4 @@ def covariance(design: Design, factor: Factor, found: Spectrum) -> Covariance:
         ball[factor.kept, :, :rank] = solved[:, :rank].reshape(len(factor.kept), d, rank)
         ball_null[factor.kept] = solved[:, rank : rank + nulls].reshape(len(factor.kept), d, nulls)
         ball[factor.kept, :, rank:] = solved[:, rank + nulls :].reshape(len(factor.kept), d, k)
-    return Covariance(shared, ball, own, null, ball_null, found.scale)
+    return BallCovariance(ball, own, ball_null)

@@ -7,14 +7,15 @@ from typing import Literal
 
 import numpy as np
 
-from ..design import Design, State, nominal_state, probe_offsets, unknown_lengths
+from ..design.arrays import Design, State, probe_offsets, unknown_lengths
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
-from ..threads import scipy_linalg, single_threaded
-from .covariance import Covariance, Spectrum, covariance, no_spectrum, spectrum
+from ..numerics.threads import scipy_linalg, single_threaded
+from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle
 from .initial import initial_state
+from .linearisation import Linearisation, linearise
 from .parameters import shared_layout
 from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
@@ -127,19 +128,13 @@ def as_drawn(design: Design) -> Spectrum:
     With errors, noise and poses that are not quite as drawn the same readings seem to tell a little of what they leave
     open. To follow that may lead far astray: where no length is known, S^2 is least when all lengths are zero.
     """
-    return spectrum(eliminate(design, shared_layout(design), nominal_state(design)))
+    return linearise(design).spectrum
 
 
-@single_threaded
-def fitted_covariance(design: Design, solution: Solution) -> Covariance:
-    """Square root of the covariance at an estimate; what is undetermined is what the design as drawn leaves open."""
-    found = covariance(design, solution.factor, solution.spectrum)
-    if not solution.spectrum.deficiency:
-        return found
-    state = nominal_state(design)
-    factor = eliminate(design, solution.factor.layout, state)
-    drawn = covariance(design, factor, spectrum(factor))
-    return replace(found, shared_null=drawn.shared_null, ball_null=drawn.ball_null, drawn=state)
+def linearised_fit(design: Design, solution: Solution) -> Linearisation:
+    """The linearisation at an estimate; what is undetermined is what the design as drawn leaves open."""
+    drawn = linearise(design) if solution.spectrum.deficiency else None
+    return Linearisation(design, solution.factor.layout, solution.state, solution.factor, solution.spectrum, drawn)
 
 
 def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design, Integers, State
-from ..machines.protocol import Array
-from ..threads import single_threaded
-from .covariance import Covariance
+from ..design.arrays import Design, State
+from ..machines.protocol import Array, Integers
+from ..numerics.threads import single_threaded
 from .elimination import ROWS_AT_ONCE
+from .linearisation import Linearisation
 from .observations import coordinate_rows, distance_rows, length_shared_rows, prior_rows, reading_blocks
 from .parameters import SharedLayout
 
@@ -79,16 +79,15 @@ def whitened_residuals(design: Design, layout: SharedLayout, state: State, x: Ar
 
 
 @single_threaded
-def hat_rows(
-    design: Design, layout: SharedLayout, state: State, x: Array | None, found: Covariance
-) -> Iterator[HatRows]:
+def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
     """All rows of Q, some at a time; readings of one ball come together."""
+    design, layout, state, balls = at.design, at.layout, at.state, at.balls
     places, d = row_places(design), design.dimension
-    width, rank = found.ball.shape[2], found.shared.shape[1]
+    width, rank = balls.common.shape[2], at.rank
 
     def widened(shared: Array) -> Array:
         common = np.zeros((*shared.shape[:-1], width))
-        common[..., :rank] = shared @ found.shared
+        common[..., :rank] = shared @ at.shared
         return common
 
     def by_shared(start: int, derivative: Array) -> HatRows:
@@ -98,8 +97,8 @@ def hat_rows(
     for some in _reading_batches(design):
         ball = design.readings.ball[design.plate_readings[some]]
         shared, by_ball = _reading_rows(design, layout, state, x, design.plate_readings[some])
-        common = widened(shared) + by_ball @ found.ball[ball]
-        own = by_ball @ found.ball_own[ball]
+        common = widened(shared) + by_ball @ balls.common[ball]
+        own = by_ball @ balls.own[ball]
         rows = d * some[:, None] + np.arange(d)
         yield HatRows(rows.ravel(), common.reshape(d * len(ball), width), own.reshape(-1, d), np.repeat(ball, d))
     if len(design.lengths):
@@ -108,13 +107,13 @@ def hat_rows(
         yield by_shared(places.priors.start, prior_rows(design, layout, state)[1])
     for part in _slices(len(design.coordinates)):
         ball, derivative = design.coordinates.ball[part], coordinate_rows(design, state).derivative[part, None]
-        own = (derivative @ found.ball_own[ball])[:, 0]
+        own = (derivative @ balls.own[ball])[:, 0]
         rows = places.coordinates.start + np.arange(part.start, part.stop)
-        yield HatRows(rows, (derivative @ found.ball[ball])[:, 0], own, ball)
+        yield HatRows(rows, (derivative @ balls.common[ball])[:, 0], own, ball)
     for part in _slices(len(design.distances)):
         first, second = design.distances.first[part], design.distances.second[part]
         derivative = distance_rows(design, state).derivative[part, None]
-        common = (derivative @ (found.ball[first] - found.ball[second]))[:, 0]
+        common = (derivative @ (balls.common[first] - balls.common[second]))[:, 0]
         rows = places.distances.start + np.arange(part.start, part.stop)
         # Balls that distances tie to others have no part of their own.
         yield HatRows(rows, common, np.zeros((len(rows), d)), np.full(len(rows), -1))

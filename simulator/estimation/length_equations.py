@@ -26,11 +26,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design import Design
-from ..joint_lengths import equation_root
+from ..design.arrays import Design
+from ..design.joint_lengths import equation_root
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
-from ..threads import single_threaded
+from ..numerics.threads import single_threaded
 from .covariance import EXACT, MICROMETRE
 from .initial import initial_state
 

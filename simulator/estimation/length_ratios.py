@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Design
+from ..design.arrays import Design
 from ..machines.protocol import Array
 from .spheres import FLAT, fit_sphere
 

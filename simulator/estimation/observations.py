@@ -11,19 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import (
-    Design,
-    Integers,
-    Readings,
-    State,
-    locations,
-    pose_size,
-    probe_offsets,
-    reading_uncertainties,
-    unknown_lengths,
-)
+from ..design.arrays import Design, State, locations, pose_size, probe_offsets, reading_uncertainties, unknown_lengths
+from ..design.observations import Readings
 from ..geometry.motions import vector_from_rotation, vector_rate
-from ..machines.protocol import Array, ErrorModel
+from ..machines.protocol import Array, ErrorModel, Integers
 from .parameters import SharedLayout
 
 # Metres: of the size of probe offsets.

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design import Design, Integers, pose_size
-from ..machines.protocol import Array, Parameter
+from ..design.arrays import Design, pose_size
+from ..machines.protocol import Array, Integers, Parameter
 
 AXIS_NAMES = ("x", "y", "z")
 

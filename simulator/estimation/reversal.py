@@ -18,7 +18,7 @@ import numpy as np
 from ..geometry.motions import fit_motion
 from ..machines.metric import MetricModel, Scale
 from ..machines.protocol import Array
-from ..threads import single_threaded
+from ..numerics.threads import single_threaded
 
 # Balls whose spread across their main line is below this fraction of their length count as on one line.
 ON_A_LINE = 1e-4

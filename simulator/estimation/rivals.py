@@ -32,9 +32,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ..design import Design, Integers, nominal_state, reading_uncertainties
-from ..machines.protocol import Array
-from ..threads import single_threaded
+from ..design.arrays import Design, nominal_state, reading_uncertainties
+from ..machines.protocol import Array, Integers
+from ..numerics.threads import single_threaded
 from .covariance import EXACT, MICROMETRE
 from .gauss_newton import GaussNewtonSettings, Iteration, Status
 from .observations import length_rows

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..design import Integers
-from ..machines.protocol import Array
-from ..threads import scipy_linalg
+from ..machines.protocol import Array, Integers
+from ..numerics.threads import scipy_linalg
 from .elimination import Factor
 
 

@@ -1,7 +1,7 @@
 """Experiment files: loading them, what they may say, and the messages about what is wrong with them."""
 
+from ..inputs.messages import ExperimentError, Message
 from .load import load
-from .messages import ExperimentError, Message
 from .model import (
     CoordinateCalibration,
     DistanceCalibration,

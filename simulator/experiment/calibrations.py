@@ -7,8 +7,10 @@ from typing import cast
 import numpy as np
 
 from ..geometry.artefacts import COINCIDENT, BallLayout, BryanGaugeSettings, corners, pairs
-from ..settings import hint, listing
-from .messages import ExperimentError, Steps
+from ..inputs.messages import ExperimentError, Steps
+from ..inputs.settings import hint, listing
+from ..inputs.tables import read_table
+from ..inputs.yamltree import Mark, mark_of
 from .model import (
     Calibration,
     CoordinateCalibration,
@@ -19,8 +21,6 @@ from .model import (
 )
 from .position_sections import CoordinatesSettings, DistancesSettings, RadiusSettings
 from .references import References, frozen
-from .tables import read_table
-from .yamltree import Mark, mark_of
 
 AXES = ("x", "y", "z")
 

@@ -7,25 +7,35 @@ from typing import Any
 
 import numpy as np
 
-from ..design import pose_size
+from ..design.arrays import pose_size
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.positions import ball_coordinates
+from ..inputs.messages import ExperimentError, Message, Steps
+from ..inputs.problems import Problems, written_text
+from ..inputs.quantities import format_length
+from ..inputs.settings import listing
+from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
 from ..machines.description import MachineDescription, random_part
 from ..machines.settings import MachineFileSettings, MetricSettings, PythonSettings, build_error_model, dimension_of
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
-from ..quantities import format_length
-from ..settings import listing
 from .curves import read_curves
 from .machine_file import load_machine
-from .messages import ExperimentError, Message, Steps
-from .model import SLIGHTLY, Calibration, DistanceCalibration, Floats, Machine, Position, RadiusCalibration, Volume
-from .problems import Problems, written_text
+from .model import (
+    SLIGHTLY,
+    Calibration,
+    DistanceCalibration,
+    Evaluation,
+    Floats,
+    Machine,
+    Position,
+    RadiusCalibration,
+    Volume,
+)
 from .references import References
 from .structure import Sections
-from .yamltree import Mark
 
 TOLERANCE = 1e-9
 
@@ -33,6 +43,10 @@ TOLERANCE = 1e-9
 MOST_SHARED = 3500
 # Lengths that the standards contribute, each a row over the machine's errors.
 MOST_LENGTHS = 20_000
+# Lengths of a standard of which some have a ball in common, whose uncertainties are therefore treated together.
+MOST_JOINT_LENGTHS = 3000
+# Derivatives of the evaluation points by machine errors: for each point, axis and error.
+MOST_DERIVATIVES = 50_000_000
 AXES = ("x", "y", "z")
 
 
@@ -365,6 +379,26 @@ def check_size(
     check_lengths({("calibration", i): one for i, one in calibrations.items()}, positions.values(), references)
 
 
+def check_derivatives(
+    sections: Sections, machine: Machine | None, evaluation: Evaluation | None, references: References
+) -> None:
+    """Report more evaluation points than there is memory for, with so many machine errors."""
+    settings = sections.get("error_model")
+    if settings is None or machine is None or evaluation is None or references.problems.has_below(("error_model",)):
+        return
+    count, d = evaluation.points.shape
+    # Errors are at most as many as parameters are, so that they need seldom be counted.
+    if count * d * MOST_SHARED <= MOST_DERIVATIVES:
+        return
+    errors = len(build_error_model(settings, *_corners(machine)).parameters)
+    if count * d * errors > MOST_DERIVATIVES:
+        text = (
+            f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at most "
+            f"{MOST_DERIVATIVES // (d * errors)} points are possible with so many errors"
+        )
+        references.problems.add(("evaluation", "points"), text)
+
+
 def check_lengths(
     calibrations: Mapping[Steps, Calibration], positions: Collection[Position], references: References
 ) -> None:
@@ -387,6 +421,26 @@ def check_lengths(
                     f"{MOST_LENGTHS} lengths are possible"
                 )
                 problems.add((*steps, "pairs"), text)
+    _check_joint_lengths(calibrations, references)
+
+
+def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: References) -> None:
+    """Report length standards of which too many lengths have balls in common."""
+    of_standards: dict[str, list[tuple[Steps, DistanceCalibration]]] = {}
+    for steps, one in calibrations.items():
+        is_standard = references.artefacts[one.artefact].role == "length_standard"
+        if is_standard and isinstance(one, DistanceCalibration) and one.repeatability == "included":
+            of_standards.setdefault(one.artefact, []).append((steps, one))
+    for name, own in of_standards.items():
+        ends = np.concatenate([one.pairs.ravel() for _, one in own])
+        place = (*own[-1][0], "pairs")
+        is_joint = len(ends) > 2 * MOST_JOINT_LENGTHS and np.bincount(ends).max() > 1
+        if is_joint and not references.problems.has_below(place):
+            text = (
+                f'{len(ends) // 2} distances of "{name}" have balls in common; at most {MOST_JOINT_LENGTHS} such are '
+                "possible: calibrate fewer of them"
+            )
+            references.problems.add(place, text)
 
 
 def check_points(

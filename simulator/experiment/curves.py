@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
+from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
+from ..inputs.settings import hint, listing, shorten
+from ..inputs.tables import _cells, refuse_columns, refuse_separators, table_lines, wrong_count, wrong_number
+from ..inputs.yamltree import Mark
 from ..machines.curves import NAMES, Points
 from ..machines.kinematic import TRANSLATIONS
-from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
-from ..settings import hint, listing, shorten
-from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from .tables import _cells, refuse_columns, refuse_separators, table_lines, wrong_count, wrong_number
-from .yamltree import Mark
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
@@ -105,7 +105,7 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
         factors.append(units[unit])
     axes = sorted({name[2] for name in names if name != POSITION})
     if not messages and (POSITION not in names or not axes):
-        messages.append(mark.message("", f"a position and at least one error are needed, as in {EXAMPLE}"))
+        messages.append(mark.message("", f"has no position, or no error; write columns as in {EXAMPLE}"))
     if len(axes) > 1:
         messages.append(mark.message("", f"errors of the axes {listing(axes)}; write one file for each axis"))
     if messages:

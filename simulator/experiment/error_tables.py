@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
+from ..inputs.messages import ExperimentError, Message
+from ..inputs.quantities import QuantityError, format_length, parse_length
+from ..inputs.settings import hint, listing, nearest, shorten
+from ..inputs.yamltree import Mark, read_text
 from ..machines.arrangement import AXES
 from ..machines.curves import Points
 from ..machines.description import Three
 from ..machines.straightness import Criterion
-from ..quantities import QuantityError, format_length, parse_length
-from ..settings import hint, listing, nearest, shorten
 from .curves import BANDWIDTH, read_numbered_curves
-from .messages import ExperimentError, Message
-from .yamltree import Mark, read_text
 
 COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
 KEYS = ("line", "straightness", "straightedge", "probe")

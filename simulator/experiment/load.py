@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping as AnyMapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+from ..inputs.messages import ExperimentError, Message
+from ..inputs.problems import Problems, written_count
+from ..inputs.yamltree import Mapping, Mark, Node, mark_of, read_tree
 from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
+from .changes import node_of
 from .checks import (
     check_calibration_read,
+    check_derivatives,
     check_error_model,
     check_inside,
     check_names,
@@ -18,18 +27,15 @@ from .checks import (
     check_use,
 )
 from .machine import resolve_evaluation, resolve_machine, target_of
-from .messages import ExperimentError, Message, Steps, format_path
 from .model import Calibration, Experiment
 from .modules import refused_modules
 from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
-from .problems import Problems, written, written_count
 from .references import resolve_offset_uncertainties, resolve_probes, resolve_references
 from .structure import validate_sections
-from .variants import in_variants, variant_trees
-from .yamltree import Mapping, Mark, Node, mark_of, read_tree
+from .variants import MOST_OF_ALL, in_variants, variant_trees
 
 
 def load(path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True) -> tuple[Experiment, ...]:
@@ -56,11 +62,20 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
         _raise_if_any([*base_problems.messages, *messages], refused, source)
         assert experiment is not None
         return (experiment,)
-    experiments = []
+    experiments: list[Experiment] = []
     variants_of: dict[Message, list[str]] = {}
+    size = 0
     for name, tree in trees.items():
         experiment, messages = build(tree, source, name, planning)
-        experiments += [experiment] if experiment else []
+        if experiment is not None:
+            mark = mark_of(root, ("variants", name), of_key=True)
+            experiments.append(replace(experiment, mark=mark))
+            size += experiment.size
+        if size > MOST_OF_ALL and len(experiments) > 1:
+            text = f"the variants up to here have {size} balls, balls read, calibrated values, priors and evaluation "
+            text += f"points; at most {MOST_OF_ALL} are possible: put some of the variants into a file of their own"
+            base_problems.add(("variants", name), text)
+            break
         for message in messages:
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [
@@ -71,27 +86,40 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
     return tuple(experiments)
 
 
-def message_at(source: Path, steps: Steps, text: str) -> Message:
-    """A message about a path of a file that is right by itself, such as a true machine that turns out too wild."""
-    return mark_of(read_tree(source, []), steps).message(format_path(steps), text)
+def with_pool(experiment: Experiment) -> Experiment:
+    """The same experiment with what a plan may choose from.
 
-
-def tree_of(source: Path, variant: str | None) -> Node:
-    """The tree of a file that is right, or of a variant of it, as ``build`` takes it."""
-    root = read_tree(source, [])
-    return _without_variants(root) if variant is None else variant_trees(root, Problems(root))[variant]
-
-
-def place_in(source: Path, variant: str | None, steps: Steps) -> Mark:
-    """Where a path stands in a file that is right, or in a variant of it.
-
-    What nobody has written is looked for in the variant's name, and without variants in the positions.
+    :raises ExperimentError: what a plan may choose from is wrong.
     """
-    root = read_tree(source, [])
-    tree = root if variant is None else variant_trees(root, Problems(root))[variant]
-    if written(tree, *steps) is not None:
-        return mark_of(tree, steps)
-    return mark_of(root, ("positions",) if variant is None else ("variants", variant), of_key=True)
+    found = _built(experiment.tree, experiment.source, experiment.name, planning=True)
+    return replace(found, mark=experiment.mark)
+
+
+def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experiment:
+    """The experiment of a mapping that holds what a file would, with paths relative to a folder.
+
+    :raises ExperimentError: it is wrong; holds everything that was found.
+    """
+    mark = Mark("experiment", 0, 0)
+    if "variants" in sections:
+        text = "are for files; change an experiment with its method with_()"
+        raise ExperimentError([mark.message("variants", text)])
+    try:
+        tree = node_of(sections, mark)
+    except ValueError as error:
+        raise ExperimentError([mark.message("", str(error))]) from None
+    return _built(tree, folder / "experiment", None, False)
+
+
+def _built(root: Node, source: Path, name: str | None, planning: bool) -> Experiment:
+    """The experiment of a tree.
+
+    :raises ExperimentError: it is wrong.
+    """
+    found, messages = build(root, source, name, planning)
+    if found is None:
+        raise ExperimentError(sorted(messages))
+    return found
 
 
 def build(
@@ -145,6 +173,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)
     evaluation = resolve_evaluation(sections, machine, probes, references)
+    check_derivatives(sections, machine, evaluation, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
     experiment = Experiment(
@@ -165,6 +194,9 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
         sigma=sections.get("sigma"),
         expected_rank_deficiency=sections.get("expected_rank_deficiency"),
         seed=sections.get("seed"),
+        tree=root,
+        mark=mark_of(root, ("positions",), of_key=True),
+        builder=partial(_built, source=source, name=name, planning=planning),
         coverage_factor=sections.get("coverage_factor"),
         priors=priors,
         offset_uncertainties=offset_uncertainties,

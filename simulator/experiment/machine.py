@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import LengthFunction, Target, format_length
-from ..settings import hint
+from ..inputs.messages import ExperimentError, Steps
+from ..inputs.problems import Problems
+from ..inputs.quantities import LengthFunction, Target, format_length
+from ..inputs.settings import hint
+from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
-from .messages import ExperimentError, Steps
 from .model import Evaluation, Floats, Machine, Task, Volume
-from .problems import Problems
 from .references import References, frozen
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
-from .tables import read_table
 
 AXES = ("x", "y", "z")
 

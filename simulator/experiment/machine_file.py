@@ -13,6 +13,12 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from ..inputs.messages import ExperimentError, Message, Steps
+from ..inputs.problems import Problems
+from ..inputs.quantities import format_angle, format_length
+from ..inputs.settings import describe, listing
+from ..inputs.wording import explain
+from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python, walk
 from ..machines.arrangement import ARRANGEMENTS, AXES, Arrangement
 from ..machines.curves import NAMES, Points
 from ..machines.description import (
@@ -24,15 +30,9 @@ from ..machines.description import (
     Three,
 )
 from ..machines.volumetric import DROOP, SQUARENESS
-from ..quantities import format_angle, format_length
-from ..settings import describe, listing
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings
-from .messages import ExperimentError, Message, Steps
-from .problems import Problems
 from .sections import VolumeSettings
-from .wording import explain
-from .yamltree import Mapping, Scalar, read_tree, to_python, walk
 
 # Part of a polynomial's coefficients that is rounding.
 NOTHING = 1e-12

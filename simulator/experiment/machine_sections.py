@@ -6,12 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Tag, create_model, model_validator
 
-from ..machines.curves import NAMES, Interpolation
-from ..machines.kinematic import ROTATIONS, describe
-from ..machines.settings import ARRANGEMENT, ArrangementName, ArrangementSettings
-from ..machines.straightness import Criterion
-from ..machines.volumetric import SQUARENESS, meaning
-from ..quantities import (
+from ..inputs.quantities import (
     Angle,
     Bending,
     Expansion,
@@ -21,7 +16,12 @@ from ..quantities import (
     PositiveTemperatureDifference,
     TemperatureDifference,
 )
-from ..settings import FORM, Settings
+from ..inputs.settings import FORM, Settings
+from ..machines.curves import NAMES, Interpolation
+from ..machines.kinematic import ROTATIONS, describe
+from ..machines.settings import ARRANGEMENT, ArrangementName, ArrangementSettings
+from ..machines.straightness import Criterion
+from ..machines.volumetric import SQUARENESS, meaning
 from .position_sections import Edges, Text
 from .sections import Line, VolumeSettings
 

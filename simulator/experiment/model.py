@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
-from ..quantities import LengthFunction, Target
-from .yamltree import Mark
+from ..inputs.messages import Message, Steps, format_path
+from ..inputs.quantities import LengthFunction, Target
+from ..inputs.yamltree import Mark, Node, mark_of, written
+from .changes import changed_tree
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
-    from .pool import Pool
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -175,6 +176,64 @@ class Evaluation:
     tasks: tuple[Task, ...] = ()
 
 
+@dataclass(frozen=True)
+class ChangeTimes:
+    """Seconds that go between positions: for another probe, and for another plane or artefact."""
+
+    probe: float
+    plane: float
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A position, or a calibration item, that a plan may choose.
+
+    `seconds` is what it takes by itself: set-up, readings and changes of probe within it, or the price of a
+    calibration item. `plane` names the axis that the artefact stands across, empty where the pose is free and for a
+    calibration item. `group` is the entry of the pool that it comes from, empty for positions that are `drawn`, in the
+    experiment's own list. `settings` is what an experiment file says of it. `reading_seconds` is what a reading takes.
+    """
+
+    name: str
+    item: Position | Calibration
+    seconds: float
+    plane: str
+    group: str
+    drawn: bool
+    settings: Mapping[str, Any]
+    reading_seconds: float = 0.0
+
+    @property
+    def readings(self) -> int:
+        """Readings that it takes, every repeat counted."""
+        if not isinstance(self.item, Position):
+            return 0
+        return sum(len(group.probes) * len(group.balls) * group.repeats for group in self.item.readings)
+
+
+@dataclass(frozen=True)
+class AtMost:
+    """A limit: of `members`, indices of candidates, no more than `count`."""
+
+    members: tuple[int, ...]
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Candidates in order, positions of the experiment itself first, and the limits on choosing them.
+
+    `must` are the indices of what has to be chosen. `dropped` tells how many candidates were generated but
+    cannot be read, or stand there twice, by the reason.
+    """
+
+    candidates: tuple[Candidate, ...]
+    changes: ChangeTimes
+    must: tuple[int, ...]
+    at_most: tuple[AtMost, ...]
+    dropped: Mapping[str, int]
+
+
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """A complete experiment, or one variant of it.
@@ -184,7 +243,8 @@ class Experiment:
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are meant for.
     ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
     by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
-    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant.
+    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
+    without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an experiment of a tree.
     """
 
     title: str
@@ -204,6 +264,9 @@ class Experiment:
     sigma: Literal["estimated", "given"]
     expected_rank_deficiency: int | None
     seed: int
+    tree: Node
+    mark: Mark
+    builder: Callable[[Node], Experiment]
     coverage_factor: float = 1.0
     priors: tuple[Prior, ...] = ()
     offset_uncertainties: Mapping[str, Floats] = field(default_factory=dict)
@@ -219,3 +282,35 @@ class Experiment:
     def label(self) -> str:
         """Name of the file without its ending, and the variant in brackets."""
         return self.source.stem if self.name is None else f"{self.source.stem}[{self.name}]"
+
+    @property
+    def size(self) -> int:
+        """Number of balls, balls read at each position and candidate, calibrated values, priors and points."""
+        candidates = () if self.pool is None else self.pool.candidates
+        offered = [one.item for one in candidates if isinstance(one.item, Position)]
+        read = sum(len(group.ball_indices) for one in (*self.positions, *offered) for group in one.readings)
+        known = sum(len(one.values) for one in self.calibration if one.kind != "radius")
+        balls = sum(len(layout.names) for layout in self.layouts.values())
+        return balls + read + known + len(self.priors) + len(self.evaluation.points)
+
+    def __repr__(self) -> str:
+        return f"<Experiment {self.label}: {self.title}>"
+
+    def place(self, steps: Steps) -> Mark:
+        """Where a path stands; what nobody has written, where the experiment itself does."""
+        return self.mark if written(self.tree, *steps) is None else mark_of(self.tree, steps)
+
+    def message(self, steps: Steps, text: str) -> Message:
+        """A message about what stands at a path."""
+        return self.place(steps).message(format_path(steps), text)
+
+    def with_(self, changes: Mapping[str, object] | None = None, /, **sections: object) -> Experiment:
+        """The experiment with some of its entries changed, checked as a file is.
+
+        ``changes`` has new values by path, such as ``positions[P1].level`` or ``artefacts.plate.size``, as variants of
+        a file have; ``sections`` replaces whole entries by their names. Values are what a file would hold: texts with
+        units, numbers, lists and mappings. None removes an entry.
+
+        :raises ExperimentError: a path that does not exist, or an experiment that is wrong so.
+        """
+        return self.builder(changed_tree(self.tree, str(self.source), {**(changes or {}), **sections}))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .messages import Message, Steps, format_path
-from .yamltree import Mapping, Node, Scalar, walk
+from ..inputs.messages import Message, Steps, format_path
+from ..inputs.yamltree import Mapping, Node, Scalar, walk
 
 
 def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:

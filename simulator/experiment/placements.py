@@ -8,7 +8,7 @@ import numpy as np
 
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import IN_PLANE_AXES, Axis, FreePlacement, PlanePlacement, Pose, nominal_pose
-from .messages import Steps
+from ..inputs.messages import Steps
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 from .references import References, lengths_per_axis

@@ -20,14 +20,13 @@ from ..geometry.positions import (
     bounding_rectangle,
     nominal_pose,
 )
-from ..quantities import format_length, length_text
-from .messages import Steps
+from ..inputs.messages import Steps
+from ..inputs.quantities import format_length, length_text
+from ..inputs.yamltree import to_python, written
 from .model import Floats, Indices, Position, ReadingGroup, Volume
 from .placements import check_turns
 from .pool_sections import GroupSettings, LengthsByAxisSettings, ProbesByPlaneSettings, RangeSettings, form_of_balls
-from .problems import written
 from .references import References, lengths_per_axis
-from .yamltree import to_python
 
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000

@@ -8,8 +8,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..geometry.artefacts import Name
 from ..geometry.positions import Axis
-from ..quantities import Duration, Length
-from ..settings import FORM, Settings
+from ..inputs.quantities import Duration, Length
+from ..inputs.settings import FORM, Settings
 from .position_sections import (
     BallNames,
     CoordinatesSettings,

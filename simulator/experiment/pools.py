@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
-from ..quantities import format_length
-from ..settings import hint, listing
+from ..inputs.messages import Steps, format_path
+from ..inputs.problems import written_count, written_text
+from ..inputs.quantities import format_length
+from ..inputs.settings import hint, listing
+from ..inputs.yamltree import Mapping, Sequence, to_python, written
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
-from .messages import Steps, format_path
-from .model import Calibration, Floats, Machine, Position, RadiusCalibration
+from .model import AtMost, Calibration, Candidate, ChangeTimes, Floats, Machine, Pool, Position, RadiusCalibration
 from .placements import resolve_position
-from .pool import AtMost, Candidate, ChangeTimes, Pool
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (
     LimitsSettings,
@@ -30,10 +31,8 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .problems import written, written_count, written_text
 from .references import References, Tally, frozen
 from .structure import Sections
-from .yamltree import Mapping, Sequence, to_python
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
 

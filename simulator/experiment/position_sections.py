@@ -8,8 +8,8 @@ from pydantic import Field, StringConstraints, Tag
 
 from ..geometry.artefacts import Coordinates, Name, PairSet
 from ..geometry.positions import Axis
-from ..quantities import Angle, Length, LengthFunction, PositiveLength
-from ..settings import FORM, Settings
+from ..inputs.quantities import Angle, Length, LengthFunction, PositiveLength
+from ..inputs.settings import FORM, Settings
 
 Text = Annotated[str, StringConstraints(min_length=1)]
 Count = Annotated[int, Field(ge=1, le=10_000)]

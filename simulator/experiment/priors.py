@@ -6,17 +6,17 @@ import numpy as np
 
 from ..estimation.parameters import AXIS_NAMES, pose_parameter_names
 from ..geometry.artefacts import BryanGaugeSettings
+from ..inputs.messages import Steps, format_path
+from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
+from ..inputs.settings import hint, shorten
+from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
-from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
-from ..settings import hint, shorten
-from .messages import Steps, format_path
 from .model import Floats, Machine, Position, Prior
 from .references import References
 from .sections import PriorSettings
 from .structure import Sections
-from .yamltree import mark_of
 
 MOST_PRIORS = 5000
 PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}

@@ -17,16 +17,16 @@ from ..geometry.artefacts import (
     BryanGaugeSettings,
     coincident_balls,
 )
-from ..quantities import format_length
-from ..settings import hint, listing, shorten
-from .messages import ExperimentError, Steps
+from ..inputs.messages import ExperimentError, Steps
+from ..inputs.problems import Problems, written_keys, written_text
+from ..inputs.quantities import format_length
+from ..inputs.settings import hint, listing, shorten
+from ..inputs.tables import read_table
+from ..inputs.yamltree import Mapping, Node, written
+from ..inputs.yamltree import Sequence as SequenceNode
 from .model import Floats, Indices
-from .problems import Problems, written, written_keys, written_text
 from .sections import ProbeSettings
 from .structure import Sections
-from .tables import read_table
-from .yamltree import Mapping, Node
-from .yamltree import Sequence as SequenceNode
 
 DEFAULT_PROBE = "probe"
 

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StringConstraints, Tag
 
 from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name
+from ..inputs.quantities import Length, LengthFunction
+from ..inputs.settings import FORM, Settings
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
-from ..quantities import Length, LengthFunction
-from ..settings import FORM, Settings
 from .pool_sections import PoolSettings
 from .position_sections import CalibrationSettings, Edges, LengthPerAxis, PositionSettings, Text
 

@@ -10,14 +10,14 @@ from typing import Annotated, Any
 from pydantic import TypeAdapter, ValidationError
 
 from ..geometry.artefacts import AnyArtefactSettings
-from ..settings import describe, hint, nearest
-from .messages import Steps
+from ..inputs.messages import Steps
+from ..inputs.problems import Problems
+from ..inputs.settings import describe, hint, nearest
+from ..inputs.wording import explain
+from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import CalibrationSettings, PositionSettings
-from .problems import Problems
 from .sections import AnyProbe, ExperimentSettings, PriorSettings
-from .wording import explain
-from .yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
 ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {

@@ -8,13 +8,16 @@ from collections.abc import Sequence as AnySequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..settings import describe, hint, listing
-from .messages import Message, format_path
-from .problems import Problems
+from ..inputs.messages import Message, format_path
+from ..inputs.problems import Problems
+from ..inputs.settings import describe, hint, listing
+from ..inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
 from .sections import ExperimentSettings
-from .yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
 
 MOST_VARIANTS = 1000
+# Balls, balls read, calibrated values, priors and evaluation points of all variants of a file, which are loaded
+# together.
+MOST_OF_ALL = 2_000_000
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
 
 
@@ -91,6 +94,32 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
         known = [key for key in ExperimentSettings.model_fields if key != "variants"]
         raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
     return _replaced(root, steps, value, mark, ())
+
+
+def removed(root: Node, path: str) -> Node:
+    """Return the tree without the entry of a mapping or a list at a path.
+
+    :raises ValueError: the path is malformed, or nothing stands there.
+    """
+    return _less(root, list(_place(root, path)), ())
+
+
+def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
+    step, rest = steps[0], steps[1:]
+    here = (*above, step)
+    key: str | int = int(step) if isinstance(node, Sequence) else step
+    below = child(node, key)
+    if below is None:
+        known = node.items if isinstance(node, Mapping) else ()
+        raise ValueError(f"there is no {format_path(here)}; {hint(step, known)}")
+    if isinstance(node, Sequence):
+        i = int(step)
+        kept = (_less(below, rest, here),) if rest else ()
+        return replace(node, items=(*node.items[:i], *kept, *node.items[i + 1 :]))
+    assert isinstance(node, Mapping)
+    if rest:
+        return replace(node, items={**node.items, step: _less(below, rest, here)})
+    return replace(node, items={name: item for name, item in node.items.items() if name != step})
 
 
 def _steps(path: str) -> list[str]:

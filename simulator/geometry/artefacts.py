@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag, model_validator
 
-from ..quantities import Length, PositiveLength
-from ..settings import Settings, listing
+from ..inputs.quantities import Length, PositiveLength
+from ..inputs.settings import Settings, listing
 from .directions import DIRECTIONS, DirectionsSettings, directions
 
 MOST_BALLS = 40_000

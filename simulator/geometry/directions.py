@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Tag, model_validator
 
-from ..quantities import Angle
-from ..settings import FORM, Settings
+from ..inputs.quantities import Angle
+from ..inputs.settings import FORM, Settings
 
 MOST_DIRECTIONS = 5000
 UPRIGHT = 0.5 * np.pi

@@ -15,12 +15,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..quantities import with_quantities
-from ..settings import hint, listing, shorten
+from ..inputs.quantities import with_quantities
+from ..inputs.settings import hint, listing, shorten
 from .protocol import Array, ErrorModel, Parameter
 
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
+
+# The packages that ballplate consisted of at first, and what models written then are to import in their place.
+FORMER_PACKAGES = ("simulator", "analysis")
+NEW_LINE = "from ballplate.models import Parameter, Reported"
 
 # Parameters are tried at random values that move points by about this much, in metres, and are changed by as much.
 USUAL_ERROR = 1e-4
@@ -88,7 +92,11 @@ def _imported(name: str, folder: Path | None) -> Any:
     try:
         module = _attempt(f"{name} cannot be imported", lambda: importlib.import_module(name))
     except CustomModelError as error:
-        if isinstance(error.__cause__, ModuleNotFoundError) and error.__cause__.name in name.split("."):
+        absent = error.__cause__.name if isinstance(error.__cause__, ModuleNotFoundError) else None
+        if absent is not None and absent.partition(".")[0] in FORMER_PACKAGES:
+            text = f"{name} imports {absent}, which is no package of its own any more; write: {NEW_LINE}"
+            raise CustomModelError(text) from None
+        if absent in name.split("."):
             where = "" if folder is None else f" nor in {folder}"
             raise CustomModelError(f"no module {name} is installed{where}; install it, or correct its name") from None
         raise
@@ -180,7 +188,7 @@ def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:
         if not isinstance(parameter, Parameter):
             raise CustomModelError(
                 f"{name}: parameters has an entry of type {type(parameter).__name__}; each must be a Parameter of "
-                "simulator.machines.protocol"
+                "ballplate.models"
             )
         if parameter.unit not in ("m", "rad", "1"):
             raise CustomModelError(f'{name}: the unit of "{parameter.name}" is "{parameter.unit}"; known: m, rad, 1')

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self, Union
 
 from pydantic import Field, PrivateAttr, StringConstraints, Tag, model_validator
 
-from ..settings import FORM, Settings
+from ..inputs.settings import FORM, Settings
 from ..splines.knots import with_boundaries
 from .arrangement import ARRANGEMENTS, AXES, Arrangement
 from .bases import Basis, Ends, Monomial, Polynomial, Spline

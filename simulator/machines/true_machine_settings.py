@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
-from ..quantities import Angle, PositiveLength
-from ..settings import Settings
+from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.settings import Settings
 from .curves import Interpolation, Points, curves_model
 from .description import MachineDescription, true_volumetric
 from .protocol import ErrorModel, TrueMachine

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..quantities import QuantityError, parse_angle, parse_length, parse_ratio
-from ..settings import Settings, hint
+from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
+from ..inputs.settings import Settings, hint
 from .framing import in_frame_of
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
 from .settings import Corner, build_error_model

@@ -8,9 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design import Integers
 from ..estimation.observations import OFFSET_STEP, offset_sensitivity
-from ..machines.protocol import Array, ErrorModel
+from ..machines.protocol import Array, ErrorModel, Integers
 
 Single = NDArray[np.float32]
 

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design import Design, Integers, State, nominal_state, probe_offsets
-from ..estimation.covariance import Spectrum, spectrum
-from ..estimation.elimination import Factor, eliminate
+from ..design.arrays import Design, State, probe_offsets
+from ..estimation.covariance import Spectrum
+from ..estimation.elimination import Factor
 from ..estimation.gauss_newton import gauss_newton
 from ..estimation.initial import initial_state
+from ..estimation.linearisation import Linearisation, linearise
 from ..estimation.observations import (
     prior_rows,
     reading_blocks,
     reading_weights,
 )
-from ..estimation.parameters import shared_layout
-from ..generate import scale_readings, true_lengths, true_priors
-from ..machines.protocol import Array, ErrorModel
-from ..threads import single_threaded
+from ..machines.protocol import Array, ErrorModel, Integers
+from ..numerics.threads import single_threaded
+from ..readings.generate import scale_readings, true_lengths, true_priors
 from .expansion import Direct, LocalModel, expand
 
 # Readings handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
@@ -71,10 +70,9 @@ class Reference:
 
     The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
     the model at the first and the second ends of the length standards' lengths, so far as they are read, with
-    `end_noise` (d, ends) and `end_difference` (m, d), their difference at the reference; `points` is the model at the
-    evaluation points. `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of priors about the truth.
-    `start` is the estimate
-    from readings without noise.
+    `end_noise` (d, ends) and `end_difference` (m, d), their difference at the reference; `is_expanded` tells that
+    models are expanded about readings, because that is faithful. `prior_residual` (m,) and `prior_derivative` (m, s)
+    are the rows of priors about the truth. `start` is the estimate from readings without noise.
     """
 
     design: Design
@@ -87,7 +85,7 @@ class Reference:
     ends: tuple[LocalModel, LocalModel] | None
     end_noise: tuple[Array, Array]
     end_difference: Array
-    points: LocalModel
+    is_expanded: bool
     prior_residual: Array
     prior_derivative: Array
     exact: Array
@@ -96,6 +94,16 @@ class Reference:
     def sum_of_squares(self) -> float:
         """S^2 of readings without noise: zero unless the true machine is none of the fitted model's."""
         return self.factor.sum_of_squares
+
+    @property
+    def linearisation(self) -> Linearisation:
+        """The linearisation at the reference."""
+        return Linearisation(self.design, self.factor.layout, self.start, self.factor, self.spectrum)
+
+    def local_model(self, points: Array, probes: Integers) -> LocalModel:
+        """The model about readings (m, d) with probes of indices (m,)."""
+        p = probe_offsets(self.design, self.start)[probes]
+        return _local_model(self.design, self.start.a, points, p, self.is_expanded)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -112,9 +120,9 @@ def reference(design: Design, truth: Truth) -> Reference:
     """
     observed = _observed(design)
     # As drawn, because a small machine error makes a direction that is open merely all but open.
-    drawn = spectrum(eliminate(observed, shared_layout(observed), nominal_state(observed)))
-    if drawn.deficiency:
-        raise NoReferenceError(f"the design is rank deficient by {drawn.deficiency}")
+    deficiency = linearise(observed).deficiency
+    if deficiency:
+        raise NoReferenceError(f"the design is rank deficient by {deficiency}")
     readings = observed.readings
     p = probe_offsets(observed, truth.state)[readings.probe]
     turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
@@ -129,7 +137,11 @@ def reference(design: Design, truth: Truth) -> Reference:
         raise TooWildError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
     p = probe_offsets(observed, start)[readings.probe]
-    local = _local_models(observed, solution.spectrum, solution.factor.layout.model, start, exact)
+    is_expanded = _is_faithful(observed, solution.spectrum, solution.factor.layout.model, start, exact)
+
+    def local(x: Array, p: Array) -> LocalModel:
+        return _local_model(observed, start.a, x, p, is_expanded)
+
     blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
     weight = reading_weights(observed, readings.select(plates))
     groups, at = [], 0
@@ -160,7 +172,6 @@ def reference(design: Design, truth: Truth) -> Reference:
             difference[of_end] += sign * (exact[end] + observed.model.error(exact[end], start.a, p[end]))
         end_noise.append((1.0 / reading_weights(observed, readings.select(end))).T)
     difference[~read] -= start.origins[readings.position[given.first[~read]]]
-    evaluated = probe_offsets(observed, start)
     return Reference(
         observed,
         truth,
@@ -172,7 +183,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         ends,
         (end_noise[0], end_noise[1]),
         difference,
-        local(observed.points, np.broadcast_to(evaluated[observed.point_probe], observed.points.shape)),
+        is_expanded,
         *prior_rows(observed, solution.factor.layout, start),
         exact,
     )
@@ -221,22 +232,23 @@ def _as_slice(ascending: Integers) -> Integers | slice:
     return slice(first, last + 1) if last - first + 1 == len(ascending) else ascending
 
 
-def _local_models(
-    design: Design, found: Spectrum, columns: slice, start: State, exact: Array
-) -> Callable[[Array, Array], LocalModel]:
-    """A function from readings (m, d) and probe offsets (m, d) to the model there: expanded where that is faithful."""
-    model, p = design.model, probe_offsets(design, start)[design.readings.probe]
+def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool) -> LocalModel:
+    """The model about readings x (m, d), with parameters a (n,) and probe offsets p (m, d)."""
+    if is_expanded:
+        return expand(design.model, x, a, p, design.free_offsets is not None)
+    return Direct(design.model, x, a, p, design.model.error(x, a, p))
 
-    def direct(x: Array, p: Array) -> LocalModel:
-        return Direct(model, x, start.a, p, model.error(x, start.a, p))
 
-    def expanded(x: Array, p: Array) -> LocalModel:
-        return expand(model, x, start.a, p, design.free_offsets is not None)
-
+def _is_faithful(design: Design, found: Spectrum, columns: slice, start: State, exact: Array) -> bool:
+    """Whether an expansion of the model tells the same as the model itself."""
+    p = probe_offsets(design, start)[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = 1.0 / reading_weights(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, found.root.shape[1])) @ found.root[columns].T
     offsets = None if design.free_offsets is None else 1e-6 * generator.standard_normal(moved.shape)
-    difference = expanded(exact, p).change(moved, step, offsets) - direct(exact, p).change(moved, step, offsets)
-    return expanded if bool((np.abs(difference) <= FAITHFUL * noise).all()) else direct
+    expanded, direct = (
+        _local_model(design, start.a, exact, p, is_expanded).change(moved, step, offsets)
+        for is_expanded in (True, False)
+    )
+    return bool((np.abs(expanded - direct) <= FAITHFUL * noise).all())

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design import Integers, Lengths
+from ..design.observations import Lengths
 from ..estimation.elimination import Factor
 from ..estimation.observations import length_values
 from ..estimation.parameters import SharedLayout
 from ..estimation.substitution import solve_balls, solve_kept, solve_shared
-from ..machines.protocol import Array
-from ..threads import single_threaded
+from ..machines.protocol import Array, Integers
+from ..numerics.threads import single_threaded
 from .expansion import Single
 from .reference import Group, Reference
 

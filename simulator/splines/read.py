@@ -12,19 +12,11 @@ from typing import Literal
 
 import numpy as np
 
-from ..experiment.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from ..experiment.tables import (
-    MOST_ROWS,
-    _cells,
-    refuse_columns,
-    refuse_separators,
-    table_lines,
-    wrong_count,
-    wrong_number,
-)
-from ..experiment.yamltree import Mark
-from ..quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number, metres_or_radians
-from ..settings import hint, listing, shorten
+from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number, metres_or_radians
+from ..inputs.settings import hint, listing, shorten
+from ..inputs.tables import MOST_ROWS, _cells, refuse_columns, refuse_separators, table_lines, wrong_count, wrong_number
+from ..inputs.yamltree import Mark
 from .space import Array
 
 EXAMPLE = "position_mm,error_um"

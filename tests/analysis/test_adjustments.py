@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from analysis.adjustments import adjustments
-from simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
+from ballplate.results.adjustments import adjustments
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
 
 MODEL = SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 

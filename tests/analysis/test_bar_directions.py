@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-
-from analysis.rank import Verdict
-from analysis.study import check, plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
+from ballplate.rank.verdict import Verdict
+from ballplate.results.study import check, predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
 
 FOLDER = Path("designs/hurt_foss")
 NO_LENGTH = "no length is known (bar: length): the overall scale of the machine stays open until one is calibrated"
@@ -253,7 +252,7 @@ def test_nothing_is_said_where_plates_tell_what_bars_do_not(tmp_path: Path) -> N
 
 def test_the_overall_scale_with_an_unknown_length_is_what_the_plan_leaves_open() -> None:
     unknown = {one.name: one for one in load(FOLDER / "bryan-gauge.yaml")}["radius unknown"]
-    found = plan(unknown)
+    found = predict(unknown)
     (direction,) = found.verdict.null
     assert [part.name for part in direction.functions] == ["scale x", "scale y", "scale z"]
     np.testing.assert_allclose([part.peak for part in direction.functions], direction.functions[0].peak, rtol=1e-9)

@@ -7,19 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.inputs.quantities import LengthFunction, Target
+from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
+from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.uncertainty import Quantity, uncertainties
-from simulator.design import Design, State, nominal_state
-from simulator.estimation.covariance import Covariance, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import gauss_newton
-from simulator.estimation.initial import initial_state
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.generate import noisy_certificate, noisy_readings
-from simulator.geometry.motions import rotation_from_vector
-from simulator.quantities import LengthFunction, Target
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
 seeds = st.integers(0, 2**31)
@@ -40,11 +39,9 @@ def small_design(seed: int = 0, calibration: str = "sides") -> Design:
     return replace(design, points=np.random.default_rng(seed).random((12, 3)))
 
 
-def judged(design: Design, sigma: float = 1.0) -> tuple[dict[str, Quantity], Covariance, SharedLayout]:
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    spread = covariance(design, factor, spectrum(factor))
-    return uncertainties(design, layout, state, spread, sigma), spread, layout
+def judged(design: Design, sigma: float = 1.0) -> tuple[dict[str, Quantity], Linearisation, SharedLayout]:
+    at = linearise(design)
+    return uncertainties(at, sigma), at, at.layout
 
 
 def assert_same(found: Quantity, expected: Quantity, relative: float = 1e-9) -> None:
@@ -189,7 +186,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
 @pytest.mark.parametrize("size", [1, 3, 5])
 def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     expected, _, _ = judged(small_design(4))
-    monkeypatch.setattr("analysis.pairs.TILE", size)
+    monkeypatch.setattr("ballplate.uncertainty.pairs.TILE", size)
     found, _, _ = judged(small_design(4))
     for symbol in ("U5", "U6"):
         assert_same(found[symbol], expected[symbol])
@@ -199,7 +196,7 @@ def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None
 @pytest.mark.parametrize("rows", [10, 64, 100_000])
 def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
     expected, _, _ = judged(small_design(4, "neighbours"))
-    monkeypatch.setattr("simulator.estimation.elimination.ROWS_AT_ONCE", rows)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.ROWS_AT_ONCE", rows)
     found, _, _ = judged(small_design(4, "neighbours"))
     for symbol, quantity in expected.items():
         assert_same(found[symbol], quantity)
@@ -208,17 +205,15 @@ def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> No
 def test_share_of_distances_within_the_target() -> None:
     """Against a count over single pairs."""
     design = small_design(7)
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    spread = covariance(design, factor, spectrum(factor))
+    at = linearise(design)
     values = []
     for i, j in itertools.combinations(range(len(design.points)), 2):
         pair = replace(design, points=design.points[[i, j]])
         length = float(np.linalg.norm(design.points[i] - design.points[j]))
-        values.append((uncertainties(pair, layout, state, spread)["U6"].maximum, length))
+        values.append((uncertainties(replace(at, design=pair))["U6"].maximum, length))
     cases = ((2e-7, 0.0, 1.0, 1.0), (1e-7, 2e-7, 1.0, 1.0), (1e-7, 2e-7, 1.7, 1.0), (3e-7, 4e-7, 1.2, 2.0))
     for constant, slope, sigma, k in cases:
         target = Target(LengthFunction(constant, slope), k)
-        found = uncertainties(design, layout, state, spread, sigma, target)["U6"].within_target
+        found = uncertainties(at, sigma, target)["U6"].within_target
         assert found == np.mean([k * sigma * u <= constant + slope * length for u, length in values])
         assert found is not None and 0 < found < 1

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.lengths import (
+from ballplate.cli import main
+from ballplate.length_map.length_map import (
     Groups,
     Settings,
     class_edges,
@@ -22,11 +21,12 @@ from analysis.lengths import (
     length_map,
     length_pairs,
 )
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
-from simulator.quantities import LengthFunction
+from ballplate.results.study import predict
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.quantities import LengthFunction
+
 from tests.reference import dense
 
 TEXT = (
@@ -59,7 +59,7 @@ def settings(**changes: object) -> Settings:
 
 
 def test_the_whole_is_what_run_tells_of_the_same_points(experiment: Experiment) -> None:
-    expected = plan(experiment).quantities["U6"]
+    expected = predict(experiment).quantities["U6"]
     found = length_map(experiment, settings()).whole
     np.testing.assert_array_equal(grid_points(lay_out(experiment), GRID), experiment.evaluation.points)
     assert found.count[0] == expected.count == 153
@@ -213,7 +213,7 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         (["--target", "1 um", "--grid", "20"], "a grid of 8000 points is too fine"),
         (["--target", "1 um", "--grid", "11", "--pairs", "p.csv"], "885115 lengths are too many for --pairs"),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),
-        (["--target", "1 um", "--csv", file], "are the same file; name another"),
+        (["--target", "1 um", "--csv", file], "which is read; name another"),
     ):
         assert main(["lengths", file, *options]) == 2
         assert told in capsys.readouterr().err

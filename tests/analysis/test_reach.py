@@ -8,15 +8,16 @@ from decimal import Decimal
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
+from ballplate.requirements.answers import Answer
+from ballplate.requirements.goals import Goal, GoalError, parse_goal
+from ballplate.requirements.search import reach
+from ballplate.requirements.steps import at_step, round_down, round_up, step_of
+from ballplate.requirements.unknowns import NotVariableError
+from ballplate.results.prediction import Prediction
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
 from scipy.optimize import brentq
-
-from analysis.cli import main
-from analysis.goals import Goal, GoalError, parse_goal
-from analysis.reach.search import Answer, reach
-from analysis.reach.steps import at_step, round_down, round_up, step_of
-from analysis.reach.unknowns import NotVariableError
-from analysis.study import Plan, plan
-from simulator.experiment.load import load
 
 TEXT = (
     Path("designs/quickstart.yaml")
@@ -40,8 +41,8 @@ def written(folder: Path, text: str, *changes: tuple[str, str]) -> Path:
     return file
 
 
-def planned(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> Plan:
-    return plan(load(written(folder, text, *changes))[0])
+def planned(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> Prediction:
+    return predict(load(written(folder, text, *changes))[0])
 
 
 def average(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> float:
@@ -179,7 +180,7 @@ def test_shares_and_tasks(tmp_path: Path) -> None:
     tasks = "  tasks: [{name: edge, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}]\n\ntarget"
     with_task = TEXT.replace(*target).replace("\ntarget", tasks)
     found = answer(tmp_path, "tasks", "repeatability", with_task)
-    told = plan(load(written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}")))[0])
+    told = predict(load(written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}")))[0])
     assert told.tasks[0].is_within and told.tasks[0].standard_uncertainty > 0.985 * 0.15e-6
 
 
@@ -227,3 +228,14 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     for wrong in (["--goal", "U9"], ["--target", "3"], ["--share", "95%", "--goal", "tasks"], ["--calibration", "1"]):
         assert main(["reach", file, "--by", "certificate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("ballplate reach: ")
+
+
+def test_more_points_than_are_gone_through_for_each_value(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8").replace("random: 200", "random: 10001")
+    path = tmp_path / "many.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["reach", str(path)]) == 3
+    assert capsys.readouterr().err == (
+        f"{path}: evaluation.points: 10001 points make 50005000 distances, which reach computes for every value that "
+        "it tries, some dozens, which takes too long; give at most 10000, better some hundred\n"
+    )

@@ -8,9 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.scale import (
+from ballplate.cli import main
+from ballplate.results.study import check, predict
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.uncertainty.scale import (
     EXACT_OFFSETS,
     OWN_SCALES,
     can_stretch,
@@ -19,13 +24,7 @@ from analysis.scale import (
     scale_uncertainty,
     with_offsets,
 )
-from analysis.study import check, plan
-from analysis.tables import plan_lines
-from simulator.design import nominal_state
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
+
 from tests.reference import dense
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
@@ -107,8 +106,8 @@ def test_offsets_with_an_uncertainty_are_what_generalised_least_squares_makes_of
 def test_scale_is_the_mean_relative_change_of_distances(tmp_path: Path) -> None:
     """Counted pair by pair, for a change of the machine's parameters."""
     design = lay_out(experiment_of(tmp_path, SMALL))
-    layout, state = shared_layout(design), nominal_state(design)
-    row = scale_row(design, layout, state)
+    at = linearise(design)
+    layout, state, row = at.layout, at.state, scale_row(at)
     step = 1e-6 * np.random.default_rng(3).normal(size=len(state.a))
     points = design.points
     offsets = np.broadcast_to(design.probes[design.point_probe], points.shape)
@@ -140,7 +139,7 @@ def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_p
 
 def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_path: Path) -> None:
     certified = experiment_of(tmp_path, QUICKSTART)
-    found = plan(certified, with_scale=True).scale
+    found = predict(certified, with_scale=True).scale
     assert found is not None and not found.rests_on_offsets and found.loosened is None
     told = {one.words: one.without for one in found.carriers}
     bare = experiment_of(tmp_path, without_certificate(QUICKSTART))
@@ -185,7 +184,7 @@ def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) 
         found = check(experiment, with_scale=True)
         assert found.scale is not None
         assert (OWN_SCALES in [one.words for one in found.scale.carriers]) is not is_free
-        assert ("the machine's own scales" in "\n".join(plan_lines(found))) is not is_free
+        assert ("the machine's own scales" in "\n".join(found.lines())) is not is_free
         known.append(found.scale.uncertainty)
     # Without scales in the model only its squareness is left to be uncertain of.
     assert known[1] < 0.5 * known[0]
@@ -212,7 +211,7 @@ def test_a_certificate_is_suggested_and_does_what_is_told(tmp_path: Path, capsys
     (told,) = [line for line in lines if line.startswith("scale: calibrate the distance ")]
     text = file.read_text(encoding="utf-8") + f"\ncalibration:\n  - {edit.split('calibration: ')[1]}\n"
     loose = with_offsets(experiment_of(tmp_path, text), 1e-6)
-    average = plan(loose).quantities["U6"].average
+    average = predict(loose).quantities["U6"].average
     assert f"average U6 {1e6 * average:.4f} um with 1 um on the probe offsets" in told
     assert main(["check", str(file), "--suggest"]) == 0
     assert "warning" not in capsys.readouterr().out

@@ -9,20 +9,19 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.corrections import correction_rows
-from analysis.lengths import Settings, length_map
-from analysis.rank import Verdict, weak_limit
-from analysis.study import check, plan
-from analysis.tables import percent, plan_lines
-from simulator.design import nominal_state
-from simulator.estimation.covariance import spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
+from ballplate.cli import main
+from ballplate.length_map.length_map import Settings, length_map
+from ballplate.rank.verdict import Verdict, weak_limit
+from ballplate.results.formatting import percent
+from ballplate.results.study import check, predict
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.corrections import correction_rows
+from ballplate.simulator.estimation.covariance import spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 TASKS = """\
@@ -50,7 +49,7 @@ def with_target(target: str, factor: float = 1.0, text: str = SMALL) -> str:
 
 def verdicts(experiment: Experiment) -> list[object]:
     """Everything that compares with the target."""
-    found = plan(experiment)
+    found = predict(experiment)
     verdict: Verdict = check(experiment).verdict
     mapped = length_map(experiment, Settings((3, 2, 3), "down", experiment.target_accuracy.stated,  # type: ignore[union-attr]
                                              2.0, False, experiment.coverage_factor))  # fmt: skip
@@ -97,14 +96,14 @@ def test_run_and_reach_tell_the_same_share(tmp_path: Path, capsys: pytest.Captur
     main(["check", file])
     checked = re.search(r"\(standard uncertainty u\): (\S+ %) of 435 lengths", capsys.readouterr().out)
     assert ran and reached and checked and ran[1] == reached[1] == checked[1]
-    share = plan(experiment_of(tmp_path, with_target("0.11 um"))).quantities["U6"].within_target
+    share = predict(experiment_of(tmp_path, with_target("0.11 um"))).quantities["U6"].within_target
     assert share is not None and 0 < share < 1 and ran[1] == percent(share)
     assert float(ran[1].removesuffix(" %")) == np.floor(1e4 * share) / 100
 
 
 def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = str(written(tmp_path, with_target("0.5 um")))
-    average = plan(load(file)[0]).quantities["U6"].average
+    average = predict(load(file)[0]).quantities["U6"].average
     just, not_quite = f"U6 average {1e6 * average * 1.001} um", f"U6 average {1e6 * average * 0.999} um"
     assert main(["check", file, "--goal", just, "--goal", "lengths", "--goal", "U2 angles maximum 1 urad"]) == 0
     out = capsys.readouterr().out
@@ -129,7 +128,7 @@ def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 def test_a_share_of_the_lengths_is_enough_where_that_is_asked_for(tmp_path: Path) -> None:
     file = str(written(tmp_path, with_target("0.11 um")))
-    share = plan(load(file)[0]).quantities["U6"].within_target
+    share = predict(load(file)[0]).quantities["U6"].within_target
     assert share is not None and 0.02 < share < 0.98
     goal = ["check", file, "--goal", "lengths"]
     assert main(goal) == 1
@@ -158,7 +157,7 @@ def test_weak_directions_fail_where_they_shall_not_be(tmp_path: Path) -> None:
 
 def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
     """By the uncertainty that the file means: 2 u is beyond a limit that u is within."""
-    largest = plan(experiment_of(tmp_path, with_target("1 um"))).quantities["U6"].maximum
+    largest = predict(experiment_of(tmp_path, with_target("1 um"))).quantities["U6"].maximum
     for factor, status in ((1.0, 0), (2.0, 1)):
         file = str(written(tmp_path, with_target(f"{1.5e6 * largest:.6f} um", factor)))
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
@@ -189,7 +188,7 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
             told.append((size, int((at_points > 2e-8).sum())))
     found_there = [(one.standard_deviation, one.beyond) for one in found.verdict.weak]
     assert sorted(found_there) == [(pytest.approx(size), count) for size, count in sorted(told)]
-    lines = plan_lines(found)
+    lines = found.lines()
     direction = next(line for line in lines if line.startswith("weakly determined 1"))
     assert f"root mean square over 30 points; more than 0.02 um at {found.verdict.weak[0].beyond} of them" in direction
     assert f"all directions together: U6 {1e6 * found.lengths.average:.4f}"[:38] in "\n".join(lines)
@@ -208,7 +207,7 @@ def test_a_certificate_that_may_be_any_ends_where_no_file_may_state_it(
 
 def test_no_weak_direction_and_yet_a_target_that_is_missed(tmp_path: Path) -> None:
     """Many moderate directions add up: nothing is weak, and `check` tells the share all the same."""
-    found = plan(experiment_of(tmp_path, SMALL))
+    found = predict(experiment_of(tmp_path, SMALL))
     directions = check(experiment_of(tmp_path, with_target("0.001 um"))).verdict.weak
     limit = 1e6 * max(one.standard_deviation for one in directions)
     text = with_target(f"{1.01 * limit:.6f} um")

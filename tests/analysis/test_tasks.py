@@ -7,15 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.study import predict
+from ballplate.simulator.design.arrays import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.functions import linear_functions
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.uncertainty.quantities import task_distances
+from ballplate.uncertainty.summaries import uncertainties
 
-from analysis.study import plan
-from analysis.tables import plan_data, plan_lines
-from analysis.tasks import share_within, task_differences, task_rows
-from simulator.design import Design, State, nominal_state, probe_offsets
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.layout import lay_out
 from tests.analysis.test_invariants import judged, small_design
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
@@ -38,9 +41,9 @@ def with_tasks(tmp_path: Path, tasks: str = TASKS, text: str = QUICKSTART) -> Ex
 
 
 def test_a_task_is_as_uncertain_as_the_distance_between_the_same_points(tmp_path: Path) -> None:
-    found = plan(with_tasks(tmp_path)).tasks[0]
+    found = predict(with_tasks(tmp_path)).tasks[0]
     points = "evaluation:\n  points: [[100 mm, 200 mm, 0 mm], [600 mm, 200 mm, 50 mm]]\n  probe: down\n"
-    expected = plan(with_tasks(tmp_path, points)).quantities["U6"]
+    expected = predict(with_tasks(tmp_path, points)).quantities["U6"]
     assert expected.count == 1
     assert found.standard_uncertainty == pytest.approx(expected.maximum, rel=1e-9)
     assert found.length == pytest.approx(np.hypot(0.5, 0.05))
@@ -48,7 +51,7 @@ def test_a_task_is_as_uncertain_as_the_distance_between_the_same_points(tmp_path
 
 
 def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path) -> None:
-    planned = plan(with_tasks(tmp_path))
+    planned = predict(with_tasks(tmp_path))
     bore, side, height = planned.tasks
     assert bore.target == 1e-7 and bore.is_within is False
     assert side.length == pytest.approx(np.linalg.norm([0.9 - 0.1, 0.1, 0.05]))
@@ -58,12 +61,17 @@ def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path
     assert (told.count, told.largest) == (3, planned.tasks[int(np.argmax(values))].name)
     assert told.average == pytest.approx(np.mean(values)) and told.maximum == max(values)
     assert told.within_target == pytest.approx(2 / 3)
-    data = plan_data(planned)
+    data = planned.to_dict()
     assert data["tasks"]["height"]["standard_uncertainty"] == height.standard_uncertainty
     assert data["tasks"]["bore distance"]["within_target"] is False
-    lines = plan_lines(planned)
+    lines = planned.lines()
     assert any(line.startswith("bore distance") and line.endswith("no") for line in lines)
     assert len(planned.design.points) == 200
+
+
+def length_of(ends: np.ndarray) -> np.ndarray:
+    """Lengths (t,) between the ends (2 t, 3) of tasks."""
+    return np.linalg.norm(ends[::2] - ends[1::2], axis=1)
 
 
 def changed(design: Design, layout: SharedLayout, state: State, step: np.ndarray) -> State:
@@ -80,7 +88,8 @@ def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> No
     design = lay_out(with_tasks(tmp_path, text=free))
     layout = shared_layout(design)
     state = replace(nominal_state(design), a=np.random.default_rng(3).normal(0, 1e-5, len(design.model.parameters)))
-    rows = task_rows(design, layout, state)
+    given = task_distances(design)
+    rows = linear_functions(linearise(design, state), given).shared
     assert rows.shape == (3, len(layout))
     # The fixed tip has no part in it, a tip of one end all, a tip of both only what rotations make of it.
     by_offset = np.abs(rows[:, layout.offsets]).max(axis=1)
@@ -88,10 +97,7 @@ def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> No
     generator = np.random.default_rng(4)
     for _ in range(4):
         step = 1e-5 * generator.standard_normal(len(layout))
-        lengths = [
-            np.linalg.norm(task_differences(design, changed(design, layout, state, sign * step)), axis=1)
-            for sign in (1, -1)
-        ]
+        lengths = [length_of(given.places.at(design, changed(design, layout, state, sign * step))) for sign in (1, -1)]
         np.testing.assert_allclose(rows @ step, (lengths[0] - lengths[1]) / 2.0, atol=1e-14, rtol=1e-6)
 
 
@@ -113,7 +119,13 @@ def test_undetermined_tasks_are_told_as_such() -> None:
 
 
 def test_share_within_counts_only_tasks_with_a_target(tmp_path: Path) -> None:
-    tasks = plan(with_tasks(tmp_path)).tasks
-    assert share_within(tasks[:1]) == 0.0
-    assert share_within([replace(one, target=None) for one in tasks]) is None
-    assert share_within([replace(tasks[0], standard_uncertainty=float("nan")), tasks[1]]) == 0.5
+    at = linearise(lay_out(with_tasks(tmp_path)))
+    targets = at.design.task_targets
+
+    def share(*targets: Target | None) -> float | None:
+        changed = replace(at.design, task_targets=targets)
+        return uncertainties(replace(at, design=changed))["tasks"].within_target
+
+    assert share(targets[0], None, None) == 0.0
+    assert share(None, None, None) is None
+    assert share(targets[0], targets[1], None) == 0.5

@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.constraints import Budget, constraints
-from analysis.planning.criteria import criterion
-from analysis.planning.information import Information, pool_information
-from analysis.planning.search import Losses, Problem, best_addition, counted_root, full_root
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.pool import with_chosen
-from simulator.machines.protocol import Array
-from simulator.threads import single_threaded
+from ballplate.planning.constraints import Budget, constraints
+from ballplate.planning.criteria import criterion
+from ballplate.planning.information import Information, pool_information
+from ballplate.planning.search import Losses, Problem, best_addition, counted_root, full_root
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.threads import single_threaded
 
 POOL = Path("designs/planning/plate-pool.yaml")
 ROUNDS = 5
@@ -77,7 +76,7 @@ def test_one_exchange(tmp_path: Path, balls: int) -> None:
         found = []
         for k in some:
             members = [information.candidates[m] for m in (*left, int(k))]
-            found.append(plan(with_chosen(experiment, members)).quantities["U6"].average)
+            found.append(predict(with_chosen(experiment, members)).quantities["U6"].average)
         return found
 
     def anew() -> list[float]:

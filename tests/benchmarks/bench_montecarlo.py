@@ -23,18 +23,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.trials import run_trials
+from ballplate.simulator.design.arrays import State, nominal_state
+from ballplate.simulator.estimation.observations import distance_rows, reading_blocks
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.montecarlo.expansion import Expansion
+from ballplate.simulator.montecarlo.reference import Reference, Truth, reference
+from ballplate.simulator.montecarlo.replicates import BATCH, draw, estimate_batch
 from joblib import Parallel, delayed
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from analysis.montecarlo.trials import run_trials
-from simulator.design import State, nominal_state
-from simulator.estimation.observations import distance_rows, reading_blocks
-from simulator.geometry.motions import rotation_from_vector
-from simulator.machines.protocol import Array
-from simulator.montecarlo.expansion import Expansion
-from simulator.montecarlo.reference import Reference, Truth, reference
-from simulator.montecarlo.replicates import BATCH, draw, estimate_batch
 from tests.reference.designs import grid_experiment
 
 ROOT = Path(__file__).parents[2]

@@ -20,12 +20,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.uncertainty.summaries import uncertainties
 
-from analysis.uncertainty import uncertainties
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
 from tests.reference.designs import grid_experiment
 
 from .linear_problem import Figures, figures, linear_problem
@@ -55,10 +53,8 @@ TABLE: list[Line] = []
 
 def ballplate(design: Design) -> tuple[Figures, int]:
     """What is measured."""
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    found = spectrum(factor)
-    quantities = uncertainties(design, layout, state, covariance(design, factor, found))
+    found = linearise(design)
+    quantities = uncertainties(found)
     return {s: (quantities[s].maximum, quantities[s].average) for s in SYMBOLS}, found.deficiency
 
 

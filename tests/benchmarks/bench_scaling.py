@@ -32,41 +32,38 @@ def peak() -> float:
 
 def measure(n: int) -> dict[str, float]:
     """Figures for a grid of n x n balls, in this process; times are the best of three."""
-    from analysis.uncertainty import ball_pairs, point_pairs
-    from simulator.design import nominal_state
-    from simulator.estimation.covariance import covariance, spectrum
-    from simulator.estimation.elimination import eliminate
-    from simulator.estimation.parameters import shared_layout
+    from ballplate.simulator.estimation.linearisation import linearise
+    from ballplate.uncertainty.summaries import point_pairs, uncertainties
+
     from tests.reference.designs import grid_experiment
 
     def estimate(size: int):  # type: ignore[no-untyped-def]
         design = grid_experiment(size)
         start = time.perf_counter()
-        layout, state = shared_layout(design), nominal_state(design)
-        factor = eliminate(design, layout, state)
+        found = linearise(design)
+        layout = found.layout
         eliminated = time.perf_counter()
-        found = covariance(design, factor, spectrum(factor))
         found.of_balls()
         linear = np.zeros((len(design.model.reported().names), len(layout)))
         linear[:, layout.model] = design.model.reported().matrix
         found.of_shared(np.eye(len(layout))[layout.poses])
         found.of_shared(linear)
-        point_pairs(design, layout, state, found)
-        return design, state, found, eliminated - start, time.perf_counter() - eliminated
+        point_pairs(found)
+        return design, found, eliminated - start, time.perf_counter() - eliminated
 
     estimate(5)
     base = peak()
     runs = [estimate(n) for _ in range(3)]
-    design, state, found = runs[-1][:3]
+    design, found = runs[-1][:2]
     before = peak()
     del runs[:-1]
     start = time.perf_counter()
-    pairs = ball_pairs(design, state, found)
+    pairs = uncertainties(found, symbols=("U5",))["U5"]
     return {
         "readings": len(design.readings),
         "pairs": pairs.count,
-        "elimination": min(run[3] for run in runs),
-        "uncertainties": min(run[4] for run in runs),
+        "elimination": min(run[2] for run in runs),
+        "uncertainties": min(run[3] for run in runs),
         "memory": before - base,
         "U5": time.perf_counter() - start,
         "U5 memory": peak() - before,

@@ -17,12 +17,11 @@ import time
 from pathlib import Path
 
 import pytest
-
-from analysis.sweeps.bundle import bundle_of, definition
-from analysis.sweeps.frame import frame
-from analysis.sweeps.load import load_sweep
-from analysis.sweeps.store import add_rows, add_sweep, open_store
-from analysis.sweeps.task import Task, compute
+from ballplate.sweeps.bundle import bundle_of, definition
+from ballplate.sweeps.frame import frame
+from ballplate.sweeps.load import load_sweep
+from ballplate.sweeps.store import add_rows, add_sweep, open_store
+from ballplate.sweeps.task import Task, compute
 
 ROOT = Path(__file__).parents[2]
 SWEEP = """\
@@ -44,7 +43,7 @@ def written(folder: Path, count: int) -> Path:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_share_of_computation(tmp_path: Path, workers: int) -> None:
     path = written(tmp_path, 1000)
-    command = [sys.executable, "-m", "analysis.cli", "sweep", str(path), "--workers", str(workers)]
+    command = [sys.executable, "-m", "ballplate", "sweep", str(path), "--workers", str(workers)]
     begun = time.perf_counter()
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     wall = time.perf_counter() - begun

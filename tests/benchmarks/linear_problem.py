@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.estimation.observations import distance_rows, reading_blocks
+from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
+from ballplate.simulator.machines.protocol import Integers
 from numpy.typing import NDArray
-
-from simulator.design import Design, Integers, nominal_state
-from simulator.estimation.observations import distance_rows, reading_blocks
-from simulator.estimation.parameters import SharedLayout, shared_layout
 
 Real = NDArray[np.float64]
 

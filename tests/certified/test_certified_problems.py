@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.certified.answers import answers
+from ballplate.certified.problems import certified_problems
+from ballplate.certified.score import Score, scores
+from ballplate.cli import main
 
-from analysis.certified.answers import answers
-from analysis.certified.problems import certified_problems
-from analysis.certified.score import Score, scores
-from analysis.cli import main
 from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made
 from tests.certified.problems import PROBLEMS
@@ -159,3 +159,41 @@ def test_a_problem_that_is_none_is_named(tmp_path: Path, capsys: pytest.CaptureF
     results.write_text('{"problems": {"three planes": {}}}')
     assert main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
     assert 'no problem "three planes"; did you mean "three-planes"?' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        (["as_drawn"], 5, 'certified.as_drawn: has no mapping "uncertainties"'),
+        (["estimate", "uncertainties", "U5", "count"], None, 'U5 has no whole number "count"'),
+        (["estimate", "uncertainties", "U3", "average"], "a", 'U3 has no number "average" above zero'),
+        (["estimate", "uncertainties", "U3", "maximum"], 0.0, 'U3 has no number "maximum" above zero'),
+        (["estimate", "sum_of_squares"], [], '"sum_of_squares" is no number'),
+        (["estimate", "machine"], {"alpha": "1"}, '"machine" is not of numbers alone'),
+        (["estimate", "balls"], [[[1.0, 10**400]]], '"balls" is not of numbers alone'),
+    ],
+)
+def test_a_damaged_problem_is_told(
+    path: list[str], value: Any, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = json.loads((FOLDER / "two-dimensions.json").read_text())
+    place = data["certified"]
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    (tmp_path / "two-dimensions.json").write_text(json.dumps(data))
+    assert main(["reproduce", "certified", "--designs", str(tmp_path)]) == 3
+    out, err = capsys.readouterr()
+    assert not out and err.count("\n") == 1 and told in err
+
+
+def test_every_shipped_problem_is_one() -> None:
+    assert {one.name for one in certified_problems(FOLDER, [])} == {path.stem for path in FOLDER.glob("*.json")}
+
+
+def test_a_result_beyond_all_numbers_has_no_digit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (problem,) = certified_problems(FOLDER, ["two-dimensions"])
+    found = json.loads(json.dumps(problem.answers))
+    found["estimate"]["sum_of_squares"] = 10**400
+    (score,) = [one for one in scores("two-dimensions", problem.answers, found) if one.quantity == "sum of squares"]
+    assert score.digits == 0.0 and score.note == "no digit agrees"

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 QUICKSTART = "designs/quickstart.yaml"
 Lines = list[str]

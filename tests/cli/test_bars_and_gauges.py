@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.cli import main
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.sweeps.fingerprint import fingerprint
 from scipy.optimize import least_squares
-
-from analysis.cli import main
-from analysis.sweeps.fingerprint import fingerprint
-from simulator.experiment.load import load
-from simulator.layout import lay_out
 
 FOLDER = Path("designs/hurt_foss")
 BARS, GAUGE = str(FOLDER / "bar-bell.yaml"), str(FOLDER / "bryan-gauge.yaml")

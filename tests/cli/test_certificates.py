@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from simulator.certificates import certified_values, read_certificate
-from simulator.design import Design
-from simulator.estimation.gauss_newton import estimate
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.cli import main
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.certificate_files import certified_values, read_certificate
+from ballplate.simulator.readings.reading_files import read_readings
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -150,8 +149,8 @@ def test_both_files_are_written_or_none(tmp_path: Path, capsys: pytest.CaptureFi
     readings.write_text("old")
     assert main([*arguments, str(tmp_path / "nowhere" / "certificate.csv"), "--force"]) == 3
     assert readings.read_text() == "old"
-    assert main([*arguments, str(readings), "--force"]) == 3
-    assert "name two files" in capsys.readouterr().err and readings.read_text() == "old"
+    assert main([*arguments, str(readings), "--force"]) == 2
+    assert "are the same file; name another" in capsys.readouterr().err and readings.read_text() == "old"
     assert main([*arguments, str(certificate), "--force"]) == 0
     assert certificate.read_text().startswith("# certificate values of quickstart, drawn with seed 1")
     bare = tmp_path / "bare.yaml"

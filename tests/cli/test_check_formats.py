@@ -13,14 +13,13 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
-
-from analysis.annotations import annotation_lines, in_message, in_property
-from analysis.checking import CheckedFile, check_files
-from analysis.cli import main
-from analysis.junit import junit_report
-from analysis.planning.repair.search import Repairs, repairs
-from simulator.experiment.messages import Message
-from simulator.experiment.model import Experiment
+from ballplate.checking.check_files import CheckedFile, check_files
+from ballplate.checking.github import annotation_lines, in_message, in_property
+from ballplate.checking.junit import junit_report
+from ballplate.cli import main
+from ballplate.planning.repair.search import Repairs, repairs
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import Message
 
 QUICKSTART = Path("designs/quickstart.yaml")
 SYMMETRICAL = Path("designs/npl/6.1.1.yaml")
@@ -182,7 +181,7 @@ def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return known[experiment.label]
 
     known: dict[str, Repairs | None] = {}
-    monkeypatch.setattr("analysis.planning.repair.search.repairs", repairs_of)
+    monkeypatch.setattr("ballplate.planning.repair.search.repairs", repairs_of)
 
 
 def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]) -> None:
@@ -243,7 +242,7 @@ def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
     program = tools / "ballplate"
     program.write_text(
         f"#!{sys.executable}\nimport sys\nsys.path.insert(0, {os.getcwd()!r})\n"
-        "from analysis.cli import main\nsys.exit(main())\n",
+        "from ballplate.cli import main\nsys.exit(main())\n",
         encoding="utf-8",
     )
     program.chmod(0o755)

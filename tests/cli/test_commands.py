@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.machines.truth import true_parameters
+from ballplate.cli import main
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.machines.truth import true_parameters
 
 QUICKSTART = "designs/quickstart.yaml"
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
@@ -201,7 +200,7 @@ def test_nothing_is_made_of_a_failed_estimate(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Readings as wrong as these are refused before.
-    monkeypatch.setattr("simulator.readings.refuse_misreadings", lambda *_: None)
+    monkeypatch.setattr("ballplate.simulator.readings.reading_files.refuse_misreadings", lambda *_: None)
     readings, lines = quickstart_readings(tmp_path)
     readings.write_text("\n".join([lines[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in lines[1:])]), "utf-8")
     capsys.readouterr()
@@ -240,7 +239,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_full_disk_is_told() -> None:
     with Path("/dev/full").open("w") as full:
         found = subprocess.run(
-            [sys.executable, "-m", "analysis.cli", "check", QUICKSTART],
+            [sys.executable, "-m", "ballplate", "check", QUICKSTART],
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
@@ -365,7 +364,7 @@ def test_all_shipped_designs_are_as_expected() -> None:
 
 def test_closed_pipe_is_no_error() -> None:
     """As in `ballplate check ... | head -1`."""
-    code = "import sys; from analysis.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from ballplate.cli import main; sys.exit(main(sys.argv[1:]))"
     process = subprocess.Popen(
         [sys.executable, "-c", code, "check", *sorted(map(str, Path("designs/npl").glob("*.yaml")))],
         stdout=subprocess.PIPE,
@@ -383,7 +382,7 @@ def test_closed_pipe_is_no_error() -> None:
 def test_checking_loads_nothing_slow() -> None:
     """A check must start fast: no pandas, plotting or SciPy."""
     code = (
-        "import sys; from analysis.cli import main; main(['check', 'designs/quickstart.yaml']);"
+        "import sys; from ballplate.cli import main; main(['check', 'designs/quickstart.yaml']);"
         "print([m for m in ('pandas', 'scipy', 'joblib', 'matplotlib') if m in sys.modules], file=sys.stderr)"
     )
     found = subprocess.run(

@@ -7,9 +7,8 @@ import json
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
 from scipy.stats import t
-
-from analysis.cli import main
 
 FOLDER = Path("designs/hurt_foss")
 STATED = {"bar-bell": "length: 500 mm", "bryan-gauge": "radius: 300 mm"}

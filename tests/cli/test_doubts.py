@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from simulator.experiment import ExperimentError, load
-from simulator.experiment.machine_file import load_machine
-from simulator.machines.description import reference_functions
+from ballplate.cli import main
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.machines.description import reference_functions
 
 QUICKSTART = Path("designs/quickstart.yaml")
 

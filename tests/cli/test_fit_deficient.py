@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 
 @pytest.mark.parametrize("truth", ["kind: random\n  position: 2 um\n  rotation: 4 urad\n  seed: 7", "kind: zero"])

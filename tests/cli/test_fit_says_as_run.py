@@ -7,16 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.fit import Fit
+from ballplate.results.prediction import Prediction
+from ballplate.results.study import fit, predict
+from ballplate.simulator.design.arrays import State
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import linearised_fit
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import exact_readings, noisy_readings, on_true_machine, true_artefacts
+from ballplate.simulator.readings.reading_files import observe
 
-from analysis.study import Fit, Plan, fit, plan
-from simulator.design import State
-from simulator.estimation.gauss_newton import fitted_covariance
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, noisy_readings, on_true_machine, true_artefacts
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import observe
 from tests.reference.random_experiments import random_experiment
 
 UPRIGHT = """
@@ -38,7 +40,7 @@ evaluation: {points: {random: 20, seed: 1}, probe: right}
 OFF = 6.0
 
 
-def told(of: Plan | Fit) -> tuple[object, ...]:
+def told(of: Prediction | Fit) -> tuple[object, ...]:
     """Deficiency, directions, and what of each quantity is undetermined."""
     counts = {symbol: (one.count, one.undetermined) for symbol, one in of.quantities.items()}
     tasks = [task.name for task in of.tasks if np.isnan(task.standard_uncertainty)]
@@ -60,14 +62,14 @@ def fitted(experiment: Experiment, seed: int | None) -> tuple[Fit, State]:
 
 
 def assert_says_as_run(experiment: Experiment, seed: int) -> None:
-    planned = plan(experiment)
+    planned = predict(experiment)
     for noise in (seed, None):
         found, truth = fitted(experiment, noise)
         assert found.converged
         assert told(found) == told(planned)
     # What counts as determined is estimated as well as it says.
     found, truth = fitted(experiment, seed)
-    spread = fitted_covariance(found.design, found.solution)
+    spread = linearised_fit(found.design, found.solution)
     layout, state = found.solution.factor.layout, found.solution.state
     for stated, off in (
         (spread.of_balls()[found.design.plate_balls], (state.balls - truth.balls)[found.design.plate_balls]),
@@ -81,7 +83,7 @@ def test_a_plate_upright_in_one_position(tmp_path: Path) -> None:
     path = tmp_path / "upright.yaml"
     path.write_text(UPRIGHT)
     experiment = load(path)[0]
-    found = plan(experiment)
+    found = predict(experiment)
     assert found.verdict.deficiency == 3 and found.quantities["U1"].undetermined == 0
     assert found.quantities["U5"].undetermined == 0
     assert_says_as_run(experiment, 1)
@@ -103,7 +105,7 @@ def test_many_experiments_drawn_at_random(tmp_path: Path) -> None:
             assert_says_as_run(experiment, seed)
             continue
         slow.append(seed)
-        assert told(found)[:2] == told(plan(experiment))[:2]
+        assert told(found)[:2] == told(predict(experiment))[:2]
         assert found.solution.iterations[-1].step < 1e-6
     assert len(slow) < 0.01 * 300, slow
 
@@ -114,7 +116,7 @@ def test_fewer_readings_than_planned_are_judged_as_they_are(tmp_path: Path) -> N
     path.write_text(Path("designs/quickstart.yaml").read_text())
     experiment = load(path)[0]
     some = replace(experiment, positions=tuple(one for one in experiment.positions if "y" not in one.name))
-    expected = plan(some).verdict.deficiency
+    expected = predict(some).verdict.deficiency
     design = lay_out(experiment)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))

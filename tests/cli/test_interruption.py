@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import signal
 import subprocess
 import sys
+import types
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.cli import main
+from ballplate.cli.interruption import interruptions
+from ballplate.running import processes
+from ballplate.running.processes import in_processes
+from ballplate.sweeps import execute
 
-from analysis.cli import main
-from analysis.cli.interruption import interruptions
-from analysis.sweeps import execute
 from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
 
 
@@ -55,7 +60,7 @@ def test_one_that_was_swallowed_ends_a_sweep(
 def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from analysis.montecarlo import trials
+    from ballplate.montecarlo import trials
 
     accuracy_of = trials.accuracy_of
 
@@ -70,22 +75,22 @@ def test_one_that_was_swallowed_ends_monte_carlo(
 
 
 def test_they_are_remembered() -> None:
-    with interruptions() as answer:
-        answer()
+    with interruptions() as interruption:
+        interruption.answer()
         swallowed()
         with pytest.raises(KeyboardInterrupt):
-            answer()
+            interruption.answer()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_ignored_ones_stay_ignored() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with interruptions() as answer:
+    with interruptions() as interruption:
         signal.raise_signal(signal.SIGINT)
-        answer()
+        interruption.answer()
 
 
-@pytest.mark.parametrize("module", ["analysis.cli.common", "simulator.experiment.messages", "numpy", "joblib"])
+@pytest.mark.parametrize("module", ["ballplate.cli.common", "ballplate.simulator.inputs.messages", "numpy", "joblib"])
 def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
     """The first second of every command is this."""
     path = small_sweep(tmp_path, 3)
@@ -96,7 +101,7 @@ def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
         f"        if name == {module!r}:\n"
         "            signal.raise_signal(signal.SIGINT)\n"
         "sys.meta_path.insert(0, Interrupting())\n"
-        "from analysis.cli import main\n"
+        "from ballplate.cli import main\n"
         "sys.exit(main(sys.argv[1:]))\n"
     )
     done = subprocess.run(
@@ -109,3 +114,50 @@ def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
     )
     assert done.returncode == 130, done.stderr
     assert done.stderr.startswith("interrupted") and done.stderr.count("\n") == 1
+
+
+def test_work_of_one_process_leaves_signals_alone() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    assert list(in_processes(abs, [(-1,), (2,)], 1)) == [1, 2]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_processes_are_started_undisturbed(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    """A signal amid their start is answered after it, and they end then."""
+    import joblib
+
+    class Interrupted(joblib.Parallel):  # type: ignore[misc]
+        def __call__(self, tasks: Any) -> Any:
+            results = super().__call__(tasks)
+            signal.raise_signal(number)
+            begun.append(number)
+            return results
+
+    begun: list[int] = []
+    monkeypatch.setattr(joblib, "Parallel", Interrupted)
+    with interruptions() as interruption, pytest.raises(KeyboardInterrupt), interruption.raising():
+        list(in_processes(abs, [(-1,), (2,)], 2))
+    assert begun == [number] and interruption.came == number
+    assert not [one for one in multiprocessing.active_children() if "Loky" in one.name]
+
+
+def test_where_signals_cannot_be_blocked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on Windows."""
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    assert list(in_processes(abs, [(-1,), (2,)], 2)) == [1, 2]
+
+
+def test_a_worker_of_windows_waits_for_its_parent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows keeps the number of a parent that has ended."""
+    done: list[object] = []
+    fake = types.SimpleNamespace(
+        INFINITE=-1,
+        OpenProcess=lambda rights, inherited, process: done.append(("opened", process)) or "handle",
+        WaitForSingleObject=lambda handle, limit: done.append(("waited", handle, limit)),
+    )
+    monkeypatch.setitem(sys.modules, "_winapi", fake)
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(os, "_exit", done.append)
+    processes._end_with(17)
+    assert done == [("opened", 17), ("waited", "handle", -1), 1]

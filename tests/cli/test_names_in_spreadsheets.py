@@ -7,11 +7,10 @@ import io
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
+from ballplate.simulator.inputs.spreadsheets import CsvWriter, cell_of_text, text_of_cell
 from hypothesis import given
 from hypothesis import strategies as st
-
-from analysis.cli import main
-from simulator.spreadsheets import CsvWriter, cell_of_text, text_of_cell
 
 EXPERIMENT = """\
 title: "=HYPERLINK(1)"

@@ -7,18 +7,17 @@ from itertools import count
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
-from analysis.study import fit
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.cli import main
+from ballplate.results.study import fit
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.readings.reading_files import read_readings
 
 NUMBER = count()
 
 MODEL = """\
 import numpy as np
-from simulator.machines.protocol import Parameter, Reported
+from ballplate.models import Parameter, Reported
 
 
 class Scales:

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 QUICKSTART = "designs/quickstart.yaml"
 Rows = list[dict[str, str]]
@@ -73,7 +72,7 @@ def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFi
     own = tmp_path / "own.yaml"
     own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
     assert main(["reliability", str(own), "--csv", str(own)]) == 2
-    assert "is the experiment file; name another" in capsys.readouterr().err
+    assert "would overwrite" in capsys.readouterr().err
     assert main(["reliability", QUICKSTART, "--csv", str(tmp_path / "no" / "t.csv")]) == 3
     assert "cannot be written" in capsys.readouterr().err
 

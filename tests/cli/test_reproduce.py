@@ -6,9 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
-from analysis.reproduction.published import npl
+from ballplate.cli import main
+from ballplate.reproduction.published import npl
 
 NPL = ["reproduce", "npl"]
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 FOLDER = Path("designs/hocken_borchardt")
 ANGLES = str(FOLDER / "angles.yaml")

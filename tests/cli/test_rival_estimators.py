@@ -7,8 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
+from ballplate.estimators.distances import MOST_DERIVATIVES, ball_pairs, compare_estimators, count_terms
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.rivals import RivalName
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Integers
 
 QUICKSTART = "designs/quickstart.yaml"
 COMPARED = ["compare", "designs/npl/6.2.7.yaml", "--variant", "5 x 5", "--trials", "4"]
@@ -49,7 +55,13 @@ def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in (["--trials", "0"], ["--estimator", "best"], ["--published-rms", "3"]):
+    for arguments in (
+        ["--trials", "0"],
+        ["--trials", "1000001"],
+        ["--points", "100001"],
+        ["--estimator", "best"],
+        ["--published-rms", "3"],
+    ):
         with pytest.raises(SystemExit) as caught:
             main([*COMPARED, *arguments])
         assert caught.value.code == 2
@@ -73,3 +85,57 @@ def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings(
     assert main(["compare", str(file), "--trials", "3", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["not_converged"] == [] and max(found["maximum"]["values"]) < 5e-6
+
+
+def _terms(experiment: Experiment, pair_set: Integers, estimator: str, across_probes: bool) -> int:
+    """Terms of equation (12) and of Cresto's estimator without those of certificates, pair by pair."""
+    count = 0
+    for one, other in pair_set:
+        times = 0
+        for position in experiment.positions:
+            probes = [
+                (p, q)
+                for group in position.readings
+                for of in position.readings
+                for p in group.probes
+                for q in of.probes
+                if one in group.ball_indices and other in of.ball_indices and (across_probes or p == q)
+            ]
+            times += len(probes)
+        count += times * (times - 1) // 2 if estimator == "cresto" else times
+    return count
+
+
+@pytest.mark.parametrize("across_probes", [False, True])
+@pytest.mark.parametrize("estimator", ["distances", "cresto", "kruth"])
+@pytest.mark.parametrize("pair_set", ["braced", "all", None])
+def test_more_terms_than_there_is_memory_for(
+    monkeypatch: pytest.MonkeyPatch, estimator: RivalName, pair_set: str | None, across_probes: bool
+) -> None:
+    """Refused is one term more than possible; what is counted are the terms that the estimators have."""
+    (experiment,) = load(QUICKSTART)
+    design = lay_out(experiment)
+    terms = _terms(experiment, ball_pairs(experiment, design, pair_set), estimator, across_probes)
+    assert count_terms(experiment, design, estimator, pair_set, across_probes) == terms
+    parameters = len(design.model.parameters)
+    monkeypatch.setattr("ballplate.estimators.distances.MOST_DERIVATIVES", terms * parameters)
+    found = compare_estimators(experiment, 1, estimator, pair_set, across_probes, points=2)
+    assert found.failed == () or estimator == "kruth"
+    monkeypatch.setattr("ballplate.estimators.distances.MOST_DERIVATIVES", terms * parameters - 1)
+    with pytest.raises(ExperimentError) as caught:
+        compare_estimators(experiment, 1, estimator, pair_set, across_probes, points=2)
+    assert str(caught.value) == (
+        f"{QUICKSTART}: artefacts: {estimator} with these pairs of balls has {terms} terms; at most {terms - 1} are "
+        f"possible with {parameters} parameters: take fewer --pairs, such as corners, or fewer balls"
+    )
+
+
+def test_pairs_of_very_many_balls_are_refused_before_they_are_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """800 million pairs of 40,000 balls would take 13 GB alone."""
+    text = Path(QUICKSTART).read_text(encoding="utf-8").replace("balls: [5, 5]", "balls: [200, 200]")
+    (tmp_path / "large.yaml").write_text(text, encoding="utf-8")
+    assert main(["compare", str(tmp_path / "large.yaml"), "--pairs", "all"]) == 3
+    count = 10 * 40_000 * 39_999 // 2
+    assert f"has {count} terms; at most {MOST_DERIVATIVES // 69} are possible" in capsys.readouterr().err

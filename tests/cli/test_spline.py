@@ -10,8 +10,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 PART = "designs/gilsinn/table-1.csv"
 DOME = (PART, "--y", "semi_finish_error", "--points", "12-32")
@@ -201,7 +200,7 @@ def test_drawings(tmp_path: Path) -> None:
         (("--period", "-1 mm"), '--period: "-1 mm" must be above zero'),
         (("--boundary", "1 mm, 2 mm, 3 mm"), "should be one abscissa, or two nominal co-ordinates"),
         (("--uncertainty", "0 um"), "must be above zero"),
-        (("--plot", "a.svg", "--whiskers", "a.svg"), "two of the files are the same"),
+        (("--plot", "a.svg", "--whiskers", "a.svg"), "are the same file; name another"),
         (("--magnification", "nan"), "--magnification should be above 0"),
         (("--magnification", "300"), "--magnification is that of --whiskers; add that, or leave it out"),
         (("--json", "--coefficients", "-"), "both go to the screen"),

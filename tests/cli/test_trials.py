@@ -7,13 +7,16 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from argparse import Namespace
 from pathlib import Path
 
+import ballplate as bp
 import pytest
+from ballplate.cli import main
+from ballplate.cli.progress import progress
 
-from analysis.cli import main
-from analysis.cli.progress import ProgressBar
 from tests.sweeps.support import hearing_interruptions
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -112,7 +115,7 @@ def test_options_that_would_be_ignored(capsys: pytest.CaptureFixture[str]) -> No
 def test_an_interruption_reports_what_is_done(workers: str) -> None:
     arguments = ["run", QUICKSTART, "--trials", "1000000", "--workers", workers, "--json"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "analysis.cli", *arguments],
+        [sys.executable, "-m", "ballplate", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -135,6 +138,8 @@ def test_an_interruption_reports_what_is_done(workers: str) -> None:
 class Terminal:
     """Standard error as a terminal of some width."""
 
+    encoding = "ascii"
+
     def __init__(self) -> None:
         self.text = ""
 
@@ -147,19 +152,69 @@ class Terminal:
     def isatty(self) -> bool:
         return True
 
+    @property
+    def lines(self) -> list[str]:
+        """What has stood in the line, one after the other."""
+        return self.text.split("\r")[1:]
+
 
 @pytest.mark.parametrize("width", [20, 60, 200])
 def test_the_bar_fits_the_terminal(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setenv("COLUMNS", str(width))
-    bar = ProgressBar("data sets")
-    bar.last = bar.started = time.monotonic() - 20
-    bar.show(512, 2048, "accurate to 1.5 %")
-    shown = terminal.text.removeprefix("\r\x1b[K")
-    assert len(shown) < width
-    if width == 200:
-        assert shown.count("#") == pytest.approx(shown.count(".") / 3, rel=0.1)
-        assert "512/2048 data sets, 25.6/s, 1 min 0 s left, accurate to 1.5 %" in shown
-    bar.close()
-    assert terminal.text.endswith("\r\x1b[K")
+    with progress(Namespace(quiet=False, verbose=False)) as shown:
+        shown.show("data sets", 0, 2048)
+        assert shown.bar is not None
+        shown.bar.start_t -= 20
+        shown.show("data sets", 512, 2048, "accurate to 1.5 %")
+        shown.bar.refresh()
+        assert all(len(line) < width for line in terminal.lines)
+        drawn = terminal.lines[-1]
+        if width == 200:
+            bar, words = drawn.strip().removeprefix("|").split("|")
+            assert bar.count("#") == pytest.approx(len(bar) / 4, abs=1)
+            assert words.startswith(" 512/2048 data sets, 00:20 so far, ") and words.endswith(", accurate to 1.5 %")
+    assert terminal.lines[-1] == "" and terminal.lines[-2].isspace() and len(terminal.lines[-2]) >= len(drawn)
+    assert "\x1b" not in terminal.text
+
+
+def test_each_step_has_a_bar_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "80")
+    threads = threading.active_count()
+    with progress(Namespace(quiet=False, verbose=False)) as shown:
+        shown.show("candidates", 0, 3)
+        shown.show("starts of the search", 0, 25)
+        assert threading.active_count() == threads
+    told = [line.strip() for line in terminal.lines if line.strip()]
+    assert "0/3 candidates" in told[0] and "0/25 starts of the search" in told[-1]
+
+
+def test_lines_without_a_terminal_come_now_and_then(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with progress(Namespace(quiet=False, verbose=False)) as shown:
+        for done in range(41):
+            shown.show("data sets", done, 80)
+            now += 0.5
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        f"{done}/80 data sets, 00:{done // 2:02d} so far, 00:{(80 - done) // 2:02d} left" for done in (10, 20, 30, 40)
+    ]
+
+
+def test_every_step_of_a_plan_tells_how_much_there_is(tmp_path: Path) -> None:
+    given = "pool:\n  candidates:\n    - {planes: [z], levels: [100 mm, 400 mm], corners: {x: [50 mm], y: [50 mm]}"
+    file = tmp_path / "pool.yaml"
+    file.write_text(Path(QUICKSTART).read_text() + f"\n{given}, probes: [down]}}\n")
+    told: list[tuple[str, int, int]] = []
+    bp.plan(file, positions=7, curve=True, report=lambda *step: told.append(step))
+    steps = {what: [one for one in told if one[0] == what] for what in dict.fromkeys(one[0] for one in told)}
+    assert {"candidates", "gains", "budgets of the curve"} < set(steps)
+    for what, reports in steps.items():
+        wanted = reports[-1][2]
+        assert reports == [(what, done, wanted) for done in range(wanted + 1)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
 
-from analysis.cli import main
 from tests.cli.test_check_formats import described, shell
 
 QUICKSTART = Path(__file__).parents[2] / "designs" / "quickstart.yaml"
@@ -115,3 +115,63 @@ def test_names_of_files_are_no_commands(
         assert len(lines) == 3, k
         assert "\r" not in out and "\x1b" not in out and "##[" not in lines[0]
         assert not any(line.startswith(("::warning", "::error::")) for line in lines)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["\x1b[31m"],
+        ["check", "a.yaml", "--\x1b[31m"],
+        ["schema", "\x1b[31m"],
+        ["plan", "a.yaml", "--hours", "\x1b[31m\n::"],
+    ],
+)
+def test_wrong_usage_is_told_without_control_characters(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert "x1b[31m" in told and told.isprintable()
+
+
+def test_what_is_written_is_told_without_control_characters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An experiment, readings, fewer of them, and a store, all under such a name."""
+    monkeypatch.chdir(tmp_path)
+    name = "\x1b[31m\n::error::"
+    lines = [["init", f"{name}.yaml"], ["simulate", f"{name}.yaml", "-o", f"{name}.csv"]]
+    lines += [
+        ["fit", f"{name}.yaml", f"{name}.csv"],
+        ["sweep", "sweep.yaml", "--workers", "1", "--store", f"{name}.sqlite"],
+    ]
+    for line in lines:
+        if line[0] == "fit":
+            readings = Path(line[2]).read_text().splitlines(keepends=True)
+            Path(line[2]).write_text("".join(readings[:-1]))
+        if line[0] == "sweep":
+            axis = "axes: {seed: {path: seed, values: [1]}}"
+            Path(f"{name}.yaml").rename("base.yaml")
+            Path(line[1]).write_text(f"title: a\nbase: base.yaml\n{axis}\n")
+        assert main(line) == 0
+        out, err = capsys.readouterr()
+        told = [text for text in (out + err).splitlines() if "[31m" in text]
+        assert told and all(text.isprintable() for text in told), line
+
+
+def test_a_report_for_build_servers_has_no_lines_of_a_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Printed on the log of a server that reads commands in it."""
+    monkeypatch.chdir(tmp_path)
+    text = QUICKSTART.read_text(encoding="utf-8")
+    names = "a\n::error::b.yaml", "c\n::error::d.yaml"
+    Path(names[0]).write_text(text, encoding="utf-8")
+    Path(names[1]).write_text(
+        text.replace("expected_rank_deficiency: 0", "expected_rank_deficiency: 1"), encoding="utf-8"
+    )
+    assert main(["check", "--format", "junit", *names]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert not any(line.startswith("::") for line in lines) and any("\\x0a::error::" in line for line in lines)

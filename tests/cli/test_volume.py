@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from simulator.design import locations, nominal_state
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.layout import lay_out
+from ballplate.cli import main
+from ballplate.simulator.design.arrays import locations, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
 
 EXPERIMENT = """\
 title: a long probe

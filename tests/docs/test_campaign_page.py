@@ -8,8 +8,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 PAGE = Path("docs/how-to/plan-a-campaign.md")
 

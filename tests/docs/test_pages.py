@@ -14,10 +14,9 @@ from typing import Any
 
 import pytest
 import yaml
-
-from analysis.cli import parser
-from simulator.experiment.machine_sections import machine_schema
-from simulator.experiment.schema import schema
+from ballplate.cli import parser
+from ballplate.simulator.experiment.machine_sections import machine_schema
+from ballplate.simulator.experiment.schema import schema
 
 DOCS = Path("docs")
 GUARD = (DOCS / "how-to/guard-designs.md").read_text(encoding="utf-8")
@@ -123,6 +122,22 @@ def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) ->
     built = (tmp_path / "built/index.html").read_text(encoding="utf-8")
     data = base64.b64encode(f"{drawing}\n".encode()).decode()
     assert f'src="data:image/svg+xml;base64,{data}" alt="a &lt; b"' in built and "A <em>caption</em>." in built
+
+
+def test_a_program_goes_on_with_the_names_of_the_last_one(tmp_path: Path) -> None:
+    """Values, modules and classes of modules, but nothing of programs before one that does not go on."""
+    programs = (
+        ("", "import math\nlost = open('a.txt', 'w')\nx = 6"),
+        (":continued:\n\n", "y = int(math.pow(x, 2)) + 1\nprint(f'y is {y}')"),
+        (":continued:\n\n", "print(f'x and y are {x + y}', 'lost' in dir())"),
+        ("", "print('kept:', [name for name in ('x', 'y', 'math') if name in dir()])"),
+    )
+    blocks = "\n\n".join(f"```{{python-run}}\n{option}{program}\n```" for option, program in programs)
+    (tmp_path / "index.md").write_text(f"# Right\n\n{blocks}\n", encoding="utf-8")
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"]
+    subprocess.run(command, check=True, capture_output=True)
+    text = Page(tmp_path / "built/index.html").text
+    assert "y is 37" in text and "x and y are 43 False" in text and "kept: []" in text
 
 
 def shown(name: str) -> Any:

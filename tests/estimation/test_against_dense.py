@@ -7,17 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.observations import Lengths, Readings
+from ballplate.simulator.estimation.functions import Displacements, displacements, linear_functions
+from ballplate.simulator.estimation.gauss_newton import newton_step
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.uncertainty.pairs import all_pairs
+from ballplate.uncertainty.quantities import QUANTITIES, evaluation_points
+from ballplate.uncertainty.summaries import point_pairs, uncertainties
 from numpy.typing import NDArray
 
-from analysis.pairs import all_pairs
-from analysis.uncertainty import point_pairs, uncertainties
-from simulator.design import Design, Lengths, Readings, State, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import newton_step
-from simulator.estimation.observations import expected_readings
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.geometry.motions import rotation_from_vector
 from tests.reference import dense
 from tests.reference.designs import (
     SIGMA,
@@ -209,59 +211,42 @@ def deficient_grid_of_seven() -> Design:
     return plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=10)
 
 
-def solved(design: Design, state: State, x: Real | None = None) -> tuple[SharedLayout, Spectrum, Covariance]:
-    layout = shared_layout(design)
-    factor = eliminate(design, layout, state, x)
-    found = spectrum(factor)
-    return layout, found, covariance(design, factor, found)
-
-
-def pair_values(places: Real, common: Real, own: Real, null: Real) -> Real:
+def pair_values(moved: Displacements) -> Real:
     """The uncertainty of every single pair, NaN where open, each from a call with two places."""
     values = []
-    for i, j in zip(*np.triu_indices(len(places), 1), strict=True):
-        two = [i, j]
-        summary = all_pairs(places[two], common[two], own[two], null[two], np.array(two))
+    for i, j in zip(*np.triu_indices(len(moved.places), 1), strict=True):
+        two = np.array([i, j])
+        summary = all_pairs(moved.select(two), two)
         values.append(np.nan if summary.undetermined else summary.maximum)
     return np.array(values)
 
 
-def individual(design: Design, layout: SharedLayout, state: State, found: Covariance) -> dict[str, Real]:
+def individual(found: Linearisation) -> dict[str, Real]:
     """All that stands behind U1 to U6, in the order of the dense reference."""
+    design, layout = found.design, found.layout
     reported = np.zeros((len(design.model.reported().names), len(layout)))
     reported[:, layout.model] = design.model.reported().matrix
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    by_model = np.zeros((len(design.points), 3, len(layout)))
-    by_model[:, :, layout.model] = design.model.jacobian(design.points, state.a, offsets)
-    corrected = design.points + design.model.error(design.points, state.a, offsets)
-    own = np.zeros((len(design.points), 3, 3))
+    of_balls = QUANTITIES["U5"].functions(design, layout)
     return {
         "U1": found.of_balls()[design.plate_balls].ravel(),
         "U2": found.of_shared(np.eye(len(layout))[layout.poses]),
         "U3": found.of_shared(reported),
-        "U4": point_pairs(design, layout, state, found)[0].ravel(),
-        "U5": np.concatenate(
-            [
-                pair_values(state.balls[chosen], found.ball[chosen], found.ball_own[chosen], found.ball_null[chosen])
-                for chosen in (
-                    np.flatnonzero(design.ball_artefact == plate) for plate in np.flatnonzero(design.is_plate)
-                )
-            ]
-        ),
-        "U6": pair_values(corrected, by_model @ found.shared, own, by_model @ found.shared_null),
+        "U4": point_pairs(found)[0].ravel(),
+        "U5": np.concatenate([pair_values(displacements(found, one.places)) for one in of_balls]),
+        "U6": pair_values(displacements(found, evaluation_points(design))),
     }
 
 
 def compare(design: Design, state: State, problem: dense.Problem, x: Real | None = None) -> int:
     """Check all uncertainties; returns the rank deficiency that both found."""
-    layout, found, spread = solved(design, state, x)
+    found = linearise(design, state, x)
     reference = dense.linearised(problem)
     assert found.deficiency == reference.deficiency
-    assert len(layout) + 3 * len(design.plate_balls) == problem.parameters
+    assert len(found.layout) + 3 * len(design.plate_balls) == problem.parameters
     assert list(design.model.reported().names) == dense.monomial_names(problem)
     expected = dense.standard_uncertainties(problem, reference)
-    summary = uncertainties(design, layout, state, spread)
-    for symbol, values in individual(design, layout, state, spread).items():
+    summary = uncertainties(found)
+    for symbol, values in individual(found).items():
         np.testing.assert_array_equal(np.isnan(values), np.isnan(expected[symbol]), err_msg=symbol)
         np.testing.assert_allclose(values, expected[symbol], rtol=RELATIVE, atol=0, err_msg=symbol)
         quantity, open_ = summary[symbol], np.isnan(expected[symbol])
@@ -305,6 +290,48 @@ def test_rank_and_what_is_left_determined_of_a_deficient_design(
 
 
 @pytest.mark.parametrize(
+    ("make", "coefficients", "deficiency"), [(grid_of_four, 5, 0), (deficient_grid_of_seven, 10, 3)]
+)
+def test_evaluation_points_some_at_a_time(
+    monkeypatch: pytest.MonkeyPatch, make: Callable[[], Design], coefficients: int, deficiency: int
+) -> None:
+    monkeypatch.setattr("ballplate.simulator.estimation.functions.PLACES_AT_ONCE", 3)
+    design = with_points(make(), 8)
+    assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+
+
+@pytest.mark.parametrize(
+    ("make", "coefficients"),
+    [(neighbour_distances, 5), (length_standard_by_distance, 5), (two_artefacts, 5), (deficient_grid_of_four, 7)],
+)
+def test_covariances_of_functions_with_one_another(make: Callable[[], Design], coefficients: int) -> None:
+    """Of balls that distances tie together, of points, of parameters and of distances, all with all."""
+    design = with_points(make(), 8)
+    found, problem = linearise(design), dense.planned(design, coefficients, 5)
+    reference = dense.linearised(problem)
+    quoted = design.model.reported().matrix.any(axis=1)
+    functions, jacobians = [], []
+    for symbol, function in dense.quantities(problem).items():
+        groups = QUANTITIES[symbol].functions(design, found.layout)
+        own = dense.jacobian(function, problem.parameters)
+        own = own[quoted] if symbol == "U3" else own
+        made = [linear_functions(found, one) for one in groups]
+        values = np.concatenate([found.uncertainty(one) for one in made])
+        expected = reference.of(own)
+        np.testing.assert_array_equal(np.isnan(values), np.isnan(expected), err_msg=symbol)
+        np.testing.assert_allclose(values, expected, rtol=RELATIVE, err_msg=symbol)
+        functions.append(made[0])
+        jacobians.append(own[: len(made[0].shared)])
+    if reference.deficiency:
+        return
+    for one, left in zip(functions, jacobians, strict=True):
+        for other, right in zip(functions, jacobians, strict=True):
+            size = np.outer(reference.of(left), reference.of(right))
+            expected = left @ reference.covariance @ right.T
+            np.testing.assert_allclose(found.covariance(one, other) / size, expected / size, atol=1e-8)
+
+
+@pytest.mark.parametrize(
     "make", [unequal_axes, length_standard_by_distance, length_standard_by_projection, two_artefacts]
 )
 def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], Design]) -> None:
@@ -336,13 +363,13 @@ def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], 
     assert compare(design, state, problem, x) == 0
 
     layout = shared_layout(design)
-    factor = eliminate(design, layout, state, x)
-    shared, balls = newton_step(design, factor, spectrum(factor))
+    found = linearise(design, state, x)
+    shared, balls = newton_step(design, found.factor, found.spectrum)
     expected, squares = dense.least_squares_step(problem)
     n, poses = 3 * len(design.plate_balls), len(problem.free_poses)
     expected_a = in_reference_basis(problem, design, shared[layout.model])
     ours = np.concatenate([balls[design.plate_balls].ravel(), shared[layout.poses], expected_a])
-    assert factor.sum_of_squares == pytest.approx(squares, rel=RELATIVE)
+    assert found.factor.sum_of_squares == pytest.approx(squares, rel=RELATIVE)
     for part in (slice(0, n), slice(n, n + poses), slice(n + poses, None)):
         assert np.abs(ours[part] - expected[part]).max() < 1e-8 * np.abs(expected[part]).max()
 

@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from ballplate.results.study import fit, predict
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import moved
+from ballplate.simulator.estimation.length_equations import length_estimate
+from ballplate.simulator.estimation.observations import length_shared_rows
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.spheres import fit_sphere
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
+from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from scipy.optimize import least_squares
 
-from analysis.study import fit, plan
-from simulator.design import Design, State, nominal_state
-from simulator.estimation.gauss_newton import moved
-from simulator.estimation.length_equations import length_estimate
-from simulator.estimation.observations import length_shared_rows
-from simulator.estimation.parameters import shared_layout
-from simulator.estimation.spheres import fit_sphere
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine, true_artefacts
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import read_readings, write_readings
 from tests.reference.derivatives import assert_derivative, central_difference
 
 FOLDER = Path("designs/hurt_foss")
@@ -94,7 +94,7 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
 
 def test_one_bar_along_one_axis_has_the_uncertainty_of_the_closed_form(tmp_path: Path) -> None:
     places = [{"name": str(k), "pose": {"origin": ["250 mm", f"{100 * k} mm", "300 mm"]}} for k in range(1, 6)]
-    found = plan(changed(tmp_path, "bar-bell", positions=places))
+    found = predict(changed(tmp_path, "bar-bell", positions=places))
     assert found.verdict.deficiency == 5
     # The mean of five lengths whose ends have 1 um each, on a certificate with 0.5 um.
     assert found.quantities["U3 ratios"].maximum == pytest.approx(np.sqrt(2e-12 / 5 + 0.25e-12) / 0.5, rel=1e-9)
@@ -189,7 +189,7 @@ def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
     np.testing.assert_allclose([values[p.name] for p in design.model.parameters], truth.a, rtol=0, atol=1e-10)
     assert [values[f"pivot: origin {axis}"] for axis in "xyz"] == pytest.approx([0.48, 0.43, 0.12], abs=1e-10)
     uncertainty = {e.name: e.standard_uncertainty for e in found.estimates}
-    planned = plan(really).quantities["U3"]
+    planned = predict(really).quantities["U3"]
     assert max(uncertainty[p.name] for p in design.model.parameters) == pytest.approx(planned.maximum, rel=1e-3)
 
 
@@ -202,8 +202,8 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
         )
         for k in (1, 2)
     )
-    known = plan(twice).quantities["U3 angles"].maximum
-    assert known == pytest.approx(plan(once).quantities["U3 angles"].maximum / np.sqrt(2.0), rel=1e-9)
+    known = predict(twice).quantities["U3 angles"].maximum
+    assert known == pytest.approx(predict(once).quantities["U3 angles"].maximum / np.sqrt(2.0), rel=1e-9)
     design = lay_out(twice)
     readings, x = exact_readings(*truth_of(twice, design))
     # The second time the ball stands 20 mm to the side of the first on the same sphere.
@@ -223,7 +223,7 @@ def test_a_bar_whose_ends_are_plate_balls_turns_about_itself_for_nobody(tmp_path
             {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.5 um"}
         ]
     )  # fmt: skip
-    found, alone = plan(as_plate), plan(shipped("bar-bell", "length known"))
+    found, alone = predict(as_plate), predict(shipped("bar-bell", "length known"))
     assert found.verdict.deficiency == 0
     for symbol in ("U3 ratios", "U3 angles"):
         assert found.quantities[symbol].maximum == pytest.approx(alone.quantities[symbol].maximum, rel=1e-6)

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.study import plan
-from simulator.design import Design, nominal_state
-from simulator.estimation.observations import reading_blocks
-from simulator.experiment.load import load
-from simulator.layout import lay_out
+from ballplate.results.study import predict
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.observations import reading_blocks
+from ballplate.simulator.experiment.load import load
 
 LAYOUTS = {
     "one ball": "[[0 mm, 0 mm, 0 mm]]",
@@ -91,6 +90,6 @@ def test_the_order_of_positions_does_not_matter(layout: str, tmp_path: Path) -> 
     found = []
     for first in (0, 2):
         path = experiment_file(tmp_path, named(LAYOUTS[layout]), CERTIFICATES["all"], first)
-        found.append(plan(load(path)[0]).quantities)
+        found.append(predict(load(path)[0]).quantities)
     for symbol in ("U4", "U5", "U6"):
         assert found[0][symbol].average == pytest.approx(found[1][symbol].average, rel=1e-9, nan_ok=True)

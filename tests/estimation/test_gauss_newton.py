@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings, scale_readings
 
-from simulator.design import Design, State
-from simulator.estimation.gauss_newton import GaussNewtonSettings, gauss_newton
-from simulator.estimation.initial import initial_state
-from simulator.generate import exact_readings, noisy_certificate, noisy_readings, scale_readings
-from simulator.geometry.motions import rotation_from_vector
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
 from tests.reference.designs import corner_sides, grid, plate_design, six_positions
 
 
@@ -164,7 +164,7 @@ def test_repeats_give_a_row_each() -> None:
 
 
 def test_impossible_errors_have_no_reading() -> None:
-    from simulator.generate import NoReadingError
+    from ballplate.simulator.readings.generate import NoReadingError
 
     model = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
     with pytest.raises(NoReadingError):

@@ -12,25 +12,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.experiments import trials
+from ballplate.results.study import predict
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.estimation.covariance import spectrum
+from ballplate.simulator.estimation.elimination import eliminate
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
+from ballplate.simulator.estimation.length_equations import length_estimate
+from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
 from numpy.typing import NDArray
 
-from analysis.montecarlo.study import trials
-from analysis.study import plan
-from simulator.design import Design, Lengths, State, nominal_state
-from simulator.estimation.covariance import spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import gauss_newton, newton_step
-from simulator.estimation.length_equations import length_estimate
-from simulator.estimation.observations import expected_readings
-from simulator.estimation.parameters import shared_layout
-from simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine, true_artefacts
-from simulator.geometry.motions import rotation_from_vector
-from simulator.layout import lay_out
-from simulator.machines.spatial_metric import SpatialMetricModel
-from simulator.machines.truth import true_machine
 from tests.estimation.test_against_dense import compare, in_reference_basis
 from tests.reference import dense
 from tests.reference.standards import POSES, bar, experiment, flat, spatial
@@ -272,7 +273,7 @@ def physical(made: Experiment, generator: np.random.Generator) -> tuple[Design, 
 def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[str, Any], tmp_path: Path) -> None:
     """Over 80 data sets each parameter scatters by its uncertainty, and S^2 about its degrees of freedom."""
     made = experiment(tmp_path, standard, known, **COARSE, **TRUE_METRIC)
-    uncertainty = {name: one.maximum for name, one in plan(made).quantities.items()}
+    uncertainty = {name: one.maximum for name, one in predict(made).quantities.items()}
     generator, errors, squares = np.random.default_rng(4), [], []
     count = 80
     for _ in range(count):
@@ -365,7 +366,7 @@ def test_a_ball_a_little_off_the_line_counts_as_in_line(tmp_path: Path) -> None:
     """What it would add to first order is less than what nobody knows of its place."""
     crooked = bar(3)
     crooked["coordinates"]["b1"][1] = "0.003 mm"
-    found = [plan(experiment(tmp_path, one, ALL)).quantities["U6"].average for one in (bar(3), crooked)]
+    found = [predict(experiment(tmp_path, one, ALL)).quantities["U6"].average for one in (bar(3), crooked)]
     assert found[1] == pytest.approx(found[0], rel=1e-4)
 
 
@@ -375,7 +376,7 @@ def test_lengths_that_follow_from_others_tell_nothing_of_the_machine(tmp_path: P
     every = experiment(tmp_path, bar(3), {"pairs": "all"} | exact)
     two = experiment(tmp_path, bar(3), {"pairs": [["b0", "b1"], ["b1", "b2"]]} | exact)
     for symbol in ("U4", "U5", "U6"):
-        found = [plan(one).quantities[symbol].maximum for one in (every, two)]
+        found = [predict(one).quantities[symbol].maximum for one in (every, two)]
         assert found[0] == pytest.approx(found[1], rel=1e-9)
     assert lay_out(every).observations == lay_out(two).observations
 

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.montecarlo.study import trials
-from analysis.study import plan
-from simulator.design import nominal_state
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import noisy_certificate
-from simulator.layout import lay_out
+from ballplate.montecarlo.experiments import trials
+from ballplate.results.study import predict
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.readings.generate import noisy_certificate
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 
@@ -48,7 +47,7 @@ def with_bar(tmp_path: Path, positions: int, uncertainty: str, repeatability: st
 def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions: int) -> None:
     """The scale cannot be known better than the one certified length, and far from its noise just as well."""
     experiment = with_bar(tmp_path, positions, "20 um")
-    found = plan(experiment)
+    found = predict(experiment)
     assert found.verdict.deficiency == 0
     design = lay_out(experiment)
     plate = design.balls[design.is_plate[design.ball_artefact]]
@@ -57,7 +56,7 @@ def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions:
 
 
 def test_ignoring_the_repeatability_counts_each_position_anew(tmp_path: Path) -> None:
-    one, four = (plan(with_bar(tmp_path, k, "20 um", "ignored")).quantities["U5"].maximum for k in (1, 4))
+    one, four = (predict(with_bar(tmp_path, k, "20 um", "ignored")).quantities["U5"].maximum for k in (1, 4))
     assert four == pytest.approx(one / 2, rel=0.01)
 
 

@@ -6,19 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from simulator.design import Design, Lengths, State, nominal_state
-from simulator.estimation.gauss_newton import moved
-from simulator.estimation.observations import (
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.estimation.gauss_newton import moved
+from ballplate.simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
     expected_readings,
     length_rows,
     reading_blocks,
 )
-from simulator.estimation.parameters import shared_layout
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+
 from tests.reference.derivatives import assert_derivative, central_difference
 from tests.reference.designs import corner_sides, plate_design, six_positions, square
 

@@ -8,27 +8,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.study import check, fit, plan
-from simulator.design import Design, State, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import gauss_newton, moved
-from simulator.estimation.initial import initial_state
-from simulator.estimation.observations import (
+from ballplate.results.study import check, fit, predict
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit, moved
+from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation.observations import (
     coordinate_rows,
     distance_rows,
     length_rows,
     prior_rows,
     reading_blocks,
 )
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.generate import exact_readings, noisy_certificate, noisy_readings
-from simulator.layout import lay_out
-from simulator.machines.truth import true_parameters
-from simulator.readings import read_readings, write_readings
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.truth import true_parameters
+from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
+from ballplate.simulator.readings.reading_files import read_readings, write_readings
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 PRIORS = """\
@@ -121,12 +119,12 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     size = np.concatenate([np.minimum(layout.scale, 1.0), np.ones(3 * len(members))]) * 1e-4
     columns = [(residual(s) - residual(-s)) / (2 * h) for s, h in zip(np.diag(size), size, strict=True)]
     dense = np.stack(columns, axis=1)
-    factor = eliminate(design, layout, state, x)
+    at = linearise(design, state, x)
     now = residual(np.zeros(len(size)))
-    assert factor.sum_of_squares == pytest.approx(now @ now, rel=1e-12)
+    assert at.factor.sum_of_squares == pytest.approx(now @ now, rel=1e-12)
     scaled = dense * size
     expected = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)))[:count] * size[:count]
-    found = covariance(design, factor, spectrum(factor)).of_shared(np.eye(count))
+    found = at.of_shared(np.eye(count))
     np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
@@ -206,9 +204,9 @@ def test_unknown_offsets_need_the_sphere(written: Callable[[str], Path]) -> None
 
 
 def test_offsets_cost_accuracy_and_qualification_gives_it_back(written: Callable[[str], Path]) -> None:
-    known = plan(load("designs/quickstart.yaml")[0]).quantities["U6"].average
-    qualified = plan(load(written(SPHERE))[0]).quantities["U6"].average
-    often = plan(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0]).quantities["U6"].average
+    known = predict(load("designs/quickstart.yaml")[0]).quantities["U6"].average
+    qualified = predict(load(written(SPHERE))[0]).quantities["U6"].average
+    often = predict(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0]).quantities["U6"].average
     assert known < often < qualified
 
 
@@ -254,7 +252,7 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
         assert found.status == "converged"
         sums.append(found.factor.sum_of_squares)
         layout = shared_layout(design)
-        spread = covariance(design, found.factor, found.spectrum).of_shared(np.eye(len(layout)))
+        spread = linearised_fit(design, found).of_shared(np.eye(len(layout)))
         columns = layout.offset_columns[1:]
         assert found.state.probes is not None
         deviations.append((found.state.probes - drawn.probes)[1:] / spread[columns])

@@ -6,15 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.study import fit, plan
-from simulator.design import nominal_state
-from simulator.estimation.observations import reading_weights
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.generate import exact_readings, noisy_readings
-from simulator.layout import lay_out
-from simulator.readings import read_readings, write_readings
+from ballplate.results.study import fit, predict
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.observations import reading_weights
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.generate import exact_readings, noisy_readings
+from ballplate.simulator.readings.reading_files import read_readings, write_readings
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
@@ -28,7 +27,7 @@ def written(tmp_path: Path, text: str) -> Path:
 
 
 def averages(path: Path) -> np.ndarray:
-    found = plan(load(path)[0]).quantities
+    found = predict(load(path)[0]).quantities
     return np.array([found[symbol].average for symbol in SYMBOLS])
 
 

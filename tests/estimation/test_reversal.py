@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
-from simulator.geometry.axes import PlateAxes, in_plate_axes
-from simulator.machines.metric import Scale
-from simulator.machines.protocol import Array
+from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
+from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
+from ballplate.simulator.machines.metric import Scale
+from ballplate.simulator.machines.protocol import Array
 
 ALPHA, GAMMA = 8e-6, -5e-6
 PLATE = np.array([(0.0, 0.0), (0.30, 0.0), (0.31, 0.12), (0.02, 0.25), (0.15, 0.11), (0.07, 0.20), (0.22, 0.04)])

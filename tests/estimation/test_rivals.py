@@ -7,13 +7,13 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from ballplate.simulator.geometry.artefacts import pairs
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 
-from simulator.design import Design
-from simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
-from simulator.generate import exact_readings, noisy_readings
-from simulator.geometry.artefacts import pairs
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
 from tests.estimation.test_gauss_newton import exactly_calibrated, truth_of
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
@@ -138,7 +138,7 @@ def test_repeated_readings_are_combined() -> None:
 
 
 def test_braced_pairs() -> None:
-    from simulator.geometry.artefacts import GridSettings, SquareSettings
+    from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
 
     layout = GridSettings.model_construct(kind="grid", balls=(5, 5), size=(0.75, 0.75)).layout()
     found = {tuple(pair) for pair in pairs(layout, "braced").tolist()}

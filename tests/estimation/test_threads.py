@@ -9,10 +9,10 @@ import sys
 import pytest
 
 PROGRAM = """
-from analysis.study import plan
-from simulator.experiment.load import load
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
 (experiment,) = load("designs/quickstart.yaml")
-found = plan(experiment)
+found = predict(experiment)
 print([(q.maximum.hex(), q.average.hex()) for q in found.quantities.values()], found.verdict.singular_values.tobytes())
 """
 

@@ -8,15 +8,14 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations import Coordinates, Distances, Priors
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.uncertainty.summaries import point_pairs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from analysis.uncertainty import point_pairs
-from simulator.design import Coordinates, Design, Distances, Priors, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
 from tests.reference import dense
 from tests.reference.designs import corner_sides, grid, plate_design, six_positions
 
@@ -122,12 +121,6 @@ def _with_prior(design: Design, position: int, component: int, row: Real, uncert
     )
 
 
-def judged(design: Design) -> tuple[Spectrum, Covariance]:
-    factor = eliminate(design, shared_layout(design), nominal_state(design))
-    found = spectrum(factor)
-    return found, covariance(design, factor, found)
-
-
 def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     """The dense reference's problem, its rows without their uncertainties, and these."""
     alike = replace(
@@ -198,10 +191,10 @@ def test_knowing_more_never_lowers_the_rank_of_many_designs(
 def assert_never_lower(what: tuple[list[int], str, float], more: list[Known]) -> None:
     positions, certificate, repeatability = what
     design = design_of(tuple(positions), certificate, repeatability)
-    deficiency = judged(design)[0].deficiency
+    deficiency = linearise(design).deficiency
     for known in more:
         design = with_known(design, known)
-        found = judged(design)[0]
+        found = linearise(design).spectrum
         assert found.deficiency <= deficiency
         deficiency = found.deficiency
     assert deficiency == deficiency_of(unweighted(design)[1])
@@ -273,17 +266,17 @@ def test_every_uncertainty_beside_what_is_known_all_but_exactly(
     design = design_of(positions, certificate, repeatability)
     for known in more:
         design = with_known(design, known)
-    layout, state = shared_layout(design), nominal_state(design)
-    _, spread = judged(design)
+    at = linearise(design)
+    layout = at.layout
     expected = exact_uncertainties(design)
     reported = design.model.reported().matrix
     quoted = np.zeros((len(reported), len(layout)))
     quoted[:, layout.model] = reported
     found = {
-        "U1": spread.of_balls().ravel(),
-        "U2": spread.of_shared(np.eye(len(layout))[layout.poses]),
-        "U3": spread.of_shared(quoted[reported.any(axis=1)]),
-        "U4": point_pairs(design, layout, state, spread)[0].ravel(),
+        "U1": at.of_balls().ravel(),
+        "U2": at.of_shared(np.eye(len(layout))[layout.poses]),
+        "U3": at.of_shared(quoted[reported.any(axis=1)]),
+        "U4": point_pairs(at)[0].ravel(),
     }
     for symbol, values in found.items():
         theirs = expected[symbol]

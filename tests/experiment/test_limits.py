@@ -5,18 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from sys import modules
 
 import numpy as np
 import pytest
-
-from simulator.estimation.elimination import SMALL, eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment import ExperimentError, load
-from simulator.experiment.messages import MOST_MESSAGES
-from simulator.experiment.yamltree import parse_tree, read_text
-from simulator.generate import true_artefacts
-from simulator.geometry.artefacts import BallLayout, coincident_balls
-from simulator.layout import lay_out
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.elimination import SMALL, eliminate
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.geometry.artefacts import BallLayout, coincident_balls
+from ballplate.simulator.inputs.messages import MOST_MESSAGES
+from ballplate.simulator.inputs.yamltree import parse_tree, read_text
+from ballplate.simulator.readings.generate import true_artefacts
 
 GOOD = """\
 title: good
@@ -137,6 +137,46 @@ def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
     ]
 
 
+def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three thousand are possible; as many between balls of their own are no difficulty."""
+    bar = "  bar: {kind: grid, balls: [10, 8], size: [450 mm, 450 mm], role: length_standard}\npositions:"
+    text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
+    text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
+    text = text.replace(
+        "calibration:",
+        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\ncalibration:\n"
+        "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 1 um}",
+    )
+    assert refusals(tmp_path, text) == [
+        '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most 3000 such are possible: '
+        "calibrate fewer of them"
+    ]
+    (tmp_path / "e.yaml").write_text(text.replace("[10, 8]", "[11, 7]"))
+    assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 2926
+    monkeypatch.setattr("ballplate.simulator.experiment.checks.MOST_JOINT_LENGTHS", 2)
+    text = text.replace("[10, 8]", "[2, 3]")
+    (tmp_path / "e.yaml").write_text(text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r2c1, r2c2], [r3c1, r3c2]]"))
+    assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 3
+    joint = text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r1c2, r2c2], [r3c1, r3c2]]")
+    assert "have balls in common; at most 2 such" in refusals(tmp_path, joint)[0]
+
+
+def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path) -> None:
+    text = replaced("{kind: kinematic}", "{kind: kinematic, position_coefficients: 25, rotation_coefficients: 25}")
+    (line,) = refusals(tmp_path, text + "evaluation: {points: {random: 40000}}\n")
+    (tmp_path / "e.yaml").write_text(text)
+    errors = len(lay_out(load(tmp_path / "e.yaml")[0]).model.parameters)
+    most = 50_000_000 // (3 * errors)
+    assert line == (
+        f"11:22: evaluation.points: 40000 points with {errors} machine errors have {120_000 * errors} derivatives; at "
+        f"most {most} points are possible with so many errors"
+    )
+    (tmp_path / "e.yaml").write_text(f"{text}evaluation: {{points: {{random: {most}}}}}\n")
+    assert len(load(tmp_path / "e.yaml")[0].evaluation.points) == most
+
+
 @pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
 def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
     (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))
@@ -246,14 +286,14 @@ def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch:
     (tmp_path / "e.yaml").write_text(text)
     design = lay_out(load(tmp_path / "e.yaml")[0])
     arguments = design, shared_layout(design)
-    from simulator.design import nominal_state
+    from ballplate.simulator.design.arrays import nominal_state
 
     state = nominal_state(design)
     assert SMALL < 3 * 196
     some = eliminate(*arguments, state)
-    monkeypatch.setattr("simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.DISTANCES_AT_ONCE", 50)
     few = eliminate(*arguments, state)
-    monkeypatch.setattr("simulator.estimation.elimination.SMALL", 10_000)
+    monkeypatch.setattr("ballplate.simulator.estimation.elimination.SMALL", 10_000)
     plain = eliminate(*arguments, state)
     for one in (some, few):
         np.testing.assert_allclose(
@@ -261,3 +301,24 @@ def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch:
         )
         whole = one.kept_root.T @ one.kept_root
         np.testing.assert_allclose(whole, plain.kept_root.T @ plain.kept_root, atol=1e-12 * abs(whole).max())
+
+
+def test_variants_that_are_too_large_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has 9 balls, reads them with one probe, and has 4 calibrated distances and 20 points."""
+    each, most = 9 + 9 + 4 + 20, 3
+    text = f"{GOOD}evaluation: {{points: {{random: 20, seed: 1}}, probe: down}}\nvariants:\n"
+    names = [f"  v{k}: {{seed: {k}}}\n" for k in range(most + 5)]
+    path = tmp_path / "e.yaml"
+    monkeypatch.setattr(modules["ballplate.simulator.experiment.load"], "MOST_OF_ALL", most * each)
+    path.write_text(text + "".join(names[:most]), encoding="utf-8")
+    assert len(load(path)) == most
+    (line,) = refusals(tmp_path, text + "".join(names))
+    place = f"{text.count(chr(10)) + most + 1}:7: variants.v{most}"
+    assert line == (
+        f"{place}: the variants up to here have {(most + 1) * each} balls, balls read, calibrated values, priors and "
+        f"evaluation points; at most {most * each} are possible: put some of the variants into a file of their own"
+    )
+    # A single experiment has the other limits alone.
+    monkeypatch.setattr(modules["ballplate.simulator.experiment.load"], "MOST_OF_ALL", each - 1)
+    path.write_text(text + names[0], encoding="utf-8")
+    assert len(load(path)) == 1

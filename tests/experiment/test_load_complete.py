@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from simulator.experiment import CoordinateCalibration, DistanceCalibration, Experiment, load
-from simulator.experiment.sections import ExperimentSettings
-from simulator.experiment.yamltree import Mapping, read_tree, walk
-from simulator.quantities import LengthFunction, Target
+from ballplate.simulator.experiment import CoordinateCalibration, DistanceCalibration, Experiment, load
+from ballplate.simulator.experiment.sections import ExperimentSettings
+from ballplate.simulator.inputs.quantities import LengthFunction, Target
+from ballplate.simulator.inputs.yamltree import Mapping, read_tree, walk
 
 COMPLETE = """\
 # yaml-language-server: $schema=schema.json

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
+from ballplate.simulator.experiment import ExperimentError, Message, load
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from simulator.experiment import ExperimentError, Message, load
 
 GOOD = """\
 title: good

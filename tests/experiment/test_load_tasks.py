@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment import ExperimentError, load
 
 TEXT = """\
 title: good

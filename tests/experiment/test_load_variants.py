@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import pytest
-
-from simulator.experiment import Experiment, ExperimentError, load
+from ballplate.simulator.experiment import Experiment, ExperimentError, load
 
 BASE = """\
 title: base

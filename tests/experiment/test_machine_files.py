@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.volumetric import Volumetric
-from simulator.experiment import ExperimentError, load
-from simulator.experiment.machine_file import load_machine
-from simulator.machines.curves import Points
-from simulator.machines.description import AxisTemperature, PowerSeries, Squareness, random_part
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.machines.curves import Points
+from ballplate.simulator.machines.description import AxisTemperature, PowerSeries, Squareness, random_part
+from ballplate.volumetric.volumetric_errors import Volumetric
 
 MACHINE = """\
 title: moving horizontal arm
@@ -240,7 +239,7 @@ def test_reversed_ends_are_told_with_everything_else(tmp_path: Path) -> None:
 
 
 def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simulator.experiment.curves.MOST_POINTS", 2)
+    monkeypatch.setattr("ballplate.simulator.experiment.curves.MOST_POINTS", 2)
     (line,) = told(written(tmp_path))
     assert line.startswith("eyx.csv:5:1: 3 points are too many; at most 2 are possible")
 

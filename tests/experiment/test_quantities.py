@@ -8,11 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from pydantic import TypeAdapter
-
-from simulator.quantities import (
+from ballplate.simulator.inputs.quantities import (
     ANGLE_UNITS,
     LARGEST,
     LENGTH_UNITS,
@@ -30,6 +26,9 @@ from simulator.quantities import (
     parse_positive_length,
     parse_ratio,
 )
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 
 @pytest.mark.parametrize(

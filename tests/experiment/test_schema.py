@@ -4,9 +4,9 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from simulator.experiment import schema
-from simulator.experiment.sections import ExperimentSettings
-from simulator.geometry.artefacts import ARTEFACTS
+from ballplate.simulator.experiment import schema
+from ballplate.simulator.experiment.sections import ExperimentSettings
+from ballplate.simulator.geometry.artefacts import ARTEFACTS
 
 DOCUMENTED = [
     "title",

@@ -3,9 +3,8 @@
 from pathlib import Path
 
 import pytest
-
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.tables import read_table
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.tables import read_table
 
 
 @pytest.fixture

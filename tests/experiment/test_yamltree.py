@@ -4,18 +4,10 @@ import math
 from pathlib import Path
 
 import pytest
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import DEEPEST, mark_of, parse_tree, read_tree, resolve_scalar, to_python
 from hypothesis import given
 from hypothesis import strategies as st
-
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.yamltree import (
-    DEEPEST,
-    mark_of,
-    parse_tree,
-    read_tree,
-    resolve_scalar,
-    to_python,
-)
 
 
 def refusals(text: str) -> list[str]:

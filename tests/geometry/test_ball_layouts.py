@@ -2,11 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from pydantic import TypeAdapter
-
-from simulator.geometry.artefacts import (
+from ballplate.simulator.geometry.artefacts import (
     ARTEFACTS,
     AnyArtefactSettings,
     BallLayout,
@@ -14,6 +10,9 @@ from simulator.geometry.artefacts import (
     corners,
     pairs,
 )
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 adapter: TypeAdapter[AnyArtefactSettings] = TypeAdapter(AnyArtefactSettings)
 

@@ -4,11 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-
-from simulator.geometry.artefacts import BallLayout, GridSettings
-from simulator.geometry.positions import (
+from ballplate.simulator.geometry.artefacts import BallLayout, GridSettings
+from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,
@@ -17,6 +14,8 @@ from simulator.geometry.positions import (
     ball_coordinates,
     nominal_pose,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 PLATE = GridSettings.model_validate({"kind": "grid", "balls": (3, 2), "size": ("600 mm", "200 mm")}).layout()
 planes: st.SearchStrategy[Axis] = st.sampled_from(("x", "y", "z"))

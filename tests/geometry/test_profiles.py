@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from simulator.geometry.profile import NotOnProfileError, along
+from ballplate.simulator.geometry.profile import NotOnProfileError, along
 
 RADIUS = 0.037
 

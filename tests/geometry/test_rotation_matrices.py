@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from ballplate.simulator.geometry.rotations import cosine_and_sine, rotation_matrix
+from ballplate.simulator.inputs.quantities import parse_angle
 from hypothesis import given
 from hypothesis import strategies as st
-
-from simulator.geometry.rotations import cosine_and_sine, rotation_matrix
-from simulator.quantities import parse_angle
 
 angles = st.floats(-10.0, 10.0)
 

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ballplate.simulator.machines.bases import (
+    Basis,
+    Ends,
+    Monomial,
+    Polynomial,
+    Spline,
+    spline_containing,
+    whole_values,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.linalg import null_space
-
-from simulator.machines.bases import Basis, Ends, Monomial, Polynomial, Spline, spline_containing, whole_values
 
 FAMILIES: dict[str, Basis] = {
     "Chebyshev": Polynomial(6),

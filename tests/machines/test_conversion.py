@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.bases import Basis, Monomial, Polynomial, Spline
-from simulator.machines.conversion import NotContainedError, along_axes, containing, linear_map
-from simulator.machines.empirical import empirical_model
-from simulator.machines.kinematic import kinematic_model, kinematic_model_of
-from simulator.machines.terms import quadratic, sums
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.bases import Basis, Monomial, Polynomial, Spline
+from ballplate.simulator.machines.conversion import NotContainedError, along_axes, containing, linear_map
+from ballplate.simulator.machines.empirical import empirical_model
+from ballplate.simulator.machines.kinematic import kinematic_model, kinematic_model_of
+from ballplate.simulator.machines.terms import quadratic, sums
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import importlib.metadata
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-from analysis.study import check
-from simulator.experiment import ExperimentError, load
-from simulator.layout import lay_out
-from simulator.machines import custom
+from ballplate.results.study import check
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.machines import custom
 
 # A machine of straight axes in space: three scales and three angles.
 GOOD = """
 import numpy as np
-from simulator.machines.protocol import Parameter, Reported
+from ballplate.models import Parameter, Reported
 
 
 class Straight:
@@ -157,6 +158,17 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
     assert "for an object of a module write module:name" in refusal(file)
 
 
+@pytest.mark.parametrize("former", ["simulator.machines.protocol", "analysis.study"])
+def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, former: str) -> None:
+    """In a process of its own, which does not find the folders of a checkout as packages."""
+    file, _ = written(tmp_path, GOOD.replace("from ballplate.models import", f"from {former} import"))
+    command = [sys.executable, "-m", "ballplate", "check", file.name]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 3
+    assert former.partition(".")[0] in done.stderr
+    assert "write: from ballplate.models import Parameter, Reported" in done.stderr
+
+
 def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
     file, module = written(tmp_path, GOOD)
     text = file.read_text(encoding="utf-8").replace(f"{{kind: python, object: {module}:build}}", "{kind: kinematic}")
@@ -168,8 +180,8 @@ def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
 
 
 def test_a_jacobian_is_compared_with_differences_of_full_rotations() -> None:
-    from simulator.machines.arrangement import ARRANGEMENTS
-    from simulator.machines.kinematic import kinematic_model
+    from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+    from ballplate.simulator.machines.kinematic import kinematic_model
 
     model = kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True)
     custom._check("own", model, np.zeros(3), np.ones(3))

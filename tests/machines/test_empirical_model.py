@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from simulator.machines.bases import Monomial, Polynomial, Spline
-from simulator.machines.empirical import FRAME, FUNCTIONS, EmpiricalModel, FrameError, empirical_model
-from simulator.machines.terms import Radial, Terms, quadratic, sums, tensor
+from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
+from ballplate.simulator.machines.empirical import FRAME, FUNCTIONS, EmpiricalModel, FrameError, empirical_model
+from ballplate.simulator.machines.terms import Radial, Terms, quadratic, sums, tensor
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
 TERMS: dict[str, Terms] = {

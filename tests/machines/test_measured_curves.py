@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from simulator.experiment import ExperimentError, load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import TrueMachine, true_machine
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment import ExperimentError, load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.truth import TrueMachine, true_machine
+from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 
 EXPERIMENT = """\
 title: measured curves
@@ -87,7 +86,7 @@ def test_readings_of_a_measured_machine(tmp_path: Path) -> None:
         ("position_mm,EQX_um\n0,1\n", ["x.csv:1:13: the column \"EQX_um\" is no error of an axis; did you mean \"E"]),
         ("position_mm,EXX_urad\n0,1\n", ["x.csv:1:13: unknown unit in the column \"EXX_urad\""]),
         ("position_mm,EAX_um\n0,1\n", ["x.csv:1:13: unknown unit in the column \"EAX_um\""]),
-        ("EXX_um,EYX_um\n0,1\n", ["x.csv:1:1: a position and at least one error are needed"]),
+        ("EXX_um,EYX_um\n0,1\n", ["x.csv:1:1: has no position, or no error; write columns as in position_mm,EXX_um"]),
         ("position_mm,EXX_um,EYY_um\n0,1,1\n", ["x.csv:1:1: errors of the axes X, Y; write one file for each axis"]),
         ("position_mm,EXX_um\n0,1\n", ["x.csv:1:1: a curve needs two points at least"]),
         ("position_mm,EXX_um\n0,1\n5\n9,one\n", ["x.csv:3:1: 1 columns instead of 2", "x.csv:4:3: \"one\" is not"]),

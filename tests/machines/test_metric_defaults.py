@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from analysis.sweeps.fingerprint import fingerprint
-from simulator.experiment.load import load
+from ballplate.simulator.experiment.load import load
+from ballplate.sweeps.fingerprint import fingerprint
 
 
 @pytest.mark.parametrize(

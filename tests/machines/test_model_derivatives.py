@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
+from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
+from ballplate.simulator.machines.description import fitted_volumetric, true_volumetric
+from ballplate.simulator.machines.empirical import empirical_model
+from ballplate.simulator.machines.framing import FramedModel
+from ballplate.simulator.machines.joined import JoinedModel
+from ballplate.simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
+from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.protocol import ErrorModel, HasLines
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.machines.terms import Radial, quadratic, sums, tensor
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulator.experiment.machine_file import load_machine
-from simulator.machines.arrangement import ARRANGEMENTS, Arrangement
-from simulator.machines.bases import Monomial, Polynomial, Spline
-from simulator.machines.description import fitted_volumetric, true_volumetric
-from simulator.machines.empirical import empirical_model
-from simulator.machines.framing import FramedModel
-from simulator.machines.joined import JoinedModel
-from simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
-from simulator.machines.metric import MetricModel
-from simulator.machines.protocol import ErrorModel, HasLines
-from simulator.machines.spatial_metric import SpatialMetricModel
-from simulator.machines.terms import Radial, quadratic, sums, tensor
 from tests.reference.derivatives import assert_derivative, complex_step
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)

@@ -6,22 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.results.study import predict
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.bases import Polynomial, Spline
+from ballplate.simulator.machines.empirical import empirical_model
+from ballplate.simulator.machines.kinematic import KinematicModel, kinematic_model, kinematic_model_of
+from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.protocol import ErrorModel
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.machines.terms import Radial, sums
+from ballplate.simulator.machines.true_machine_settings import CoefficientSettings
+from ballplate.simulator.machines.truth import TruthError, true_parameters
 from scipy.spatial.transform import Rotation
-
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.layout import lay_out
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.bases import Polynomial, Spline
-from simulator.machines.empirical import empirical_model
-from simulator.machines.kinematic import KinematicModel, kinematic_model, kinematic_model_of
-from simulator.machines.metric import MetricModel
-from simulator.machines.protocol import ErrorModel
-from simulator.machines.spatial_metric import SpatialMetricModel
-from simulator.machines.terms import Radial, sums
-from simulator.machines.true_machine_settings import CoefficientSettings
-from simulator.machines.truth import TruthError, true_parameters
 
 LOWER, UPPER = (-0.2, 0.1, 0.3), (0.8, 0.7, 1.3)
 GENERATOR = np.random.default_rng(5)
@@ -178,7 +177,7 @@ def test_priors_of_poses_free_nothing(tmp_path: Path) -> None:
 def test_u2_leaves_offsets_out(tmp_path: Path) -> None:
     certificate = "calibration: [{kind: coordinates, balls: all, standard_uncertainty: 0.2 um}]\n"
     (experiment,) = load(written(tmp_path, certificate))
-    quantities = plan(experiment).quantities
+    quantities = predict(experiment).quantities
     assert quantities["U2"].count == 18
     assert quantities["U2 offsets"].count == 3
     assert quantities["U2"].count == quantities["U2 lengths"].count + quantities["U2 angles"].count

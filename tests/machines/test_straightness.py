@@ -9,10 +9,9 @@ import pytest
 
 # Loaded beforehand, so that the first example does not take longer than examples may.
 import scipy.optimize  # noqa: F401
+from ballplate.simulator.machines.straightness import reference_line
 from hypothesis import example, given
 from hypothesis import strategies as st
-
-from simulator.machines.straightness import reference_line
 
 points = st.integers(3, 9).flatmap(
     lambda n: st.tuples(

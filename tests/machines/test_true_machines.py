@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
-from simulator.machines.metric import MetricModel
-from simulator.machines.true_machine_settings import CoefficientSettings, RandomSettings, ZeroSettings
-from simulator.machines.truth import TruthError, true_machine, true_parameters
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.true_machine_settings import CoefficientSettings, RandomSettings, ZeroSettings
+from ballplate.simulator.machines.truth import TruthError, true_machine, true_parameters
 
 MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
 ORIGIN = np.zeros((1, 3))

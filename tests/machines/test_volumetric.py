@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.volumetric import Volumetric, between
-from simulator.experiment.machine_file import load_machine
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.curves import Points
-from simulator.machines.description import (
+from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.curves import Points
+from ballplate.simulator.machines.description import (
     AxisTemperature,
     MachineDescription,
     ParametricError,
@@ -21,9 +19,11 @@ from simulator.machines.description import (
     fitted_volumetric,
     true_volumetric,
 )
-from simulator.machines.straightness import Criterion
-from simulator.machines.true_machine_settings import RandomSettings
-from simulator.machines.truth import true_parameters
+from ballplate.simulator.machines.straightness import Criterion
+from ballplate.simulator.machines.true_machine_settings import RandomSettings
+from ballplate.simulator.machines.truth import true_parameters
+from ballplate.volumetric.volumetric_errors import Volumetric, between
+
 from tests.published.rigid_body import tip_error
 
 SIZE = np.array([1.8, 1.2, 0.9])

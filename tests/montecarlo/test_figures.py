@@ -9,21 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.stats
-
-from analysis.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
-from analysis.montecarlo.study import trials, true_experiment
-from analysis.montecarlo.tables import trials_data, trials_lines, with_error
-from analysis.montecarlo.tally import tally
-from analysis.montecarlo.targets import Target, sample_of_pairs, targets
-from analysis.montecarlo.trials import run_trials
-from analysis.study import plan
-from simulator.design import Design, nominal_state
-from simulator.estimation.observations import distance_rows, expected_readings, reading_blocks
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.montecarlo.reference import Reference, reference
-from simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.montecarlo.comparison_tables import trials_data, trials_lines, with_error
+from ballplate.montecarlo.experiments import trials, true_experiment
+from ballplate.montecarlo.figures import Comparison, Figure, Outcome, outcome, power_of_misfit
+from ballplate.montecarlo.tally import tally
+from ballplate.montecarlo.targets import Target, sample_of_pairs, targets
+from ballplate.montecarlo.trials import run_trials
+from ballplate.results.study import predict
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.estimation.observations import distance_rows, expected_readings, reading_blocks
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.montecarlo.reference import Reference, reference
+from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:
@@ -63,7 +62,7 @@ def test_residuals_are_those_of_a_right_model() -> None:
 
 
 def test_linearised_uncertainties_are_those_of_the_plan() -> None:
-    planned = plan(shipped("quickstart.yaml")).quantities
+    planned = predict(shipped("quickstart.yaml")).quantities
     found = two_thousand().comparisons
     for symbol in ("U1", "U2", "U4", "U5"):
         assert found[symbol].linear_average == pytest.approx(planned[symbol].average, rel=1e-3), symbol

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.montecarlo.study import true_experiment
-from analysis.montecarlo.targets import targets
-from simulator.experiment import load
-from simulator.montecarlo.reference import reference
+from ballplate.montecarlo.experiments import true_experiment
+from ballplate.montecarlo.targets import targets
+from ballplate.simulator.experiment import load
+from ballplate.simulator.montecarlo.reference import reference
 
 SHIPPED = Path("designs/park")
 KEYS = {

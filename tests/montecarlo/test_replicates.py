@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.observations import Coordinates, Lengths, Priors, Readings
+from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.montecarlo.expansion import Direct, Expansion
+from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
+from ballplate.simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 
-from simulator.design import Coordinates, Design, Lengths, Priors, Readings, State, nominal_state
-from simulator.estimation.gauss_newton import gauss_newton
-from simulator.geometry.motions import rotation_from_vector
-from simulator.machines.metric import MetricModel
-from simulator.montecarlo.expansion import Direct, Expansion
-from simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
-from simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
 

@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 import yaml
-
-from analysis.planning.campaign import Campaign, Request, campaign
-from analysis.planning.constraints import HOUR, Budget
-from analysis.planning.criteria import NAMES, CriterionName
-from analysis.planning.done import SetUp, done_candidates
-from analysis.planning.offer import offer
-from simulator.design import nominal_state
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.generate import exact_readings
-from simulator.layout import lay_out
-from simulator.readings import write_readings
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import HOUR, Budget
+from ballplate.planning.criteria import NAMES, CriterionName
+from ballplate.planning.done import SetUp, done_candidates
+from ballplate.planning.offer import offer
+from ballplate.planning.selection import Campaign
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.readings.generate import exact_readings
+from ballplate.simulator.readings.reading_files import write_readings
 
 PLATES: tuple[dict[str, Any], ...] = (
     {"kind": "grid", "balls": [3, 2], "size": ["240 mm", "160 mm"]},

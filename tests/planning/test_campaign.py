@@ -9,21 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.internal_error import InternalError
-from analysis.planning.bound import Bound
-from analysis.planning.campaign import Request, campaign
-from analysis.planning.constraints import HOUR, Budget
-from analysis.planning.done import done_candidates
-from analysis.planning.earlier import earlier_choice
-from analysis.planning.offer import offer
-from analysis.planning.search import Problem
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import with_chosen
+from ballplate.cli import main
+from ballplate.planning.bound import Bound
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import HOUR, Budget
+from ballplate.planning.done import done_candidates
+from ballplate.planning.earlier import earlier_choice
+from ballplate.planning.offer import offer
+from ballplate.planning.search import Problem
+from ballplate.results.study import predict
+from ballplate.running.internal_error import InternalError
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError
 
 from .small_pool import TEXT
 
@@ -76,7 +75,7 @@ def first(path: Path) -> Experiment:
 
 def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
     found = campaign(first(drawn), Request("U6"))
-    reference = plan(load(drawn)[0])
+    reference = predict(load(drawn)[0])
     assert found.drawn == pytest.approx(reference.quantities["U6"].average, rel=1e-9)
     assert found.value <= found.drawn
     assert found.drawn_spent is not None
@@ -93,7 +92,7 @@ def test_an_interrupted_campaign_never_does_worse_than_its_remainder(drawn: Path
     done = done_candidates(readings_of(drawn, read), experiment)
     assert len(done) == read
     found = campaign(experiment, Request("U6"), offer(experiment.pool, done))
-    reference = plan(load(drawn)[0])
+    reference = predict(load(drawn)[0])
     assert found.value <= reference.quantities["U6"].average * (1 + 1e-12)
     names = [candidate.name for candidate in found.chosen]
     assert {one.name for one in done} <= set(names)
@@ -111,7 +110,7 @@ def test_what_was_read_in_part_counts_as_it_was_read(drawn: Path) -> None:
     done = done_candidates(path, experiment)
     assert sum(one.read.readings for one in done) == len(lines) - 1 - 7
     partly = campaign(experiment, Request("U6"), offer(experiment.pool, done))
-    full = plan(with_chosen(experiment, partly.chosen))
+    full = predict(with_chosen(experiment, partly.chosen))
     assert partly.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
 
 
@@ -231,8 +230,8 @@ def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_the_pool_is_not_overwritten_by_the_choice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "pool.yaml"
     path.write_text(TEXT)
-    assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 3
-    assert "the pool stands in" in capsys.readouterr().err
+    assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 2
+    assert "which is read; name another file" in capsys.readouterr().err
     assert path.read_text() == TEXT
 
 
@@ -241,7 +240,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
     positions: int, drawn: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bound that is wrong on purpose, of the choice itself and of a point of the curve."""
-    from analysis.planning import campaign as planning
+    from ballplate.planning import campaign as planning
 
     right = planning.bound
 
@@ -263,3 +262,13 @@ def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
     one.check("U6", 1e-6 * (1 - 5e-10))
     with pytest.raises(InternalError, match="U6 of the choice, 9.9.*e-07, is below 1e-06"):
         one.check("U6", 1e-6 * (1 - 5e-9))
+
+
+def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
+    steps: list[tuple[str, int, int]] = []
+    request = Request("U6", Budget(positions=4))
+    campaign(load(drawn, planning=True)[0], request, report=lambda *step: steps.append(step))
+    searched = [(done, wanted) for what, done, wanted in steps if what == "starts of the search"]
+    assert len(searched) > 1
+    assert searched == [(done, searched[0][1]) for done in range(searched[0][0], searched[0][1] + 1)]
+    assert all(0 <= done <= wanted for _, done, wanted in steps)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from analysis.planning.done import SetUp, done_candidates
-from analysis.planning.experiment_file import experiment_text
-from analysis.planning.schedule import run_sheet
-from simulator.design import nominal_state
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.generate import exact_readings
-from simulator.layout import lay_out
-from simulator.readings import write_readings
+from ballplate.planning.done import SetUp, done_candidates
+from ballplate.planning.experiment_file import experiment_text
+from ballplate.planning.schedule import run_sheet
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.readings.generate import exact_readings
+from ballplate.simulator.readings.reading_files import write_readings
 
 CAMPAIGN = Path("designs/planning/campaign.yaml")
 

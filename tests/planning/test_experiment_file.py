@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from analysis.planning.experiment_file import experiment_text
-from analysis.planning.schedule import run_sheet
-from simulator.design import Design
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate, with_chosen
-from simulator.layout import lay_out
+from ballplate.planning.experiment_file import experiment_text
+from ballplate.planning.schedule import run_sheet
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
 
 FOLDER = Path("designs/planning")
 NUMBERS = count()
@@ -121,7 +120,7 @@ variants:
 """
 MODEL = """\
 import numpy as np
-from simulator.machines.protocol import Parameter, Reported
+from ballplate.models import Parameter, Reported
 
 
 class Scale:

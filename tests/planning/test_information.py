@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.campaign import Request, campaign
-from analysis.planning.constraints import Budget, constraints
-from analysis.planning.criteria import CriterionName, criterion, is_about_balls
-from analysis.planning.information import pool_information
-from analysis.planning.search import Losses, Problem, value
-from analysis.study import Plan, plan
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import with_chosen
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import Budget, constraints
+from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.planning.information import pool_information
+from ballplate.planning.search import Losses, Problem, value
+from ballplate.results.prediction import Prediction
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError
 
 from .small_pool import TEXT
 
@@ -53,7 +53,7 @@ def problem_of(experiment: Experiment, name: CriterionName) -> Problem:
     return Problem(information, criterion(information, experiment, name), limits)
 
 
-def in_full(found: Plan, name: CriterionName) -> float:
+def in_full(found: Prediction, name: CriterionName) -> float:
     kind, _, largest = name.partition("-")
     return getattr(found.quantities[kind], "maximum" if largest else "average")
 
@@ -81,7 +81,7 @@ def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> N
     problem = problem_of(experiment, name)
     compared = 0
     for chosen in selections(experiment, 30, 7, 3):
-        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         found = value(problem, chosen)
         assert np.isfinite(found) == (full.verdict.deficiency == 0)
         if np.isfinite(found):
@@ -102,7 +102,7 @@ def test_equal_for_estimated_offsets_and_parts_of_a_plate(tmp_path: Path, name: 
         items = [experiment.pool.candidates[k] for k in chosen]
         if not any(isinstance(one.item, Position) for one in items):
             continue
-        full = plan(with_chosen(experiment, items))
+        full = predict(with_chosen(experiment, items))
         found = value(problem, chosen)
         if np.isfinite(found) and full.verdict.deficiency == 0:
             compared += 1
@@ -120,7 +120,7 @@ def test_equal_for_a_bar_and_better_certificates() -> None:
     compared = 0
     for chosen in selections(experiment, 10, 9, 5):
         members = sorted({*chosen, *last})
-        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in members]))
+        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in members]))
         found = value(problem, members)
         assert np.isfinite(found) == (full.verdict.deficiency == 0)
         if np.isfinite(found):
@@ -155,7 +155,7 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
     (experiment,) = load(written(tmp_path, text), planning=True)
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
-    full = plan(with_chosen(experiment, candidates))
+    full = predict(with_chosen(experiment, candidates))
     information = pool_information(experiment, candidates)
     assert information.deficiency == full.verdict.deficiency > 0
     assert full.quantities["U6"].undetermined == full.quantities["U6"].count
@@ -237,12 +237,12 @@ def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
     names = [candidate.name for candidate in experiment.pool.candidates]
     for wanted in (["a", "b", "of small"], ["c", "d", "of large"], ["a", "b", "c", "of small", "of large"]):
         chosen = [names.index(name) for name in wanted]
-        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         assert full.verdict.deficiency == 0
         assert value(problem, chosen) == pytest.approx(full.quantities["U6"].average, rel=1e-9)
     # Neither the sides of the one nor those of the other tell squareness, and nothing else is shared.
     chosen = [names.index(name) for name in ("a", "d", "of small", "of large")]
-    full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+    full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
     assert full.verdict.deficiency == 1 and value(problem, chosen) == np.inf
 
 
@@ -269,7 +269,7 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str, n
     assert problem.information.deficiency == 0
     compared = 0
     for chosen in selections(experiment, 15, 7, 3):
-        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         found = value(problem, chosen)
         assert np.isfinite(found) == (full.verdict.deficiency == 0)
         if np.isfinite(found):
@@ -289,7 +289,7 @@ def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_p
         for wanted in (["a", "b"], ["c", "d"], ["a", "b", "of small", "of large"]):
             assert value(problem, [names.index(one) for one in wanted]) == np.inf
         chosen = [names.index(one) for one in ("a", "b", "c")]
-        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         assert value(problem, chosen) == pytest.approx(in_full(full, name), rel=1e-9)  # type: ignore[arg-type]
 
 
@@ -304,7 +304,7 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
         for chosen in combinations(candidates, size):
             places = [one.item for one in chosen if isinstance(one.item, Position)]
             if len({one.artefact for one in places}) == 2 and len(places) <= positions:
-                full = plan(with_chosen(experiment, chosen))
+                full = predict(with_chosen(experiment, chosen))
                 best = min(best, np.inf if full.verdict.deficiency else full.quantities["U5"].average)
     assert found.bound <= found.value == pytest.approx(best, rel=1e-9)
     with pytest.raises(ExperimentError, match='U5 takes in the distances of ".*", of which no position can be read'):

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.planning.campaign import Campaign, Request, campaign
-from analysis.planning.constraints import Budget
-from analysis.planning.done import done_candidates
-from analysis.planning.information import pool_information
-from analysis.planning.offer import offer
-from analysis.planning.schedule import run_sheet
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import with_chosen
+from ballplate.cli import main
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import Budget
+from ballplate.planning.done import done_candidates
+from ballplate.planning.information import pool_information
+from ballplate.planning.offer import offer
+from ballplate.planning.schedule import run_sheet
+from ballplate.planning.selection import Campaign
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
 
 from .random_pools import write_some
 
@@ -86,7 +86,7 @@ def test_a_position_is_completed_where_it_stands_without_another_set_up(pool: Pa
     (experiment,) = load(pool, planning=True)
     assert experiment.pool is not None
     whole = with_chosen(experiment, [one for one in experiment.pool.candidates if one.name in ("side", "low")])
-    assert found.value == pytest.approx(plan(whole).quantities["U6"].average, rel=1e-9)
+    assert found.value == pytest.approx(predict(whole).quantities["U6"].average, rel=1e-9)
 
 
 def test_what_has_been_moved_is_not_offered_for_completion(pool: Path) -> None:
@@ -148,7 +148,7 @@ def test_no_selection_is_better_and_more_readings_do_no_harm(pool: Path, count: 
             seconds += 180.0 if len({one.name == "left" for one in todo}) == 2 else 0.0
             if seconds > 45 * 60.0:
                 continue
-            worth = plan(with_chosen(experiment, [side.read, first, *chosen])).quantities["U6"]
+            worth = predict(with_chosen(experiment, [side.read, first, *chosen])).quantities["U6"]
             if not worth.undetermined:
                 best = min(best, worth.average)
     assert np.isfinite(best) and found.value == pytest.approx(best, rel=1e-9)
@@ -304,7 +304,7 @@ positions:
     assert found.drawn_spent.seconds == 5 * 60.0 + 2 * 1200.0 + 2 * 600.0 + 27 * 60.0 + 180.0
     assert (found.drawn_spent.readings, found.drawn_spent.positions) == (32, 2)
     whole: Experiment = load(pool)[0]
-    assert found.drawn == pytest.approx(plan(whole).quantities["U6"].average, rel=1e-9)
+    assert found.drawn == pytest.approx(predict(whole).quantities["U6"].average, rel=1e-9)
     assert found.value <= found.drawn  # type: ignore[operator]
 
 
@@ -342,7 +342,7 @@ def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
     less = campaign(experiment, Request("U6", budget), offer(experiment.pool, taken[:2]))
     for one in found.values():
         assert one.value <= less.value * (1 + 1e-9)
-        full = plan(with_chosen(experiment, one.chosen))
+        full = predict(with_chosen(experiment, one.chosen))
         assert one.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
         assert [left.name for left in one.ignored] == ([] if "small low" in names_of(one) else ["small low"])
     assert found[True].value <= found[False].value * (1 + 1e-9)

@@ -10,23 +10,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.campaign import TINY_POOL, Campaign
-from analysis.planning.constraints import Spent
-from analysis.planning.criteria import CriterionName
-from analysis.planning.experiment_file import experiment_text
-from analysis.planning.schedule import RunSheet, run_sheet
-from analysis.study import plan, worth
-from simulator.design import nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate, with_chosen
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.planning.campaign import TINY_POOL
+from ballplate.planning.constraints import Spent
+from ballplate.planning.criteria import CriterionName
+from ballplate.planning.experiment_file import experiment_text
+from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.planning.selection import Campaign
+from ballplate.results.study import predict, worth
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.reading_files import read_readings
 
 from .random_pools import RandomPool, random_pool, write_some
 
@@ -38,16 +35,15 @@ def by_run(experiment: Experiment, name: CriterionName) -> float:
     """The criterion by what `run` computes, infinite where something that it is about is undetermined."""
     kind, _, largest = name.partition("-")
     if kind in ("U6", "U5", "tasks"):
-        found = plan(experiment).quantities[kind]
+        found = predict(experiment).quantities[kind]
         return np.inf if found.undetermined else getattr(found, "maximum" if largest else "average")
     design = lay_out(experiment)
-    layout = shared_layout(design)
-    factor = eliminate(design, layout, nominal_state(design))
-    spread = covariance(design, factor, spectrum(factor))
+    at = linearise(design)
+    layout = at.layout
     scaled = np.eye(len(layout))[layout.model] / layout.scale[layout.model, None]
-    if np.isnan(spread.of_shared(scaled)).any():
+    if np.isnan(at.of_shared(scaled)).any():
         return np.inf
-    variances = np.linalg.eigvalsh(scaled @ spread.shared @ spread.shared.T @ scaled.T)
+    variances = np.linalg.eigvalsh(scaled @ at.shared @ at.shared.T @ scaled.T)
     return {
         "A": np.sqrt(variances.mean()),
         "D": np.exp(0.5 * np.log(variances).mean()),

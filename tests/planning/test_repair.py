@@ -10,21 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from ballplate.checking.check_files import Wanted, check_files
+from ballplate.planning.repair.changes import Kind, apply_all
+from ballplate.planning.repair.judging import examine, judge
+from ballplate.planning.repair.offers import offers
+from ballplate.planning.repair.repair_tables import repair_lines
+from ballplate.planning.repair.screening import rank_of, seen_by
+from ballplate.planning.repair.search import Repair, Repairs, repairs
+from ballplate.results.study import check
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Experiment, Pool, Position
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analysis.checking import Wanted, check_files
-from analysis.planning.repair.changes import Kind, apply_all
-from analysis.planning.repair.judging import examine, judge
-from analysis.planning.repair.offers import offers
-from analysis.planning.repair.screening import rank_of, seen_by
-from analysis.planning.repair.search import Repair, Repairs, repairs
-from analysis.planning.repair.tables import repair_lines
-from analysis.study import check
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import AtMost, Candidate, ChangeTimes, Pool
-from simulator.layout import lay_out
 from tests.reference import dense
 
 NPL = Path("designs/npl")

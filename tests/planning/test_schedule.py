@@ -9,15 +9,13 @@ from time import process_time
 
 import numpy as np
 import pytest
+from ballplate.planning.changeover import MOST_EXACT, Kind, changeover, cheapest
+from ballplate.planning.schedule import ordered, run_sheet
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
+from ballplate.simulator.geometry.positions import Pose
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from analysis.planning.changeover import MOST_EXACT, Kind, changeover, cheapest
-from analysis.planning.schedule import ordered, run_sheet
-from simulator.experiment.load import load
-from simulator.experiment.model import Position, ReadingGroup
-from simulator.experiment.pool import Candidate, ChangeTimes
-from simulator.geometry.positions import Pose
 
 CHANGES = ChangeTimes(probe=120.0, plane=1800.0)
 

@@ -11,20 +11,18 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from ballplate.planning.bound import bound
+from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.constraints import HOUR, Budget, Constraints, constraints
+from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.planning.information import pool_information
+from ballplate.planning.search import Losses, Problem, improve, starts, value
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import AtMost, Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Array
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-
-from analysis.planning.bound import bound
-from analysis.planning.campaign import Request, campaign
-from analysis.planning.constraints import HOUR, Budget, Constraints, constraints
-from analysis.planning.criteria import CriterionName, criterion, is_about_balls
-from analysis.planning.information import pool_information
-from analysis.planning.search import Losses, Problem, improve, starts, value
-from simulator.experiment.load import load
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import AtMost
-from simulator.machines.protocol import Array
 
 from .small_pool import TEXT
 

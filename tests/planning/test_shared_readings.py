@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from analysis.planning.search import value
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.model import Position
-from simulator.experiment.pool import with_chosen
+from ballplate.planning.search import value
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Position
+from ballplate.simulator.experiment.pool import with_chosen
 
 from .small_pool import TEXT
 from .test_information import problem_of, selections, written
@@ -48,7 +47,7 @@ def test_equal_to_the_full_computation(name: str, tmp_path: Path) -> None:
     with_standards = 0
     for chosen in selections(experiment, 20, 9, 6):
         items = [experiment.pool.candidates[k] for k in chosen]
-        full = plan(with_chosen(experiment, items))
+        full = predict(with_chosen(experiment, items))
         if full.verdict.deficiency:
             continue
         kind, _, largest = name.partition("-")
@@ -67,7 +66,7 @@ def test_positions_that_read_different_balls_are_not_overrated(tmp_path: Path) -
     problem = problem_of(experiment, "U6")
     compared = 0
     for chosen in selections(experiment, 20, 10, 6):
-        full = plan(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
+        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         if not full.verdict.deficiency:
             compared += 1
             expected = full.quantities["U6"].average

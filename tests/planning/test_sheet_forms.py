@@ -10,10 +10,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-
-from analysis.planning.drawings import MARGIN, SIZE, place_drawing
-from analysis.planning.schedule import RunSheet, run_sheet
-from analysis.planning.sheet_forms import (
+from ballplate.planning.drawings import MARGIN, SIZE, place_drawing
+from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.planning.sheet_forms import (
     COLUMNS,
     sheet_csv,
     sheet_data,
@@ -22,9 +21,9 @@ from analysis.planning.sheet_forms import (
     sheet_page,
     summary,
 )
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.positions import ball_coordinates
 
 
 @pytest.fixture(scope="module")

@@ -10,16 +10,16 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from ballplate.planning.campaign import TINY_POOL, Request, campaign
+from ballplate.planning.constraints import Budget, constraints
+from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.planning.information import pool_information
+from ballplate.planning.search import LARGE, SMALL_POOL, Losses, Problem, full_root, value
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment.pool import with_chosen
 
-from analysis.planning.campaign import TINY_POOL, Request, campaign
-from analysis.planning.constraints import Budget, constraints
-from analysis.planning.criteria import CriterionName, criterion, is_about_balls
-from analysis.planning.information import pool_information
-from analysis.planning.search import LARGE, SMALL_POOL, Losses, Problem, full_root, value
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment, Position
-from simulator.experiment.pool import Candidate, with_chosen
-from simulator.layout import lay_out
 from tests.reference import dense
 
 # Of the pairs of its candidates that have both plates some determine everything, and most leave open a direction in

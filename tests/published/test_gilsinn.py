@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.cli import main
+from ballplate.error_curve.error_curve import Curve, CurveSettings, Hold, fit_curve
+from ballplate.simulator.splines.pieces import pieces
+from ballplate.simulator.splines.read import choose_points, read_points
 
-from analysis.cli import main
-from analysis.curve import Curve, CurveSettings, Hold, fit_curve
-from simulator.splines.pieces import pieces
-from simulator.splines.read import choose_points, read_points
 from tests.reference import truncated_powers
 
 OURS, DOCUMENT = Path("designs/gilsinn/table-1.csv"), Path("tests/published/nistir-6517-table1.csv")

@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.reversal import ReversalFit, fit_reversal
-from analysis.study import Fit, fit
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.machines.metric import Scale
-from simulator.readings import read_readings
+from ballplate.estimators.reversal_fits import ReversalFit, fit_reversal
+from ballplate.results.fit import Fit
+from ballplate.results.study import fit
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.machines.metric import Scale
+from ballplate.simulator.readings.reading_files import read_readings
 
 FOLDER = Path("designs/hocken_borchardt")
 INCH = 0.0254

@@ -8,20 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.montecarlo.study import true_experiment
-from analysis.study import fit, plan
-from simulator.design import Design
-from simulator.estimation.length_equations import LengthEstimator, length_estimate
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
-from simulator.generate import exact_readings, noisy_certificate, noisy_readings
-from simulator.geometry.directions import directions
-from simulator.layout import lay_out
-from simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
-from simulator.montecarlo.reference import Truth, reference
-from simulator.montecarlo.replicates import BATCH, estimate_batch
-from simulator.readings import read_readings
+from ballplate.montecarlo.experiments import true_experiment
+from ballplate.results.study import fit, predict
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.directions import directions
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
+from ballplate.simulator.montecarlo.reference import Truth, reference
+from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
+from ballplate.simulator.readings.reading_files import read_readings
 
 FOLDER = Path("designs/hurt_foss")
 NAMES = ("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")
@@ -96,7 +95,7 @@ def test_the_general_estimator_is_unbiased_over_a_thousand_campaigns(file: str, 
     assert len(errors) >= COUNT and all(one.converged.all() for one in batches)
     stated = np.sqrt((shared.spectrum.root[shared.factor.layout.model] ** 2).sum(axis=1))
     assert_unbiased(errors / stated)
-    assert stated.max() == pytest.approx(plan(experiment).quantities["U3"].maximum, rel=1e-3)
+    assert stated.max() == pytest.approx(predict(experiment).quantities["U3"].maximum, rel=1e-3)
 
 
 def assert_unbiased(z: np.ndarray) -> None:
@@ -114,7 +113,7 @@ def test_the_joint_length_equations_are_unbiased_over_a_thousand_campaigns(file:
     errors, stated = campaigns(design, truth, "length-equations", COUNT)
     assert np.abs(errors.mean(axis=0) / (errors.std(axis=0, ddof=1) / np.sqrt(COUNT))).max() < 4.0
     # With weights that are all the same, equal lengths and equal noise, they lose nothing against the general one.
-    found = plan(experiment)
+    found = predict(experiment)
     assert errors.std(axis=0, ddof=1)[3:].max() == pytest.approx(found.quantities["U3 angles"].maximum, rel=0.1)
     # Student's distribution for the few degrees of freedom that the scatter is estimated with; squareness only, as the
     # certificate's error is one of scale.

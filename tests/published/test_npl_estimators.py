@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.estimators import QUANTILES
-from analysis.reproduction.compare import compare_difference
-from analysis.reproduction.published import npl
-from analysis.reproduction.shipped import Shipped
+from ballplate.estimators.distances import QUANTILES
+from ballplate.reproduction.compare import compare_difference
+from ballplate.reproduction.published import npl
+from ballplate.reproduction.shipped import Shipped
 
 
 @pytest.mark.slow

@@ -18,14 +18,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.reproduction.published import npl
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, kinematic_model
+from ballplate.simulator.numerics.threads import single_threaded
 from numpy.typing import NDArray
-
-from analysis.reproduction.published import npl
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import HELD_AT_FAR_END, kinematic_model
-from simulator.threads import single_threaded
 
 Array = NDArray[Any]
 DESIGN = "6.2.3[n=5 NDEL=5 L=0.3]"

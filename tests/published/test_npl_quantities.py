@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ballplate.reproduction.quantities import tabulated_quantities
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
 
-from analysis.reproduction.quantities import tabulated_quantities
-from simulator.experiment.load import load
-from simulator.layout import lay_out
 from tests.reference import dense
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from analysis.reproduction.compare import compare_rank
-from analysis.reproduction.published import npl
-from analysis.reproduction.shipped import Shipped
-from analysis.study import check
-from simulator.experiment.load import load
+from ballplate.reproduction.compare import compare_rank
+from ballplate.reproduction.published import npl
+from ballplate.reproduction.shipped import Shipped
+from ballplate.results.study import check
+from ballplate.simulator.experiment.load import load
 
 STATEMENTS = [(one, design) for one in npl().statements.ranks for design in one.designs]
 # Deficiencies for which the report has no number.

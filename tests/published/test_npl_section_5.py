@@ -11,12 +11,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-
-from analysis.reproduction.compare import compare_progress
-from analysis.reproduction.published import npl
-from analysis.reproduction.shipped import Shipped, fitted_exactly, shipped_experiment, sums_of_squares
-from analysis.study import Fit, check
-from simulator.experiment.load import load
+from ballplate.reproduction.compare import compare_progress
+from ballplate.reproduction.published import npl
+from ballplate.reproduction.shipped import Shipped, fitted_exactly, shipped_experiment, sums_of_squares
+from ballplate.results.fit import Fit
+from ballplate.results.study import check
+from ballplate.simulator.experiment.load import load
 
 
 @cache

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.reproduction.compare import compare_column, compare_erratum, compare_remark
-from analysis.reproduction.published import SYMBOLS, case_of, npl
-from analysis.reproduction.shipped import Shipped, planned
+from ballplate.reproduction.compare import compare_column, compare_erratum, compare_remark
+from ballplate.reproduction.published import SYMBOLS, case_of, npl
+from ballplate.reproduction.shipped import Shipped, planned
 
 
 @pytest.fixture(scope="module")

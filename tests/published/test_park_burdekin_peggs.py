@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.description import (
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.description import (
     AxisTemperature,
     MachineDescription,
     ParametricError,
@@ -25,6 +24,7 @@ from simulator.machines.description import (
     coupling,
     true_volumetric,
 )
+
 from tests.published.rigid_body import tip_error
 
 PRINTED: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("park-burdekin-peggs.yaml").read_text("utf-8"))

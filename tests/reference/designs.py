@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations import Coordinates, Distances, Lengths, Readings
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
 from numpy.typing import NDArray
-
-from simulator.design import Coordinates, Design, Distances, Lengths, Readings
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
 
 Real = NDArray[np.float64]
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
 
 PROBES = {
     "down": ["0 mm", "0 mm", "-50 mm"],

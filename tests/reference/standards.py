@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
 
 PLATE: dict[str, Any] = {
     "title": "a plate and a length standard",

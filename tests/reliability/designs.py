@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from simulator.experiment.load import load
-from simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.model import Experiment
 
 PLATE = """
 title: small

@@ -13,22 +13,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.gross_errors.events import Cause, cause
+from ballplate.gross_errors.power import noncentrality
+from ballplate.gross_errors.search import FAMILY, Search, diagnosis
+from ballplate.gross_errors.suspects import Diagnosis
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.machines.true_machine_settings import RandomSettings
+from ballplate.simulator.machines.truth import TrueMachine, true_machine
+from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.readings.reading_files import observe
 from numpy.typing import NDArray
-
-from analysis.reliability.events import Cause, cause
-from analysis.reliability.power import noncentrality
-from analysis.reliability.search import FAMILY, Search, diagnosis
-from analysis.reliability.suspects import Diagnosis
-from simulator.design import Design, Readings
-from simulator.estimation.gauss_newton import estimate
-from simulator.experiment.load import load
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
-from simulator.machines.true_machine_settings import RandomSettings
-from simulator.machines.truth import TrueMachine, true_machine
-from simulator.readings import observe
 
 Real = NDArray[np.float64]
 Generator = np.random.Generator
@@ -55,7 +55,7 @@ class World:
         plain = self.drawn(self.machine(1), generator)
         solution = estimate(plain.design, plain.x)
         self.freedom = self.design.observations - self.design.parameter_count
-        self.search = Search(plain.design, solution.state, plain.x, self.freedom, True)
+        self.search = Search(linearised_fit(plain.design, solution), plain.x, self.freedom, True)
         self.least = noncentrality(0.5 * FAMILY / self.search.tests, 0.8, self.freedom - 1)
 
     def machine(self, seed: int) -> TrueMachine:
@@ -297,7 +297,7 @@ def draw_one(world: World, make: Draw, seed: int) -> tuple[DataSet, Diagnosis]:
     data = make(world, world.drawn(world.machine(seed), generator), generator)
     observed = observe(data.design, data.readings, data.x)
     solution = estimate(observed.design, observed.x)
-    return data, diagnosis(observed.design, solution, observed.x, world.freedom, True)
+    return data, diagnosis(linearised_fit(observed.design, solution), observed.x, world.freedom, True)
 
 
 def counts(world: World, kind: str, sets: int) -> Counter[str]:

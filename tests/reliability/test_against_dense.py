@@ -8,18 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.patterns import Patterns, patterns
+from ballplate.gross_errors.redundancy import reliability_of
+from ballplate.gross_errors.reliability import Reliability
+from ballplate.simulator.design.arrays import Design, State, nominal_state, probe_offsets
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
+from ballplate.simulator.estimation.hat import row_places, whitened_residuals
+from ballplate.simulator.estimation.observations import expected_readings
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.geometry.motions import rotation_from_vector
 from numpy.typing import NDArray
 
-from analysis.reliability.patterns import Patterns, patterns
-from analysis.reliability.study import Reliability, reliability_of
-from simulator.design import Design, State, nominal_state, probe_offsets
-from simulator.estimation.gauss_newton import gauss_newton, moved
-from simulator.estimation.hat import row_places, whitened_residuals
-from simulator.estimation.observations import expected_readings
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.geometry.motions import rotation_from_vector
-from simulator.layout import lay_out
 from tests.estimation.test_against_dense import certified_coordinates, repeats, with_length_standard
 from tests.reference import dense
 from tests.reliability.designs import MIXED, PLANE, PLATE, experiment

@@ -7,21 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.search import diagnosis
+from ballplate.gross_errors.suspects import Diagnosis, Suspect
+from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
+from ballplate.simulator.estimation.hat import whitened_residuals
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import exact_readings, on_true_machine
+from ballplate.simulator.readings.reading_files import ObservedReadings, observe, read_readings
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from analysis.reliability.search import diagnosis
-from analysis.reliability.suspects import Diagnosis, Suspect
-from analysis.reliability.wording import diagnosis_lines, unexplained_words
-from simulator.design import Design
-from simulator.estimation.gauss_newton import Solution, estimate
-from simulator.estimation.hat import whitened_residuals
-from simulator.estimation.parameters import shared_layout
-from simulator.experiment.load import load
-from simulator.generate import exact_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings, observe, read_readings
 from tests.reliability.designs import PLATE, experiment
 from tests.reliability.test_search import jacobian
 
@@ -40,7 +40,8 @@ def certified(name: str) -> tuple[ObservedReadings, bool]:
 
 def diagnosed(design: Design, x: Real, estimated: bool) -> tuple[Solution, Diagnosis]:
     solution = estimate(design, x)
-    return solution, diagnosis(design, solution, x, design.observations - design.parameter_count, estimated)
+    freedom = design.observations - design.parameter_count
+    return solution, diagnosis(linearised_fit(design, solution), x, freedom, estimated)
 
 
 def with_one_wrong(x: Real, reading: int, axis: int) -> Real:

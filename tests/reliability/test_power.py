@@ -7,26 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.leftover import Columns, leftover
+from ballplate.gross_errors.patterns import Patterns, patterns
+from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentrality
+from ballplate.gross_errors.redundancy import reliability_of
+from ballplate.gross_errors.reliability import Reliability
+from ballplate.gross_errors.search import diagnosis
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
+from ballplate.simulator.estimation.hat import hat_rows, row_places
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation.observations import rotation_sensitivity
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 from numpy.typing import NDArray
 from scipy.special import nctdtr
 from scipy.stats import binom
 
-from analysis.reliability.leftover import Columns, leftover
-from analysis.reliability.patterns import Patterns, patterns
-from analysis.reliability.power import alarm_limit, chance_of_alarm, noncentrality
-from analysis.reliability.search import diagnosis
-from analysis.reliability.study import Reliability, reliability_of
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import covariance, spectrum
-from simulator.estimation.elimination import eliminate
-from simulator.estimation.gauss_newton import Solution, estimate
-from simulator.estimation.hat import hat_rows, row_places
-from simulator.estimation.observations import rotation_sensitivity
-from simulator.estimation.parameters import shared_layout
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import ObservedReadings, observe
 from tests.reliability.designs import MIXED, PLANE, PLATE, experiment
 
 Real = NDArray[np.float64]
@@ -73,12 +72,10 @@ def test_both_tails_count() -> None:
 
 def basis_of(design: Design) -> Real:
     """The columns Q (rows, rank) of the hat matrix's root, dense."""
-    layout, state = shared_layout(design), nominal_state(design)
-    factor = eliminate(design, layout, state)
-    found = covariance(design, factor, spectrum(factor))
-    width, d = found.ball.shape[2], design.dimension
+    linear = linearise(design)
+    width, d = linear.balls.common.shape[2], design.dimension
     basis = np.zeros((len(row_places(design)), width + d * len(design.balls)))
-    for some in hat_rows(design, layout, state, None, found):
+    for some in hat_rows(linear, None):
         basis[some.rows, :width] = some.common
         at = np.flatnonzero(some.ball >= 0)
         columns = width + d * some.ball[at][:, None] + np.arange(d)
@@ -244,7 +241,7 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
                 observed, solution = world.fitted(seed, planned, k, float(planned.detectable[k]))
                 freedom = freedom_of(observed.design)
                 found = patterns(observed.design, solution.state, observed.x)
-                left = leftover(observed.design, solution.state, observed.x, freedom)
+                left = leftover(linearised_fit(observed.design, solution), observed.x, freedom)
                 statistic = Columns(found.matrix, [], left).statistics()[matching(found, planned, k)]
                 limit = alarm_limit(FALSE_ALARM)
                 if estimated:
@@ -276,7 +273,9 @@ def alarms(folder: Path, text: str, fits: int) -> dict[bool, int]:
     for r in range(fits):
         observed, solution = world.fitted(r)
         for estimated in found:
-            told = diagnosis(observed.design, solution, observed.x, freedom_of(observed.design), estimated)
+            told = diagnosis(
+                linearised_fit(observed.design, solution), observed.x, freedom_of(observed.design), estimated
+            )
             found[estimated] += bool(told)
     return found
 

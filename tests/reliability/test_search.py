@@ -7,19 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.leftover import leftover
+from ballplate.gross_errors.scatter import log_chances, ratio, scatters, with_scatter
+from ballplate.gross_errors.search import Search
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import estimate, moved
+from ballplate.simulator.estimation.hat import whitened_residuals
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation.parameters import shared_layout
+from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.readings.reading_files import observe
 from numpy.typing import NDArray
 
-from analysis.reliability.leftover import leftover
-from analysis.reliability.scatter import log_chances, ratio, scatters, with_scatter
-from analysis.reliability.search import Search
-from simulator.design import Design, State
-from simulator.estimation.gauss_newton import estimate, moved
-from simulator.estimation.hat import whitened_residuals
-from simulator.estimation.parameters import shared_layout
-from simulator.generate import noisy_certificate, noisy_readings, on_true_machine
-from simulator.layout import lay_out
-from simulator.machines.truth import true_machine
-from simulator.readings import observe
 from tests.reliability.designs import MIXED, PLANE, experiment
 from tests.reliability.test_against_dense import numeric
 
@@ -74,7 +75,7 @@ def smallest_left(columns: Real, own: Real) -> float:
 @pytest.mark.parametrize("text", [MIXED, PLANE], ids=["mixed", "plane"])
 def test_what_causes_explain_is_what_they_take_away_as_parameters(text: str, tmp_path: Path) -> None:
     design, state, x = fitted(text, tmp_path)
-    search = Search(design, state, x, design.observations - design.parameter_count, True)
+    search = Search(linearise(design, state, x), x, design.observations - design.parameter_count, True)
     matrix = search.patterns.matrix.toarray()
     residual, taken = whitened_residuals(design, shared_layout(design), state, x), jacobian(design, state, x)
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
@@ -102,7 +103,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(text: str, tmp
 
 def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path) -> None:
     design, state, x = fitted(PLANE, tmp_path)
-    search = Search(design, state, x, design.observations - design.parameter_count, True)
+    search = Search(linearise(design, state, x), x, design.observations - design.parameter_count, True)
     residual, taken = whitened_residuals(design, shared_layout(design), state, x), jacobian(design, state, x)
     before, seen = left_by(taken, residual), set()
     # An error in one axis along another has one value for each place on the latter's scale.
@@ -122,7 +123,7 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
 
 def test_scatter_is_hardly_ever_suspected_of_noise(tmp_path: Path) -> None:
     design, state, x = fitted(MIXED, tmp_path)
-    left = leftover(design, state, x, design.observations - design.parameter_count)
+    left = leftover(linearise(design, state, x), x, design.observations - design.parameter_count)
     every, generator, draws, level = scatters(design), np.random.default_rng(2), 2000, 0.01
     alarms = np.zeros(len(every))
     for _ in range(draws):
@@ -138,7 +139,7 @@ def test_weights_that_are_right_leave_no_scatter_over(tmp_path: Path) -> None:
     one = next(one for one in scatters(design) if one.position == 2)
     generator, found = np.random.default_rng(3), []
     for stated in (1.0, 3.0):
-        left = leftover(with_scatter(design, one, stated), state, x, freedom)
+        left = leftover(linearise(with_scatter(design, one, stated), state, x), x, freedom)
         noise = generator.standard_normal((len(left.residual), 400))
         noise[one.rows] *= 3.0 / stated
         drawn = left.of(noise)

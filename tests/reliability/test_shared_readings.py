@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.names import name
+from ballplate.gross_errors.redundancy import reliability_of
+from ballplate.gross_errors.reliability import write_observations
+from ballplate.gross_errors.search import diagnosis
+from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
+from ballplate.simulator.estimation.observations import expected_readings
 from numpy.typing import NDArray
 
-from analysis.reliability.names import name
-from analysis.reliability.search import diagnosis
-from analysis.reliability.study import reliability_of
-from analysis.reliability.tables import reliability_data, write_observations
-from simulator.design import Design, nominal_state
-from simulator.estimation.gauss_newton import gauss_newton
-from simulator.estimation.observations import expected_readings
-from simulator.layout import lay_out
 from tests.reference import dense
 from tests.reference.standards import bar, experiment, flat
 from tests.reliability.test_against_dense import distances_of, orthonormal
@@ -108,7 +108,7 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)
     freedom = design.observations - design.parameter_count
-    (first,) = diagnosis(design, solution, x, freedom, sigma_is_estimated=False).suspects
+    (first,) = diagnosis(linearised_fit(design, solution), x, freedom, sigma_is_estimated=False).suspects
     given, k = first.patterns, first.pattern
     assert (given.kind[k], int(given.subject[k])) == ("end", wrong)
     along_x = next(i for i, column in enumerate(first.columns) if given.axis[column] == 0)
@@ -120,7 +120,7 @@ def test_tables_hold_the_readings_of_standards(tmp_path: Path) -> None:
     stream = io.StringIO()
     write_observations(stream, result)
     rows = [row for row in csv.DictReader(io.StringIO(stream.getvalue())) if row["kind"] == "end"]
-    told = [one for one in reliability_data(result)["observations_by_name"] if one["kind"] == "end"]
+    told = [one for one in result.to_dict()["observations_by_name"] if one["kind"] == "end"]
     ends = result.patterns.of_kind("end")
     assert len(rows) == len(told) == len(ends) == 15
     for row, one, k in zip(rows, told, ends.tolist(), strict=True):

@@ -5,9 +5,8 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from ballplate.gross_errors.tails import log_chance, normal_equivalent
 from scipy.stats import chi2, f, norm
-
-from analysis.reliability.tails import log_chance, normal_equivalent
 
 
 @pytest.mark.parametrize("dimensions", [1.0, 3.0, 6.0, 50.0])

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
+from ballplate.cli import main
 
 
 @pytest.fixture(scope="session")

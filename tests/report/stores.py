@@ -8,8 +8,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from analysis.sweeps.store import Store, add_rows, add_sweep, open_store
-from analysis.sweeps.task import Row
+from ballplate.sweeps.store import Store, add_rows, add_sweep, open_store
+from ballplate.sweeps.task import Row
 
 VERSIONS = (("ballplate", "0.1.0"), ("python", "3.11"))
 VOID = {"meta", "link", "br", "hr", "img", "input", "col"}

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.planning.campaign import Campaign, CurvePoint, Gain
-from analysis.planning.constraints import Budget, Spent
-from analysis.report.campaign import draw_campaign, words
-from analysis.study import plan
-from simulator.experiment.load import load
-from simulator.experiment.pool import with_chosen
+from ballplate.planning.choice import CurvePoint, Gain
+from ballplate.planning.constraints import Budget, Spent
+from ballplate.planning.selection import Campaign
+from ballplate.report.campaign import draw_campaign, words
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.pool import with_chosen
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
@@ -37,7 +37,7 @@ def found() -> Campaign:
     )
     return Campaign(
         experiment, pool, "U6", "m", 0, Budget(4 * 3600.0), chosen, (), Spent(14000.0, 175, 5), 6e-7, 4e-7, 1.2e-6,
-        "as drawn", Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, plan(with_chosen(experiment, chosen)), curve,
+        "as drawn", Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, predict(with_chosen(experiment, chosen)), curve,
     )  # fmt: skip
 
 

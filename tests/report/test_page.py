@@ -9,17 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from ballplate.cli import main
+from ballplate.report.cells import NoExperimentError, experiments
+from ballplate.report.page import page
+from ballplate.report.results import read_results
+from ballplate.report.verdicts import ranks
+from ballplate.report.volume import error_map
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.sweeps.frame import frame
+from ballplate.sweeps.store import open_store
 
-from analysis.cli import main
-from analysis.report.cells import NoExperimentError, experiments
-from analysis.report.page import page
-from analysis.report.results import read_results
-from analysis.report.verdicts import ranks
-from analysis.report.volume import error_map
-from analysis.study import plan
-from analysis.sweeps.frame import frame
-from analysis.sweeps.store import open_store
-from simulator.experiment.load import load
 from tests.report.stores import Page, axis, done, failed, made_up
 
 
@@ -158,7 +158,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     mark = tmp_path / "has run"
     module = (
         "from pathlib import Path\n"
-        "from simulator.machines.settings import KinematicSettings, build_error_model\n"
+        "from ballplate.simulator.machines.settings import KinematicSettings, build_error_model\n"
         "def build(lower, upper):\n"
         f"    Path({str(mark)!r}).touch()\n"
         "    return build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower, upper)\n"
@@ -170,13 +170,13 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     store = made_up(tmp_path / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)])
     contents = {"made-up.yaml": own, "base.yaml": base, "own_model.py": module}
     rows = [(1, name, content.encode()) for name, content in contents.items()]
-    store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+    store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
     assert "is run only with --run-modules" in report(store.path)
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
     page_file = tmp_path / "own.html"
-    command = [sys.executable, "-m", "analysis.cli", "report", store.path, "--run-modules", "-o", page_file]
+    command = [sys.executable, "-m", "ballplate", "report", store.path, "--run-modules", "--force", "-o", page_file]
     subprocess.run(command, check=True)
     assert mark.exists() and "cannot be drawn" not in page_file.read_text(encoding="utf-8")
 
@@ -187,7 +187,7 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
         with store.connection:
             store.connection.execute("DELETE FROM bundle")
             rows = [(1, "made-up.yaml", b""), (1, "base.yaml", b""), (1, name, b"x")]
-            store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+            store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
         with pytest.raises(NoExperimentError, match="leads out of the folder"):
             experiments(store, read_results(store, 1), [0])
         assert not (tmp_path / "out.yaml").exists()
@@ -202,7 +202,7 @@ def test_a_base_other_than_the_one_told_is_not_loaded(tmp_path: Path) -> None:
     with store.connection:
         store.connection.execute("DELETE FROM bundle")
         rows = [(1, "made-up.yaml", sweep), (1, "base.yaml", good), (1, "evil.yaml", evil)]
-        store.connection.executemany("INSERT INTO bundle VALUES (?, ?, ?)", rows)
+        store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     sys.modules.pop("this", None)
     (found,) = experiments(store, read_results(store, 1), [0])
     assert found.error_model.kind == "kinematic" and "this" not in sys.modules
@@ -214,7 +214,7 @@ def test_the_error_map_is_u4_on_a_grid() -> None:
     corners = [one.values for one in found.slices]
     # All errors are zero at the lower corner, as far as the probe does not turn.
     assert corners[0][0, 0] < 1e-9
-    average = plan(experiment).quantities["U4"].average
+    average = predict(experiment).quantities["U4"].average
     assert 0.5 * average < sum(values.mean() for values in corners) / 3 < 2.0 * average
     assert found.within is not None and 0.99 < found.within <= 1.0
 

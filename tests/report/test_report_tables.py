@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.cli import main
+from ballplate.report.heatmaps import SHADES, heat_maps
+from ballplate.report.results import best_and_worst, read_results
+from ballplate.report.series import plots
+from ballplate.report.tables import MOST_BEST, MOST_ROWS, report_tables
+from ballplate.results.formats import FORMATS
+from ballplate.sweeps.store import Store
 
-from analysis.cli import main
-from analysis.report.formats import FORMATS
-from analysis.report.heatmaps import SHADES, heat_maps
-from analysis.report.results import best_and_worst, read_results
-from analysis.report.series import plots
-from analysis.report.tables import MOST_BEST, MOST_ROWS, report_tables
-from analysis.sweeps.store import Store
 from tests.report.stores import axis, done, failed, made_up
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -131,7 +131,7 @@ def test_the_command_writes_tables(small: Store, capsys: pytest.CaptureFixture[s
 
 def test_wrong_usage_is_told(small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["report", str(small.path), "-o", str(small.path)]) == 2
-    assert "is the store itself" in capsys.readouterr().err
+    assert "would overwrite" in capsys.readouterr().err
     assert main(["report", str(small.path), "--sweep", "7", "--format", "text"]) == 3
     assert "there is no such sweep; it has 1" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "none.sqlite"), "--format", "text"]) == 3

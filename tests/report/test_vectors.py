@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from analysis.cli import main
-from analysis.report.vectors import LONGEST, Vectors, draw_vectors, magnification, of_fit, of_reversal
-from analysis.reversal import fit_reversal
-from analysis.study import fit
-from simulator.experiment.load import load
-from simulator.layout import lay_out
-from simulator.readings import read_readings
+from ballplate.cli import main
+from ballplate.estimators.reversal_fits import fit_reversal
+from ballplate.report.vectors import LONGEST, Vectors, draw_vectors, magnification
+from ballplate.results.study import fit
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.readings.reading_files import read_readings
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
@@ -26,14 +25,14 @@ def test_vectors_are_the_residuals() -> None:
     experiment = load(FOLDER / "real.yaml")[0]
     observed = read_readings(FOLDER / "real-readings.csv", lay_out(experiment))
     found = fit(experiment, observed)
-    turned, first = of_fit(found, observed)
+    turned, first = found.residual_vectors()
     assert (turned.label, first.label) == ("turned", "first") and turned.residuals.shape == (13, 2)
     every = np.concatenate([turned.residuals, first.residuals])
     assert np.abs(every).max() == pytest.approx(abs(found.largest[0].value))
     assert (every**2).sum() / 0.0254e-6**2 == pytest.approx(found.solution.factor.sum_of_squares)
     np.testing.assert_array_equal(first.places, observed.x[observed.design.readings.position == 1])
     # The reversal has the residuals of both positions in the first: as much each, and so twice as much there.
-    (both,) = of_reversal(fit_reversal(experiment, observed))
+    (both,) = fit_reversal(experiment, observed).residual_vectors()
     np.testing.assert_array_equal(both.places, first.places)
     np.testing.assert_allclose(both.residuals, 2 * first.residuals, rtol=0, atol=5e-9)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from analysis.sweeps.schema import schema as sweep_schema
-from simulator.experiment.schema import schema
+from ballplate.simulator.experiment.schema import schema
+from ballplate.sweeps.schema import schema as sweep_schema
+
 from tests.robustness.mutations import vocabulary
 from tests.robustness.worker import complaint
 

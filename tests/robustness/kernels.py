@@ -18,7 +18,7 @@ def architectures() -> list[str]:
 
 def outcome(arguments: list[str]) -> tuple[int, str, str]:
     """Status, standard output and standard error of a command."""
-    from analysis.cli import main
+    from ballplate.cli import main
 
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):

@@ -407,7 +407,12 @@ def changed_text(random: Random, content: bytes) -> tuple[str, bytes]:
 @cache
 def _read(path: Path) -> tuple[bytes, str]:
     content = path.read_bytes()
-    return content, json.dumps(yaml.load(content, Loader=yaml.SafeLoader), default=str)
+    return content, tree_of(content)
+
+
+def tree_of(content: bytes) -> str:
+    """What a YAML file means, as JSON."""
+    return json.dumps(yaml.load(content, Loader=yaml.SafeLoader), default=str)
 
 
 def mutant(files: Sequence[Path], words: Vocabulary, seed: int, number: int) -> Mutant:
@@ -415,6 +420,12 @@ def mutant(files: Sequence[Path], words: Vocabulary, seed: int, number: int) -> 
     random = Random(f"{seed}-{number}")
     origin = random.choice(files)
     content, tree_text = _read(origin)
+    changes, content = changed_yaml(random, content, tree_text, words)
+    return Mutant(origin, number, tuple(changes), content)
+
+
+def changed_yaml(random: Random, content: bytes, tree_text: str, words: Vocabulary) -> tuple[list[str], bytes]:
+    """A file with one to three changes, and what these are; `tree_text` is JSON of what the file means."""
     changes = []
     if random.random() < 0.65:
         tree = json.loads(tree_text)
@@ -436,7 +447,7 @@ def mutant(files: Sequence[Path], words: Vocabulary, seed: int, number: int) -> 
         for _ in range(random.choice((1, 1, 2))):
             name, content = changed_text(random, content)
             changes.append(name)
-    return Mutant(origin, number, tuple(changes), content)
+    return changes, content
 
 
 def mutants(files: Sequence[Path], words: Vocabulary, seed: int, numbers: range) -> Iterator[Mutant]:
@@ -538,12 +549,18 @@ def table_mutants(tables: Sequence[Path], seed: int, numbers: range) -> Iterator
     for number in numbers:
         random = Random(f"{seed}-{number}")
         origin = random.choice(tables)
-        content, changes = origin.read_bytes(), list[str]()
-        for _ in range(random.choice((1, 1, 2))):
-            every = TABLE_CHANGES if random.random() < 0.7 else TEXT_CHANGES
-            changes.append(random.choice(list(every)))
-            content = every[changes[-1]](random, content)[:MOST_BYTES]
+        changes, content = changed_table(random, origin.read_bytes())
         yield Mutant(origin, number, tuple(changes), content)
+
+
+def changed_table(random: Random, content: bytes) -> tuple[list[str], bytes]:
+    """A comma-separated table with one change or two, and what these are."""
+    changes = list[str]()
+    for _ in range(random.choice((1, 1, 2))):
+        every = TABLE_CHANGES if random.random() < 0.7 else TEXT_CHANGES
+        changes.append(random.choice(list(every)))
+        content = every[changes[-1]](random, content)[:MOST_BYTES]
+    return changes, content
 
 
 def trees(words: Vocabulary) -> st.SearchStrategy[Any]:

@@ -11,14 +11,14 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 from unicodedata import category
 
-Trial = Callable[[Path], str | None]
-"""Tries a file and says what is wrong with what came of it, None where nothing is."""
+Trial = Callable[[Any], str | None]
+"""Tries a file, or a command, and says what is wrong with what came of it, None where nothing is."""
 
 GIGABYTE = 2**30
 WAIT = 6.0
@@ -26,19 +26,22 @@ WAIT = 6.0
 # Control characters, half characters, and ends of lines and paragraphs.
 CONTROL = ("Cc", "Cs", "Zl", "Zp")
 
+# Of an error in a file after its name: where, what, and what would be right, which what was expected is.
+FORM = r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*"
+
 
 class OutOfTimeError(BaseException):
     """A trial takes too long; derived so that nothing under test takes it for an error of its own."""
 
 
-def outcome(arguments: Sequence[str]) -> tuple[int, str, str]:
-    """Status, standard output and standard error of a command."""
-    from analysis.cli import main
+def outcome(arguments: Sequence[str], folder: Path = Path()) -> tuple[int, str, str]:
+    """Status, standard output and standard error of a command that is given in a folder."""
+    from ballplate.cli import main
 
     # Encoded as a terminal's, so that what cannot be encoded shows.
     out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
     err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", errors="backslashreplace")
-    with redirect_stdout(out), redirect_stderr(err):
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
         try:
             status = main(arguments)
         except SystemExit as left:
@@ -59,27 +62,24 @@ def complaint(arguments: Sequence[str], files: Path) -> str | None:
         return f"status 3 with output: {out[:500]}"
     # Every kind of line end counts.
     lines = err.splitlines()
-    # What was expected is what would be right.
-    form = re.compile(
-        re.escape(str(files))
-        + r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*"
-    )
+    form = re.compile(re.escape(str(files)) + FORM)
     ill = [line for line in lines if not form.fullmatch(line) or any(category(letter) in CONTROL for letter in line)]
     if not lines:
         return "status 3, and no error"
     return f"not in the stated form: {ill[0][:600]!r}" if ill else None
 
 
-def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) -> None:
+def _serve(connection: Connection, trial: Trial, memory: int) -> None:
     """Try files until told to end. What was imported before is not counted, what is used together is."""
-    import analysis.estimators
-    import analysis.montecarlo.study
-    import analysis.study  # noqa: F401
+    import ballplate.estimators.distances
+    import ballplate.montecarlo.experiments
+    import ballplate.results.study  # noqa: F401
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGPROF, _out_of_time)
     warnings.simplefilter("error")
-    trial(Path(connection.recv()))
+    for request in connection.recv():
+        trial(request)
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         resident = _peak()
@@ -88,12 +88,10 @@ def _serve(connection: Connection, trial: Trial, seconds: float, memory: int) ->
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
     connection.send(None)
     while True:
-        path = connection.recv()
-        if path is None:
-            return
+        request, seconds = connection.recv()
         signal.setitimer(signal.ITIMER_PROF, seconds)
         try:
-            found = trial(Path(path))
+            found = trial(request)
         except OutOfTimeError:
             found = f"more than {seconds} s of processor time:\n{traceback.format_exc()[-3000:]}"
         except BaseException:
@@ -117,13 +115,13 @@ def _out_of_time(*_: Any) -> None:
 
 
 class Worker:
-    """A process that tries one file after the other; `warm_up` is a good file, tried before bounds are set.
+    """A process that tries one request after the other; those of `warm_up` are good, and tried before bounds are set.
 
     `seconds` are of processor time, which does not depend on what else the computer does; the process is waited for
     six times as long.
     """
 
-    def __init__(self, trial: Trial, warm_up: Path, seconds: float = 10.0, memory: int = GIGABYTE) -> None:
+    def __init__(self, trial: Trial, warm_up: Sequence[Any], seconds: float = 10.0, memory: int = GIGABYTE) -> None:
         self.trial, self.warm_up, self.seconds, self.memory = trial, warm_up, seconds, memory
         self.peak = 0
         self._start()
@@ -131,19 +129,23 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, other = context.Pipe()
-        arguments = (other, self.trial, self.seconds, self.memory)
+        arguments = (other, self.trial, self.memory)
         self.process = context.Process(target=_serve, args=arguments, daemon=True)
         self.process.start()
         other.close()
-        self.connection.send(str(self.warm_up))
+        self.connection.send(list(self.warm_up))
         self.connection.recv()
 
-    def __call__(self, path: Path) -> str | None:
-        """What is wrong with what comes of a file; a process that does not answer any more is replaced."""
-        self.connection.send(str(path))
+    def __call__(self, request: Any, seconds: float | None = None) -> str | None:
+        """What is wrong with what comes of a request, for which there may be more time than for others.
+
+        A process that does not answer any more is replaced.
+        """
+        seconds = seconds or self.seconds
+        self.connection.send((request, seconds))
         found: str | None
         try:
-            if self.connection.poll(WAIT * self.seconds):
+            if self.connection.poll(WAIT * seconds):
                 found, peak = self.connection.recv()
                 self.peak = max(self.peak, peak)
                 if peak > self.memory:
@@ -152,7 +154,7 @@ class Worker:
                     self._start()
                     found = found or f"{peak / GIGABYTE:.2f} GB of memory"
                 return found
-            found = f"no answer after {WAIT * self.seconds} s"
+            found = f"no answer after {WAIT * seconds} s"
         except EOFError:
             found = "the process has died"
         self._stop()

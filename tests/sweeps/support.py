@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pandas
-
-from analysis.sweeps.frame import frame
-from analysis.sweeps.store import open_store
+from ballplate.sweeps.frame import frame
+from ballplate.sweeps.store import open_store
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,7 +35,7 @@ def small_sweep(folder: Path, count: int, more: str = "") -> Path:
 
 
 def command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "analysis.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "ballplate", *map(str, arguments)]
 
 
 def hearing_interruptions() -> None:

@@ -6,13 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
-from analysis.sweeps import bundle as bundles
-from analysis.sweeps.bundle import bundle_of
-from analysis.sweeps.load import load_sweep
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.yamltree import read_tree
+from ballplate.cli import main
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import read_tree
+from ballplate.sweeps import bundle as bundles
+from ballplate.sweeps.bundle import bundle_of
+from ballplate.sweeps.load import load_sweep
 
 EXPERIMENT = """\
 title: "../secret/id_rsa"

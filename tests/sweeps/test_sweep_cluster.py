@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -28,7 +29,14 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """Address of a scheduler, and the process that looks after its two workers."""
     with (tmp_path / "log").open("wb") as log:
         file = tmp_path / "scheduler.json"
-        quiet = {"stdout": log, "stderr": log, "cwd": ROOT}
+        temporary = tmp_path / "temporary"
+        temporary.mkdir()
+        quiet: dict[str, Any] = {
+            "stdout": log,
+            "stderr": log,
+            "cwd": ROOT,
+            "env": {**os.environ, "TMPDIR": str(temporary)},
+        }
         arguments = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
         scheduler = subprocess.Popen([sys.executable, "-m", "distributed.cli.dask_scheduler", *arguments], **quiet)
         options = ["--scheduler-file", str(file), "--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
@@ -80,6 +88,8 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     assert process.returncode == 1 and "24 cells, 18 done, 6 failed" in out, err
     assert "Traceback" not in err
     assert_same(rows(tmp_path / "small.sqlite"), rows(tmp_path / "alone.sqlite"))
+    # What is unpacked is in the folders of the workers, which dask deletes whatever ends them.
+    assert not list((tmp_path / "temporary").glob("ballplate-*"))
 
 
 def test_no_scheduler(tmp_path: Path) -> None:

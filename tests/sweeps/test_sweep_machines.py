@@ -6,12 +6,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-
-from analysis.cli import main
-from analysis.sweeps.bundle import bundle_of, unpack
-from analysis.sweeps.fingerprint import fingerprint
-from analysis.sweeps.load import experiment_of, load_sweep
-from simulator.experiment.load import load
+from ballplate.cli import main
+from ballplate.simulator.experiment.load import load
+from ballplate.sweeps.bundle import bundle_of, unpack
+from ballplate.sweeps.fingerprint import fingerprint
+from ballplate.sweeps.load import experiment_of, load_sweep
 
 SWEEP = """\
 title: with a machine file

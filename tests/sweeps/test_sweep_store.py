@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import shutil
 import sqlite3
@@ -11,16 +12,15 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
-
-from analysis.cli import main
-from analysis.montecarlo.study import trials
-from analysis.study import plan
-from analysis.sweeps.fingerprint import fingerprint
-from analysis.sweeps.load import experiment_of, load_sweep
-from analysis.sweeps.model import Sweep
-from analysis.sweeps.store import all_details, files, keys, open_store, results, sweeps
-from analysis.sweeps.task import BLOCK, Row, Task, compute
-from simulator.experiment.load import load
+from ballplate.cli import main
+from ballplate.montecarlo.experiments import trials
+from ballplate.results.study import predict
+from ballplate.simulator.experiment.load import load
+from ballplate.sweeps.fingerprint import fingerprint
+from ballplate.sweeps.load import experiment_of, load_sweep
+from ballplate.sweeps.model import Sweep
+from ballplate.sweeps.store import files, keys, open_store, results, sweeps
+from ballplate.sweeps.task import BLOCK, Row, Task, compute
 
 from .support import ROOT, assert_same, command, rows, run, small_sweep
 
@@ -42,7 +42,7 @@ def test_figures_are_those_of_the_experiments(tmp_path: Path, capsys: pytest.Cap
     assert table["status"].tolist() == ["done"] * 6 + ["failed"] * 2
     for k in (0, 5):
         experiment = experiment_of(loaded, k)
-        expected = plan(experiment).quantities
+        expected = predict(experiment).quantities
         assert table["U4_maximum_m"][k] == expected["U4"].maximum
         assert table["U5_average_m"][k] == expected["U5"].average
         outcome = trials(experiment, 64, int(table["data_set_seed"][k])).outcome
@@ -60,7 +60,7 @@ def test_a_second_run_computes_nothing(
 ) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path) == 1
-    monkeypatch.setattr("analysis.sweeps.local.compute", None)
+    monkeypatch.setattr("ballplate.sweeps.local.compute", None)
     capsys.readouterr()
     assert sweep(path) == 1
     assert capsys.readouterr().out == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
@@ -74,6 +74,9 @@ def made_by_the_first_method(path: Path) -> None:
     for key, figures in connection.execute("SELECT key, figures FROM result").fetchall():
         wrong = np.full(len(figures) // 8, 17.0, "<f8").tobytes()
         connection.execute("UPDATE result SET figures = ? WHERE key = ?", [wrong, key])
+    for table in ("cell", "result"):
+        # Of that time there are no digests.
+        connection.execute(f"UPDATE {table} SET digest = NULL")
     connection.close()
 
 
@@ -117,7 +120,7 @@ def test_an_interrupted_run_leaves_no_rows_of_two_methods(tmp_path: Path, monkey
         return compute(loaded, task)
 
     with monkeypatch.context() as patched:
-        patched.setattr("analysis.sweeps.local.compute", second_fails)
+        patched.setattr("ballplate.sweeps.local.compute", second_fails)
         assert sweep(path) == 130
     assert_same(rows(store), right[:1].reset_index(drop=True))
     sweep(path)
@@ -170,7 +173,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
             base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
         return compute(loaded, task)
 
-    monkeypatch.setattr("analysis.sweeps.local.compute", changing)
+    monkeypatch.setattr("ballplate.sweeps.local.compute", changing)
     assert sweep(path) == 3
     assert "have been changed while it ran" in capsys.readouterr().err
     # What was computed before the change is there, and nothing else.
@@ -191,7 +194,7 @@ def test_what_two_sweeps_share_is_computed_once(tmp_path: Path, monkeypatch: pyt
         done.append(task)
         return compute(loaded, task)
 
-    monkeypatch.setattr("analysis.sweeps.local.compute", counted)
+    monkeypatch.setattr("ballplate.sweeps.local.compute", counted)
     sweep(path, "--beside")
     # What is no valid experiment is judged anew.
     assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
@@ -208,7 +211,7 @@ def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
     assert sweep(path) == 0
     store = open_store(tmp_path / "small.sqlite")
     assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
-    assert "undetermined" in dict(all_details(store, 1))[0]
+    assert "undetermined" in results(store, 1).details[0]
     store.close()
     (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8")
     assert sweep(path) == 3
@@ -217,7 +220,7 @@ def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
 def test_replicates_in_blocks_are_the_same_replicates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
     assert BLOCK % 512 == 0
-    monkeypatch.setattr("analysis.sweeps.task.BLOCK", 512)
+    monkeypatch.setattr("ballplate.sweeps.task.BLOCK", 512)
     assert sweep(path) == 1
     split = rows(tmp_path / "small.sqlite")
     monkeypatch.undo()
@@ -290,10 +293,12 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
     for name in ("t.csv", "t.parquet"):
         assert main(["export", str(store), "-o", str(tmp_path / name)]) == 0
-    csv = pandas.read_csv(tmp_path / "t.csv")
+    # Not with pandas, some versions of which do not read every number to the last bit.
+    with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
+        written = list(csv.DictReader(stream))
     parquet = pandas.read_parquet(tmp_path / "t.parquet")
     for name in table.select_dtypes("float"):
-        np.testing.assert_array_equal(csv[name], table[name])
+        np.testing.assert_array_equal([float(row[name] or "nan") for row in written], table[name])
         np.testing.assert_array_equal(parquet[name], table[name])
     assert main(["export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
     assert main(["export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
@@ -303,8 +308,8 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 MODEL = """
-from simulator.machines.arrangement import ARRANGEMENTS
-from simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.kinematic import kinematic_model
 from NAME_helper import SIZE
 
 
@@ -397,3 +402,27 @@ def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
     path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\nrecord: [U5]\n", encoding="utf-8")
     assert sweep(path) == 0
     assert rows(tmp_path / "small.sqlite")["noise"].tolist() == [str(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("place", "size", "told"),
+    [
+        ("predict", (1 << 58,), "it needs more memory than there is: there is no room for another 2.00 EiB; "),
+        ("experiment_of", (), "it needs more memory than there is; "),
+        ("trials", (1 << 58,), "it needs more memory than there is: there is no room for another 2.00 EiB; "),
+    ],
+)
+def test_a_cell_that_finds_no_memory_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, size: tuple[int, ...], told: str
+) -> None:
+    loaded = load_sweep(small_sweep(tmp_path, 2, "trials: 10\n"))
+
+    def finds_none(*_: object) -> None:
+        for each in size:
+            np.empty(each)
+        raise MemoryError
+
+    monkeypatch.setattr(f"ballplate.sweeps.task.{place}", finds_none)
+    row = compute(loaded, Task(0))
+    assert row.status == "failed"
+    assert row.reason == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"

@@ -8,21 +8,20 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     CoordinateCalibration,
     DistanceCalibration,
     Experiment,
     Indices,
     RadiusCalibration,
 )
-from simulator.geometry.artefacts import (
+from ballplate.simulator.geometry.artefacts import (
     BallLayout,
     BryanGaugeSettings,
     TwoSpheresSettings,
     pairs,
 )
-from simulator.quantities import LengthFunction, format_length
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length
 
 from .changes import (
     Change,

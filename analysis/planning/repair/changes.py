@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     Calibration,
     CoordinateCalibration,
     DistanceCalibration,
@@ -18,9 +17,9 @@ from simulator.experiment.model import (
     ReadingGroup,
     Volume,
 )
-from simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
-from simulator.geometry.positions import Pose, ball_coordinates
-from simulator.machines.protocol import Array
+from ballplate.simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
+from ballplate.simulator.geometry.positions import Pose, ball_coordinates
+from ballplate.simulator.machines.protocol import Array
 
 
 class Kind(IntEnum):

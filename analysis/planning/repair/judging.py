@@ -7,19 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.rounding import above, comparable
 
-from simulator.design import Design, nominal_state
-from simulator.estimation.covariance import Covariance, Spectrum, covariance, spectrum
-from simulator.estimation.elimination import Factor, eliminate
-from simulator.estimation.parameters import SharedLayout, shared_layout
-from simulator.experiment.messages import ExperimentError
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import placed_only
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
-from simulator.rounding import above, comparable
-
-from ...rank import effects, weak_limit
+from ...rank.verdict import effects, weak_limit
 from .changes import Change, apply_all
 
 # Part of a null direction that counts as its being there, and not rounding.
@@ -55,20 +51,17 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A design with its factor and spectrum."""
+    """An experiment and its design, linearised."""
 
     experiment: Experiment
-    design: Design
-    layout: SharedLayout
-    factor: Factor
-    spectrum: Spectrum
+    at: Linearisation
 
     @cached_property
     def judged(self) -> Judged:
         """The summary."""
-        found, model = self.spectrum, self.layout.model
-        effect = effects(self.design, self.layout, found)
-        limit = weak_limit(self.design, self.experiment.target_accuracy)
+        found, model = self.at.spectrum, self.at.layout.model
+        effect = effects(self.at)
+        limit = weak_limit(self.at.design, self.experiment.target_accuracy)
         return Judged(
             found.deficiency,
             int(above(effect, limit).sum()),
@@ -78,21 +71,13 @@ class Examined:
             found.null[model] / found.scale[model, None],
         )
 
-    @cached_property
-    def spread(self) -> Covariance:
-        """How balls follow null directions."""
-        return covariance(self.design, self.factor, self.spectrum)
-
 
 def examine(experiment: Experiment) -> Examined:
     """Rank of an experiment's design in full, without what only its pool places.
 
     :raises ExperimentError: the design cannot be laid out.
     """
-    design = lay_out(placed_only(experiment))
-    layout = shared_layout(design)
-    factor = eliminate(design, layout, nominal_state(design))
-    return Examined(experiment, design, layout, factor, spectrum(factor))
+    return Examined(experiment, linearise(lay_out(placed_only(experiment))))
 
 
 def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | None:
@@ -105,7 +90,7 @@ def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | No
 
 def work(base: Examined) -> float:
     """Size of one judgement: observations times shared parameters."""
-    return float(base.design.observations * len(base.layout))
+    return float(base.at.design.observations * len(base.at.layout))
 
 
 def removed(before: Array, after: Array) -> tuple[int, ...]:

@@ -7,14 +7,19 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     Experiment,
 )
-from simulator.geometry.artefacts import (
+from ballplate.simulator.geometry.artefacts import (
     GridSettings,
     SquareSettings,
 )
-from simulator.machines.settings import EmpiricalSettings, KinematicSettings, MachineFileSettings, SplineSettings
+from ballplate.simulator.machines.settings import (
+    EmpiricalSettings,
+    KinematicSettings,
+    MachineFileSettings,
+    SplineSettings,
+)
 
 from .changes import (
     Change,

@@ -7,17 +7,16 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     Experiment,
     Position,
 )
-from simulator.geometry.artefacts import (
+from ballplate.simulator.geometry.artefacts import (
     TwoSpheresSettings,
 )
-from simulator.geometry.positions import AXIS_INDEX, QUARTER_TURNS
-from simulator.machines.protocol import Array
-from simulator.quantities import format_length
+from ballplate.simulator.geometry.positions import AXIS_INDEX, QUARTER_TURNS
+from ballplate.simulator.inputs.quantities import format_length
+from ballplate.simulator.machines.protocol import Array
 
 from .changes import (
     Change,

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     Experiment,
+    Pool,
     Position,
 )
-from simulator.experiment.pool import Pool, placed_only
+from ballplate.simulator.experiment.pool import placed_only
 
 from .certificates import better_certificates, certificates
 from .changes import (

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     Experiment,
 )
-from simulator.geometry.artefacts import (
+from ballplate.simulator.geometry.artefacts import (
     BallLayout,
 )
-from simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array
 
-from ...bar_cures import bar_directions
+from ...rank.proposed_bars import bar_directions
 
 
 def bars(d: int) -> Iterator[tuple[str, Array]]:

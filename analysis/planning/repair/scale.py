@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import placed_only
-from simulator.threads import single_threaded
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.numerics.threads import single_threaded
 
-from ...scale import OFFSET_TRIAL, Scale, lengths_with_offsets
+from ...uncertainty.scale import OFFSET_TRIAL, Scale, lengths_with_offsets
 from .certificates import certificates
 from .changes import Change
 from .written import Edit, edits

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from simulator.design import nominal_state
-from simulator.estimation.observations import reading_blocks
-from simulator.experiment.model import DistanceCalibration, Position
-from simulator.experiment.pool import placed_only
-from simulator.layout import lay_out
-from simulator.machines.protocol import Array
+from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.observations import reading_blocks
+from ballplate.simulator.experiment.model import DistanceCalibration, Position
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.machines.protocol import Array
 
 from .changes import Change
 from .judging import Examined
@@ -29,7 +28,7 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
     read already are left out. A set of changes removes as many directions as the rank of its triangles together.
     """
     found: dict[Change, Array] = {}
-    if not base.spectrum.deficiency:
+    if not base.at.deficiency:
         return found
     experiment = base.experiment
     plates = {place.artefact for place in experiment.positions if experiment.artefacts[place.artefact].role == "plate"}
@@ -46,19 +45,19 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
 
 
 def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
-    design = base.design
+    design = base.at.design
     own = np.flatnonzero(design.ball_artefact == design.artefact_names.index(item.artefact))[item.pairs]
     along = design.balls[own[:, 0]] - design.balls[own[:, 1]]
     along[:, item.dimensions :] = 0.0
     along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]
-    moved = base.spread.ball_null[own]
+    moved = base.at.ball_null[own]
     return _triangle(np.einsum("md,mdk->mk", along, moved[:, 0] - moved[:, 1]))
 
 
 def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, Array]:
     if not added:
         return {}
-    experiment, null, layout = base.experiment, base.spectrum.null, base.layout
+    experiment, null, layout = base.experiment, base.at.shared_null, base.at.layout
     own = len(experiment.positions)
     together = replace(
         experiment,
@@ -76,7 +75,7 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
     for k, change in enumerate(added, start=own):
         readings = extended.readings.select(order[first[k] : first[k + 1]])
         blocks = reading_blocks(extended, state, readings, None)
-        rows = blocks.by_model @ null[layout.model] + blocks.by_ball @ base.spread.ball_null[readings.ball]
+        rows = blocks.by_model @ null[layout.model] + blocks.by_ball @ base.at.ball_null[readings.ball]
         if blocks.by_offset is not None:
             rows = rows + blocks.by_offset @ with_held[layout.offset_columns[readings.probe]]
         if change.of is None:

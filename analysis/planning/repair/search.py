@@ -10,15 +10,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.numerics.threads import single_threaded
 
-from simulator.experiment.model import Experiment
-from simulator.experiment.pool import placed_only
-from simulator.machines.protocol import Array
-from simulator.rounding import comparable
-from simulator.threads import single_threaded
-
-from ...rank import independent_mixture
-from ...study import Plan, plan
+from ...rank.verdict import independent_mixture
+from ...results.prediction import Prediction
+from ...results.study import predict
 from .changes import EFFORT, Change, Kind, apply_all, go_together, is_inside
 from .covering import covering_pairs, covering_set, different
 from .judging import Examined, Judged, examine, judge, removed, work
@@ -57,7 +57,7 @@ class Repair:
     worst: float
     smallest: float
     is_faint: bool
-    plan: Plan | None
+    plan: Prediction | None
     edits: tuple[Edit, ...]
 
 
@@ -299,14 +299,14 @@ class _Search:
 
     def open_errors(self) -> Array:
         """What the null directions do to the machine, in the form in which they are told."""
-        return np.asarray(self.before.open_errors @ independent_mixture(self.base.spread))
+        return np.asarray(self.before.open_errors @ independent_mixture(self.base.at))
 
     def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
         """A repair with the plan of the changed design."""
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)
         after = self.judge(changes)
-        planned = plan(placed_only(changed)) if removes is None else None
+        planned = predict(placed_only(changed)) if removes is None else None
         if planned is not None and planned.verdict.deficiency != after.deficiency:
             raise AssertionError("two computations of one design's rank differ")
         gone = tuple(range(self.before.deficiency)) if removes is None else removes

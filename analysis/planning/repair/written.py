@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-
-from simulator.experiment.model import (
+from ballplate.simulator.experiment.model import (
     Calibration,
     CoordinateCalibration,
     DistanceCalibration,
@@ -17,9 +16,9 @@ from simulator.experiment.model import (
     Position,
     ReadingGroup,
 )
-from simulator.geometry.positions import AXIS_INDEX, IN_PLANE_AXES, QUARTER_TURNS, ball_coordinates
-from simulator.machines.protocol import Array
-from simulator.quantities import LengthFunction, format_length, parse_length
+from ballplate.simulator.geometry.positions import AXIS_INDEX, IN_PLANE_AXES, QUARTER_TURNS, ball_coordinates
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
+from ballplate.simulator.machines.protocol import Array
 
 from .changes import ball_set, pair_set
 

@@ -1,0 +1,32 @@
+"""`python -m ballplate`, the same as the command `ballplate`.
+
+Signals are answered from the first line on, while what answers them later is loaded.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+ANSWERS = {signal.SIGINT: (130, b"interrupted"), signal.SIGTERM: (143, b"terminated")}
+
+
+def _leave(number: int, _: object) -> None:
+    status, word = ANSWERS[signal.Signals(number)]
+    os.write(2, word + b"; no file was written\n")
+    os._exit(status)
+
+
+def main() -> int:
+    """Run the command and return its exit status."""
+    for number in ANSWERS:
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _leave)
+    from .cli import main as command
+
+    return command()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Checks of many files, and their reports for build servers."""

@@ -1,0 +1,41 @@
+"""The bar of progress on a terminal."""
+
+from __future__ import annotations
+
+import shutil
+from threading import RLock
+
+from tqdm import tqdm
+
+# What is told beside the bar, and in lines without one.
+FORM = "{n_fmt}/{total_fmt} {desc}, {elapsed} so far, {remaining} left{postfix}"
+
+
+class Bar(tqdm):
+    """A bar that neither starts a thread nor makes a lock for other processes, which a command would have to end."""
+
+    monitor_interval = 0
+    _lock = RLock()
+
+    def __init__(self, what: str, total: int, before: int) -> None:
+        form = "|{bar}| " + FORM
+        # Sizes are given, as tqdm draws nothing on a terminal that does not know its own.
+        super().__init__(
+            desc=what, total=total, initial=before, miniters=1, leave=False, ncols=width(), nrows=2, bar_format=form
+        )
+
+
+def width() -> int:
+    """Columns of the terminal, less one, as some begin a new line after the last."""
+    return shutil.get_terminal_size().columns - 1
+
+
+def line(what: str, done: int, wanted: int, before: int, elapsed: float, remark: str) -> str:
+    """How far a step has come, in words alone.
+
+    >>> line("data sets", 512, 2048, 0, 20.0, "accurate to 1.5 %")
+    '512/2048 data sets, 00:20 so far, 01:00 left, accurate to 1.5 %'
+    """
+    return tqdm.format_meter(
+        done, wanted, elapsed, prefix=what, initial=before, bar_format=FORM, postfix=remark or None
+    )

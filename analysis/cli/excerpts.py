@@ -1,0 +1,93 @@
+"""Errors of files for people at a terminal: below each the line that it is about, with a mark at the place."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from argparse import Namespace
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+from unicodedata import combining, east_asian_width
+
+if TYPE_CHECKING:
+    from ballplate.simulator.inputs.messages import Message
+
+# What ends a line of a YAML file.
+LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+# Larger files are not read again for the sake of a line.
+MOST_BYTES = 10_000_000
+# Columns of a terminal that are left of what an excerpt shows.
+INDENT = 4
+RED, PLAIN = "\x1b[31m", "\x1b[0m"
+
+
+def has_colour(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
+    """Whether colour is wanted: by NO_COLOR and FORCE_COLOR where one is not empty, else on a terminal that has it.
+
+    Not every console of Windows knows the sequences, and there it has to be asked for.
+    """
+    if environment.get("NO_COLOR"):
+        return False
+    if environment.get("FORCE_COLOR"):
+        return True
+    return stream.isatty() and os.name != "nt" and environment.get("TERM") != "dumb"
+
+
+def print_errors(messages: Iterable[Message], options: Namespace) -> None:
+    """Print errors on standard error, a line each; at a terminal, and with --verbose, with the lines of the files."""
+    with_lines = options.verbose or sys.stderr.isatty()
+    colour = has_colour(sys.stderr) if with_lines else False
+    files: dict[str, list[str]] = {}
+    for message in messages:
+        print(message, file=sys.stderr)
+        if not with_lines or not message.line:
+            continue
+        if message.file not in files:
+            files[message.file] = _lines(Path(message.file))
+        lines = files[message.file]
+        if message.line <= len(lines):
+            shown, mark = excerpt(lines[message.line - 1], message.column, shutil.get_terminal_size().columns)
+            print(shown, file=sys.stderr)
+            print(f"{RED}{mark}{PLAIN}" if colour else mark, file=sys.stderr)
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+            return []
+        return LINE_END.split(path.read_bytes().decode("utf-8-sig", "replace"))
+    except (OSError, ValueError):
+        return []
+
+
+def excerpt(line: str, column: int, width: int) -> tuple[str, str]:
+    """A line, or what of it has room in `width` around a column that counts from 1, and a line that marks the column.
+
+    >>> print(*excerpt("  repeatability: 1 parsec", 18, 80), sep="\\n")
+          repeatability: 1 parsec
+                         ^
+    """
+    from ballplate.simulator.inputs.messages import in_one_line
+
+    room = max(width - INDENT - 1, 10)
+    at = min(max(column - 1, 0), len(line))
+    far = max(at - room, 0)
+    # Each character as it is shown, so that the mark stands below the right one.
+    shown = [" " if one == "\t" else in_one_line(one) for one in f"{line} "[far : at + room]]
+    at -= far
+    start = 0
+    while sum(map(_columns, shown[start : at + 1])) > max(room // 2, room - sum(map(_columns, shown[at + 1 :]))):
+        start += 1
+    end = len(shown)
+    while end > at + 1 and sum(map(_columns, shown[start:end])) > room:
+        end -= 1
+    indent = " " * INDENT
+    return (indent + "".join(shown[start:end])).rstrip(), indent + " " * sum(map(_columns, shown[start:at])) + "^"
+
+
+def _columns(text: str) -> int:
+    """How many columns of a terminal a text takes."""
+    return sum(0 if combining(one) else 2 if east_asian_width(one) in "FW" else 1 for one in text)

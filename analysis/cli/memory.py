@@ -1,0 +1,46 @@
+"""Words for a computation that found no memory."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from ..running.memory import want_of_memory
+
+# What makes a command's work smaller.
+SMALLER = {
+    "check": "leave positions or parameters out",
+    "run": "give fewer evaluation.points, leave positions out, or use fewer --workers",
+    "plan": "offer fewer candidates, give fewer evaluation.points, or use fewer --workers",
+    "reach": "give fewer evaluation.points, leave positions out, or use fewer --workers",
+    "lengths": "take a coarser --grid",
+    "reliability": "give fewer evaluation.points, or leave positions out",
+    "simulate": "plan fewer readings",
+    "fit": "leave readings or evaluation.points out",
+    "compare": "leave positions out, or use fewer --workers",
+    "sweep": "use fewer --workers, or make the experiments smaller",
+    "export": "export to CSV, and fewer experiments",
+    "report": "report fewer experiments",
+    "map": "take a coarser --grid",
+    "spline": "give fewer points",
+}
+
+
+def no_memory(error: BaseException, options: Namespace) -> str | None:
+    """What to tell the user where an error comes of a want of memory, here or in a worker; None of any other error."""
+    name = options.run.__module__.rpartition(".")[2]
+    named = [value for key in ("files", "file", "store") for value in _paths(getattr(options, key, None))]
+    place = ", ".join(map(str, named)) or f"ballplate {name}"
+    smaller = SMALLER.get(name, "close other programs")
+    # Worker processes that the system has ended; loading the class for it would take memory.
+    if any(kind.__name__ == "BrokenProcessPool" for kind in type(error).__mro__):
+        return (
+            f"{place}: a worker process of {name} was ended from outside, as a rule because memory ran short; {smaller}"
+        )
+    want = want_of_memory(error)
+    return None if want is None else f"{place}: {name} {want}; {smaller}"
+
+
+def _paths(value: object) -> list[Path]:
+    values = value if isinstance(value, list) else [value]
+    return [one for one in values if isinstance(one, Path)]

@@ -1,0 +1,51 @@
+"""How much a command tells on standard error beside errors and warnings: options that all commands have."""
+
+from __future__ import annotations
+
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+def add_telling(parser: ArgumentParser) -> None:
+    """Add the choice to be told less, or more."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "-q", "--quiet", action="store_true", help="tell no progress and no notes, but errors and warnings"
+    )
+    group.add_argument(
+        "-v", "--verbose", action="store_true", help="tell versions, the files that are read, and how long steps take"
+    )
+
+
+def note(options: Namespace, text: str) -> None:
+    """Tell what is neither a result nor an error nor a warning."""
+    from ballplate.simulator.inputs.messages import in_one_line
+
+    if not options.quiet:
+        print(in_one_line(text), file=sys.stderr)
+
+
+@contextmanager
+def told(options: Namespace) -> Iterator[None]:
+    """Tell, where it is asked for, what a command works with before it does, and then how long it took."""
+    if not options.verbose:
+        yield
+        return
+    from ..sweeps.task import versions
+    from .outputs import inputs
+
+    for name, version in versions():
+        note(options, f"{name} {version}")
+    outputs = {one.dest for one in getattr(options, "outputs", ())}
+    for path in dict.fromkeys(inputs(options, outputs)):
+        if path.is_file():
+            note(options, f"reads {path}")
+    started = time.monotonic(), time.process_time()
+    try:
+        yield
+    finally:
+        elapsed, processor = time.monotonic() - started[0], time.process_time() - started[1]
+        note(options, f"{options.command}: {elapsed:.3g} s, {processor:.3g} s of the processor in this process")

@@ -1,0 +1,1 @@
+"""Splines with prescribed values through measured errors."""

@@ -1,0 +1,1 @@
+"""Estimators beside the full one: of distances, by reversal, by length equations."""

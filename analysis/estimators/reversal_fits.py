@@ -1,0 +1,313 @@
+"""The reversal of NBSIR 79-1752 on an experiment's readings, with the full estimate of the same readings beside it.
+
+The full estimate is what the report calls multiple redundancy: all co-ordinates of the plate, one pose, and the
+two-dimensional metric as the machine's error model. It needs no approximation and has standard uncertainties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.estimation.gauss_newton import linearised_fit
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
+from ballplate.simulator.geometry.motions import rotation_from_vector, vector_from_rotation
+from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.metric import Scale
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.settings import MetricSettings, build_error_model
+from ballplate.simulator.numerics.threads import single_threaded
+from ballplate.simulator.readings.reading_files import ObservedReadings
+from numpy.typing import NDArray
+
+from ..report.vectors import Vectors
+from ..results.estimates import ParameterEstimate
+from ..results.fit import Fit
+from ..results.formatting import number
+from ..results.plates import axes_of_plates
+from ..results.study import fit
+
+# The first-order equations may change a result by this many of its standard uncertainties before a warning is due.
+NOTICEABLE = 0.5
+# With more than this many they are of no use.
+USELESS = 5.0
+
+# Chance that offsets are missed although there are none.
+ERRS = 1e-3
+
+INSTEAD = "or fit without --estimator, which takes any positions"
+
+
+@dataclass(frozen=True, eq=False)
+class ReversalFit:
+    """Both estimates of the same readings.
+
+    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the first; `places` (n, 2)
+    are the readings in the first. `names` and
+    `coordinates` (n, 2) are the balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple
+    redundancy with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless `scale` is
+    "none") and offsets as the reversal defines them, with standard uncertainties. `without_offsets` is the chance of a
+    ratio of sums of squares such as found if there were none; NaN where they are parameters.
+    """
+
+    label: str
+    title: str
+    scale: Scale
+    offsets: bool
+    first: str
+    second: str
+    places: Array
+    found: Reversal
+    estimates: tuple[ParameterEstimate, ...]
+    axes: PlateAxes
+    names: tuple[str, ...]
+    coordinates: Array
+    full: Fit
+    redundant: tuple[ParameterEstimate, ...]
+    without_offsets: float
+
+    @property
+    def turn(self) -> float:
+        """The turn in radians that multiple redundancy finds, or the reversal where that finds none."""
+        betas = [one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)]
+        return np.pi / 2.0 + (betas[0] if betas else self.found.exact_beta)
+
+    @property
+    def distortion(self) -> float:
+        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's own axes."""
+        exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
+        return float(np.abs(self.coordinates - exact).max())
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Readings in the first position less what those in the second predict."""
+        label = f"{self.first}, less what {self.second} predicts"
+        return (Vectors(label, self.places, self.found.residuals, self.names),)
+
+    @property
+    def complaint(self) -> str:
+        """Why the results are of no use; empty where they are of some."""
+        return self._neglected() if self.found.bias > USELESS else ""
+
+    def _neglected(self) -> str:
+        """What the first-order equations change by what they neglect."""
+        away = np.degrees(abs(self.turn - np.pi / 2.0))
+        told = f"{away:.4g} degrees" if away >= 1.0 else f"{3600.0 * away:.3g} arcsec"
+        offset = float(np.abs(self.found.offset - self.found.exact_offset).max())
+        shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
+        return (
+            f"the turn is {told} from 90 degrees, too far for equations of the first order: what they neglect changes "
+            f"co-ordinates of balls by up to {_length(self.distortion)}{shift}, and results by up to "
+            f"{number(self.found.bias, 2)} of their standard uncertainties; turn the plate closer to 90 degrees, or "
+            "take the results of multiple redundancy"
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user of the result has to know."""
+        told = []
+        if NOTICEABLE < self.found.bias <= USELESS:
+            told.append(self._neglected())
+        if self.without_offsets < ERRS:
+            told.append("the residuals are those of an offset between the positions; fit without --no-offsets")
+        if self.full.converged and self.full.too_large:
+            told.append(
+                "the residuals are larger than the stated repeatability explains; standard uncertainties of multiple "
+                + ("redundancy are scaled by them" if self.full.sigma_is_estimated else "redundancy are too small")
+            )
+        return tuple(told)
+
+
+@single_threaded
+def fit_reversal(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    scale: Scale | None = None,
+    offsets: bool = True,
+    sigma: Literal["estimated", "given"] | None = None,
+) -> ReversalFit:
+    """Estimate squareness, scale difference and the plate from two positions a quarter turn apart.
+
+    `scale` overrides which axis the file gives the scale difference, `sigma` what it says about uncertainties.
+
+    :raises ExperimentError: the experiment is no reversal; every reason at once.
+    """
+    _refuse_others(experiment, observed, scale)
+    settings: MetricSettings = experiment.error_model
+    scale = settings.plane_scale if scale is None else scale
+    experiment = replace(experiment, error_model=settings.model_copy(update={"scale": scale}))
+    corners = (tuple(map(float, experiment.machine.volume.lower)), tuple(map(float, experiment.machine.volume.upper)))
+    design = replace(observed.design, model=build_error_model(experiment.error_model, *corners))
+    observed = replace(observed, design=design)
+    seen = _mean_readings(observed)
+    k, m = (0, 1) if turn_between(*seen) < 0.0 else (1, 0)
+    try:
+        found = reverse(seen[k], seen[m], scale, offsets)
+        chance = float("nan") if offsets else _chance(found, reverse(seen[k], seen[m], scale))
+    except UndeterminedError as error:
+        text = f"{error}; read balls that are not"
+        raise ExperimentError([_message(experiment, ("artefacts", design.artefact_names[0]), text)]) from None
+    axes = axes_of_plates(experiment)[design.artefact_names[0]]
+    full = fit(experiment, observed, sigma)
+    values = [found.alpha, found.beta, found.gamma, *found.offset.tolist()][: 5 if offsets else 3]
+    return ReversalFit(
+        experiment.label,
+        experiment.title,
+        scale,
+        offsets,
+        design.position_names[k],
+        design.position_names[m],
+        seen[k] + design.origins[k],
+        found,
+        tuple(ParameterEstimate(n, v, np.nan, u) for (n, u), v in zip(PARAMETERS, values, strict=False)),
+        axes,
+        design.ball_names,
+        in_plate_axes(found.coordinates, axes)[0],
+        full,
+        _redundant(design, full, k, m) if full.converged else (),
+        chance,
+    )
+
+
+PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
+    ("alpha", "rad"),
+    ("beta", "rad"),
+    ("gamma", "1"),
+    ("offset x", "m"),
+    ("offset y", "m"),
+)
+
+
+def _length(value: float) -> str:
+    return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} um"
+
+
+def _message(experiment: Experiment, steps: Steps, text: str) -> Message:
+    return experiment.message(steps, text)
+
+
+def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Scale | None) -> None:
+    """Refuse what is no reversal."""
+    found: list[Message] = []
+
+    def say(steps: Steps, text: str) -> None:
+        found.append(_message(experiment, steps, f"{text}, {INSTEAD}"))
+
+    if not isinstance(experiment.error_model, MetricSettings):
+        kind = experiment.error_model.kind
+        text = 'the reversal is about a machine of kind "metric" in two dimensions'
+        solid = experiment.dimension == 3
+        remedy = "write metric" + (" and leave z out of the volume and of all places" if solid else "")
+        say(("error_model", "kind"), f'{text}, not "{kind}"{" in three" if solid else ""}; {remedy}')
+    elif experiment.dimension != 2:
+        say(("machine", "volume"), "the reversal is about two dimensions, not three; leave z out")
+    elif scale not in (None, experiment.error_model.plane_scale) and experiment.priors:
+        say(("priors",), f"priors are about the file's error model; write scale: {scale} there instead of --scale")
+    if len(experiment.artefacts) != 1:
+        names = listing(experiment.artefacts)
+        say(("artefacts",), f"the reversal takes one artefact, not {len(experiment.artefacts)} ({names}); keep one")
+    if len(experiment.positions) != 2:
+        text = f"the reversal takes two positions, a quarter turn apart, not {len(experiment.positions)}"
+        say(("positions",), f"{text}; keep two")
+    elif not found:
+        found += _unusable_readings(experiment, observed)
+        if not found:
+            _refuse_turn(observed, say)
+    if found:
+        raise ExperimentError(found)
+
+
+def _unusable_readings(experiment: Experiment, observed: ObservedReadings) -> list[Message]:
+    """What is wrong with readings that are not of all balls in both positions, or with several probes."""
+    design, file = observed.design, observed.marks[0].file if observed.marks else str(experiment.source)
+    found = []
+    probes = [design.probe_names[probe] for probe in np.unique(design.readings.probe)]
+    if len(probes) > 1:
+        text = f"the reversal takes readings with one probe, not with {listing(probes)}; keep those with one, {INSTEAD}"
+        found.append(Message(file, 0, 0, "", text))
+    count = np.zeros((2, len(design.ball_names)), np.int64)
+    np.add.at(count, (design.readings.position, design.readings.ball), 1)
+    for k in range(2):
+        unread = [f'"{design.ball_names[ball]}"' for ball in np.flatnonzero(count[k] == 0)]
+        if unread:
+            text = (
+                f'the reversal needs every ball in both positions; in "{design.position_names[k]}" the readings lack '
+            )
+            found.append(Message(file, 0, 0, "", f"{text}{listing(unread)}; read them, {INSTEAD}"))
+    return found
+
+
+def _refuse_turn(observed: ObservedReadings, say: Callable[[Steps, str], None]) -> None:
+    """Refuse positions between which no quarter turn lies."""
+    if len(observed.design.ball_names) < 2:
+        return
+    turn = np.degrees(turn_between(*_mean_readings(observed)))
+    if not 45.0 < abs(turn) < 135.0:
+        names = " and ".join(f'"{name}"' for name in observed.design.position_names)
+        say(("positions",), f"a turn of {abs(turn):.4g} degrees lies between {names}; turn the plate by about 90")
+
+
+def _mean_readings(observed: ObservedReadings) -> Array:
+    """Mean reading (2, n, 2) of each ball in each position, with its probe's offset, from the nominal origin."""
+    design, readings = observed.design, observed.design.readings
+    places = observed.x + design.probes[readings.probe] - design.origins[readings.position]
+    total = np.zeros((2, len(design.ball_names), 2))
+    count = np.zeros(total.shape[:2])
+    np.add.at(total, (readings.position, readings.ball), places)
+    np.add.at(count, (readings.position, readings.ball), 1.0)
+    return np.asarray(total / count[:, :, None])
+
+
+def _chance(three: Reversal, five: Reversal) -> float:
+    """Chance that offsets explain as much of the residuals as they do if there are none, by an F test."""
+    from scipy.special import fdtrc
+
+    if five.degrees_of_freedom <= 0:
+        return 1.0
+    left = five.sigma**2 * five.degrees_of_freedom
+    explained = (three.sigma**2 * three.degrees_of_freedom - left) / 2.0
+    return float(fdtrc(2.0, five.degrees_of_freedom, max(explained, 0.0) / five.sigma**2)) if left > 0.0 else 0.0
+
+
+def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEstimate, ...]:
+    """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the first, `k`."""
+    at = linearised_fit(design, full.solution)
+    layout, state = at.layout, at.state
+    own = np.eye(len(layout))
+    # Exact derivatives, as imaginary steps leave the real part alone.
+    by_shared = [_relation(design, layout, state, k, m, 1e-30j * row).imag / 1e-30 for row in own]
+    rows = np.concatenate([np.transpose(by_shared), own[layout.model]])
+    values = np.concatenate([_relation(design, layout, state, k, m, 0.0 * own[0]), state.a])
+    uncertainties = full.sigma * at.of_shared(rows)
+    names = ("beta", "offset x", "offset y", *(parameter.name for parameter in design.model.parameters))
+    found = dict(zip(names, zip(values.tolist(), uncertainties.tolist(), strict=True), strict=True))
+    return tuple(ParameterEstimate(name, *found[name], unit) for name, unit in PARAMETERS if name in found)
+
+
+def _relation(design: Design, layout: SharedLayout, state: State, k: int, m: int, change: NDArray[Any]) -> NDArray[Any]:
+    """Beta and the offset (3,) as functions of a `change` of the shared parameters, which may be complex.
+
+    Points of the plate are at R y + o, so that readings x of the second position, less its nominal origin, are at
+    M x + offset in the first, with M = A R_k R_m^T A^-1.
+    """
+    poses = np.where(layout.pose_columns >= 0, change[layout.pose_columns], 0.0)
+    a = state.a + change[layout.model]
+    inverse = (np.eye(2) + design.model.error(np.eye(2, dtype=a.dtype), a, np.zeros((2, 2)))).T
+    metric = np.linalg.inv(inverse)
+    rotations = rotation_from_vector(poses[:, 2:]) @ state.rotations
+    between = rotations[k] @ rotations[m].T
+    relation = metric @ between @ inverse
+    origins = state.origins + poses[:, :2]
+    probe = design.probes[design.readings.probe[0]]
+    # Where readings with the probe's offset added are, less where the axes' errors have taken that.
+    shift = probe - metric @ probe
+    offset = metric @ (origins[k] - between @ origins[m]) + shift - relation @ shift
+    offset = offset - design.origins[k] + relation @ design.origins[m]
+    turn = vector_from_rotation((state.rotations[k] @ state.rotations[m].T)[None])[0, 0]
+    return np.array([turn - np.pi / 2 + poses[k, 2] - poses[m, 2], *offset])

@@ -1,0 +1,181 @@
+"""What a bias that nobody notices changes in the quantities that do not depend on the frame, at the most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ballplate.simulator.estimation.functions import (
+    Coordinates,
+    Displacements,
+    Distances,
+    Places,
+    Points,
+    displacements,
+)
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.numerics.rounding import comparable
+
+from ..uncertainty.quantities import QUANTITIES
+from .response import Response
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+# Places of which all pairs are looked at; of more points, or balls of a plate, some are chosen evenly.
+MOST_PLACES = 200
+
+# Numbers of a product of functions and patterns that are held at once.
+AT_ONCE = 2_000_000
+
+SYMBOLS = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.effect)
+LENGTHS = tuple(symbol for symbol in SYMBOLS if QUANTITIES[symbol].are_lengths)
+
+
+@dataclass(frozen=True)
+class Largest:
+    """For k patterns the largest change by a unit of the bias (k,), its function (k,), and the latter's uncertainty.
+
+    The function is -1, and the change 0, where there is none that is determined.
+    """
+
+    change: Array
+    function: Integers
+    uncertainty: Array
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Linear functions of the displacements of places: rows of `operator` (f, places d), with uncertainties (f,).
+
+    The places move by `common` (places d, r) times the common part of a response and, for balls, by `own`
+    (places d, n d) times its own part; None for points. `first` and `second` (f,) are the places of each function, or
+    one and its axis.
+    """
+
+    operator: csr_array
+    common: Array
+    own: csr_array | None
+    uncertainty: Array
+    first: Integers
+    second: Integers
+
+    def largest(self, response: Response) -> Largest:
+        """The largest change of a function by each pattern."""
+        count = len(response.index)
+        change, where = np.zeros(count), np.full(count, -1)
+        step = max(AT_ONCE // max(len(self.uncertainty), 1), 1)
+        for start in range(0, count if len(self.uncertainty) else 0, step):
+            some = slice(start, min(start + step, count))
+            moved = self.common @ response.common[some].T
+            if self.own is not None:
+                moved += (self.own @ response.own[some].T).toarray()
+            values = np.abs(self.operator @ moved)
+            where[some] = comparable(values, axis=0).argmax(axis=0)
+            change[some] = values.max(axis=0)
+        uncertainty = self.uncertainty[where] if len(self.uncertainty) else np.full(count, np.nan)
+        return Largest(change, where, uncertainty)
+
+
+def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[Integers], Changes]:
+    """Changes of co-ordinates, or of distances; of a large artefact, those that end at some or the asked balls."""
+    places, made = given.places, displacements(at, given.places, narrow=False)
+    if isinstance(given, Coordinates):
+        found = _coordinates(made, places)
+        return lambda asked: found
+    if isinstance(given.places, Points):
+        chosen = np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
+        pairs = np.stack(np.triu_indices(len(chosen), 1), axis=1) if given.pairs is None else given.pairs
+        of_points = _distances(made.select(chosen), None, pairs, chosen)
+        return lambda asked: of_points
+    own = _own_parts(at, made, given.places.index)
+    kept: dict[bytes, Changes] = {}
+
+    def among(asked: Integers) -> Changes:
+        some = evenly(len(made.places))
+        others = np.setdiff1d(np.flatnonzero(np.isin(places.labels, asked)), some)
+        first, second = np.triu_indices(len(some), 1)
+        ends = np.stack([np.repeat(others, len(some)), np.tile(some, len(others))], axis=1)
+        pairs = np.concatenate([np.stack([some[first], some[second]], axis=1), ends])
+        pairs = pairs if given.pairs is None else given.pairs
+        key = pairs.tobytes()
+        if key not in kept:
+            kept.clear()
+            kept[key] = _distances(made, own, pairs, places.labels)
+        return kept[key]
+
+    return among
+
+
+def evenly(count: int) -> Integers:
+    """Indices of up to `MOST_PLACES` of `count` places.
+
+    >>> evenly(3).tolist(), len(evenly(1000)), int(evenly(1000)[-1])
+    ([0, 1, 2], 200, 999)
+    """
+    if count <= MOST_PLACES:
+        return np.arange(count)
+    return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
+
+
+def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_array:
+    """The parts (places d, n d) that balls have alone, in the columns of all balls."""
+    from scipy.sparse import coo_array
+
+    n, d = at.design.balls.shape
+    row = d * np.arange(len(index))[:, None, None] + np.arange(d)[:, None] + np.zeros(d, np.int64)
+    column = d * index[:, None, None] + np.zeros((d, 1), np.int64) + np.arange(d)
+    own = coo_array((made.own.ravel(), (row.ravel(), column.ravel())), shape=(len(index) * d, n * d)).tocsr()
+    own.eliminate_zeros()
+    return own
+
+
+def _coordinates(made: Displacements, places: Places) -> Changes:
+    """Co-ordinates of points that are determined."""
+    from scipy.sparse import csr_array, eye
+
+    n, d = made.places.shape
+    uncertainty = made.uncertainties.ravel()
+    known = np.flatnonzero(~np.isnan(uncertainty))
+    operator = csr_array(eye(n * d, format="csr"))[known]
+    place, axis = np.divmod(known, d)
+    common = made.common.reshape(n * d, -1)
+    return Changes(operator, common, None, uncertainty[known], places.labels[place], axis)
+
+
+def _distances(made: Displacements, own: csr_array | None, pairs: Integers, labels: Integers) -> Changes:
+    """Distances between pairs (m, 2) of places that are apart and, where they are as drawn, determined."""
+    from scipy.sparse import coo_array
+
+    n, d = made.places.shape
+    places, drawn = (where - where.mean(axis=0) if n else where for where in (made.places, made.drawn))
+    common, null = without_rigid_motion(places, made.common), without_rigid_motion(drawn, made.null)
+    first, second = pairs.T
+    apart = np.sqrt(((places[first] - places[second]) ** 2).sum(axis=1)) > 0.0
+    first, second = first[apart], second[apart]
+
+    def by_places(places: Array) -> csr_array:
+        unit = places[first] - places[second]
+        length = np.sqrt((unit**2).sum(axis=1))
+        unit /= np.where(length > 0.0, length, 1.0)[:, None]
+        row = np.repeat(np.arange(len(first)), 2 * d)
+        column = np.concatenate([d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1)
+        value = np.concatenate([unit, -unit], axis=1)
+        return coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
+
+    operator = by_places(places)
+    change = (by_places(drawn) if null.shape[2] else operator) @ null.reshape(n * d, null.shape[2])
+    limit = 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
+    known = np.sqrt((change**2).sum(axis=1)) <= limit
+    operator, first, second = operator[known], first[known], second[known]
+    flat = common.reshape(n * d, common.shape[2])
+    variance = np.zeros(len(first))
+    for start in range(0, flat.shape[1], 100):
+        variance += ((operator @ flat[:, start : start + 100]) ** 2).sum(axis=1)
+    if own is not None:
+        variance += np.asarray((operator @ own).power(2).sum(axis=1)).ravel()
+    return Changes(operator, flat, own, np.sqrt(variance), labels[first], labels[second])

@@ -1,0 +1,85 @@
+"""Names of observations and events, as a metrologist would say them."""
+
+from __future__ import annotations
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Integers
+
+from .patterns import Patterns
+
+
+def name(given: Patterns, k: int, with_position: bool = True) -> str:
+    """What a pattern is about; a reading's may be without its position."""
+    kind, subject = given.kind[k], int(given.subject[k])
+    design, axis = given.design, int(given.axis[k])
+    letter = AXIS_NAMES[axis] if axis >= 0 else ""
+    if kind in ("reading", "end"):
+        return f"{reading_name(design, subject, with_position)}, {letter}"
+    if kind == "length":
+        return f"{length_name(design, subject)} in position {design.position_names[_position(design, subject)]}"
+    if kind == "prior":
+        return f"prior of {design.priors.names[subject]}"
+    if kind == "coordinate":
+        return f"{letter} of ball {design.ball_label(int(design.coordinates.ball[subject]))}"
+    if kind == "distance":
+        first, second = (int(end[subject]) for end in (design.distances.first, design.distances.second))
+        return f"distance {design.ball_label(first)} to {design.ball_names[second]}"
+    if kind == "ball":
+        ball, position = design.readings.ball[subject], design.readings.position[subject]
+        return f"dirt on ball {design.ball_label(int(ball))} in position {design.position_names[position]}, {letter}"
+    if kind == "moved":
+        ball, position = design.readings.ball[subject], design.readings.position[subject]
+        where = f"from position {design.position_names[position]} on"
+        return f"ball {design.ball_label(int(ball))} displaced {where}, along {letter} of the plate"
+    if kind in ("shift", "turn"):
+        how = f"along {letter}" if kind == "shift" else f"turned about {letter}"
+        return f"position {design.position_names[subject]} slipped {slip_place(given, k)}, {how}"
+    if kind == "probe":
+        return f"offset {letter} of probe {design.probe_names[subject]}"
+    if kind == "length value":
+        return f"certified {length_name(design, subject, of_reading=False)}"
+    if kind == "scale":
+        return f"scale of the certificate of {design.artefact_names[subject]}"
+    return f"expansion in position {design.position_names[subject]}"
+
+
+def common_ball(design: Design, distances: Integers) -> int:
+    """The ball that several distances have in common; of two between the same balls, the first."""
+    ends = np.stack([design.distances.first[distances], design.distances.second[distances]], axis=1)
+    return next(int(ball) for ball in ends[0] if (ends == ball).any(axis=1).all())
+
+
+def slip_place(given: Patterns, k: int) -> str:
+    """Where in a position a slip of the artefact is looked for."""
+    design, position, start = given.design, int(given.subject[k]), int(given.start[k])
+    rows = np.flatnonzero(design.readings.position == position)
+    probe = design.readings.probe[rows]
+    at = int(np.searchsorted(rows, start))
+    if probe[at - 1] != probe[at] and probe[at - 1] not in probe[at:]:
+        return f"before probe {design.probe_names[probe[at]]}"
+    half = "half-way, " if at == len(rows) // 2 else ""
+    return f"{half}before ball {design.ball_label(int(design.readings.ball[start]))}"
+
+
+def reading_name(design: Design, reading: int, with_position: bool = True) -> str:
+    """A reading by ball and position, and by its probe where there are several."""
+    readings = design.readings
+    position = f" in position {design.position_names[readings.position[reading]]}" if with_position else ""
+    probe = f" with {design.probe_names[readings.probe[reading]]}" if len(design.probe_names) > 1 else ""
+    return f"ball {design.ball_label(int(readings.ball[reading]))}{position}{probe}"
+
+
+def length_name(design: Design, length: int, of_reading: bool = True) -> str:
+    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is certified."""
+    given, readings = design.lengths, design.readings
+    ball = int(readings.ball[given.first[length]])
+    artefact = design.artefact_names[design.ball_artefact[ball]]
+    if given.second[length] < 0:
+        return f"radius of {artefact}" + (f" to ball {design.ball_names[ball]}" if of_reading else "")
+    return f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]} of {artefact}"
+
+
+def _position(design: Design, length: int) -> int:
+    return int(design.readings.position[design.lengths.first[length]])

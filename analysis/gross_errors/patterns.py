@@ -1,0 +1,411 @@
+"""What may be wrong with observations: a single one, or an event that touches many, each as a pattern over all rows.
+
+A pattern is what one unit of the bias changes in the whitened residuals. Single observations come first, in the
+order of their rows; the events after them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design, State, locations, probe_offsets
+from ballplate.simulator.estimation.hat import RowPlaces, row_places
+from ballplate.simulator.estimation.observations import (
+    expected_readings,
+    length_directions,
+    length_values,
+    offset_sensitivity,
+    reading_weights,
+    rotation_sensitivity,
+)
+from ballplate.simulator.machines.protocol import Array, Integers
+
+if TYPE_CHECKING:
+    from ballplate.simulator.design.whitening import Whitening
+    from scipy.sparse import csc_array
+
+Kind = Literal[
+    "reading", "length", "prior", "coordinate", "distance", "end", "ball", "moved", "shift", "turn", "probe",
+    "length value",
+    "scale", "expansion",
+]  # fmt: skip
+SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
+
+# Axes along which a reading changes lengths by less than this share of the most are left out, and so are those that
+# change all of them in a proportion equal to within the square of this.
+SLIGHT = 1e-3
+UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
+
+# A slip leaves at least so many readings of the position on either side, and is looked for before at most so many.
+LEAST_PART, MOST_STARTS = 3, 60
+
+
+@dataclass(frozen=True)
+class Block:
+    """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
+
+    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe or artefact;
+    of a certified length, the first that has it, and of a ball, its first reading in that position, or from that
+    position on. An `end` is a reading of a standard whose lengths are read together, with which several of them are
+    wrong. `axis` (count,) is along or about which, -1 without one, the plate's own axis of a ball that moved; `start`
+    (count,) the first reading after a slip, -1 without one.
+    """
+
+    kind: Kind
+    row: Integers
+    column: Integers
+    value: Array
+    subject: Integers
+    axis: Integers
+    start: Integers
+
+    @property
+    def count(self) -> int:
+        return len(self.subject)
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """Patterns as columns of `matrix` (rows, k), with `kind`, `subject`, `axis` and `start` (k,) as in `Block`."""
+
+    design: Design
+    matrix: csc_array
+    kind: np.ndarray
+    subject: Integers
+    axis: Integers
+    start: Integers
+
+    def __len__(self) -> int:
+        return len(self.subject)
+
+    @cached_property
+    def is_local(self) -> np.ndarray:
+        """Which patterns (k,) are of rows that come together: of one ball at the most, or one kind."""
+        return np.isin(self.kind, [*SINGLE, "end", "ball", "moved", "length value"])
+
+    def of_kind(self, *kinds: Kind) -> Integers:
+        """Indices of the patterns of some kinds."""
+        return np.flatnonzero(np.isin(self.kind, kinds))
+
+    def unit(self, k: int) -> Literal["m", "rad", "1"]:
+        """Unit of the bias."""
+        kind: Kind = self.kind[k]
+        if kind == "prior":
+            return prior_unit(self.design, int(self.subject[k]))
+        return UNITS.get(kind, "m")
+
+
+def patterns(design: Design, state: State, x: Array | None, every_start: bool = False) -> Patterns:
+    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones.
+
+    Slips are half-way and between probes, or with `every_start` at every reading, up to `MOST_STARTS` of a position.
+    """
+    from scipy.sparse import coo_array
+
+    at = _Place(design, state, x, row_places(design), every_start)
+    blocks = [block for build in BUILDERS for block in build(at)]
+    start = np.cumsum([0, *(block.count for block in blocks)])
+    column = np.concatenate([block.column + first for block, first in zip(blocks, start, strict=False)])
+    row = np.concatenate([block.row for block in blocks])
+    value = np.concatenate([block.value for block in blocks])
+    matrix = coo_array((value, (row, column)), shape=(len(at.places), int(start[-1]))).tocsc()
+    kind = np.repeat(np.array([block.kind for block in blocks]), [block.count for block in blocks])
+    return Patterns(
+        design,
+        matrix,
+        kind,
+        np.concatenate([block.subject for block in blocks]),
+        np.concatenate([block.axis for block in blocks]),
+        np.concatenate([block.start for block in blocks]),
+    )
+
+
+def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
+    """Unit of what a prior states."""
+    given = design.priors
+    if given.position[prior] >= 0:
+        return "rad" if given.component[prior] >= design.dimension else "m"
+    if given.probe[prior] >= 0:
+        return "m"
+    used = np.flatnonzero(given.by_model[prior])
+    return design.model.parameters[int(used[0])].unit if len(used) else "1"
+
+
+class _Place:
+    """A design where it is linearised, with what several kinds of patterns need."""
+
+    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool) -> None:
+        self.design, self.state, self.places, self.every_start = design, state, places, every_start
+        self.chosen = design.plate_readings
+        self.readings = design.readings.select(self.chosen)
+        self.weight = reading_weights(design, self.readings)
+        self.x = expected_readings(design, state, design.readings) if x is None else x
+        self.unit, self.white = length_directions(design, state, x), design.length_whitening
+        turned = locations(design, state, self.readings) - state.origins[self.readings.position]
+        self.arm = turned
+        self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
+
+    def of_readings(
+        self, rows: Integers, by_axis: Array, group: Integers | None = None
+    ) -> tuple[Integers, Integers, Array]:
+        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns.
+
+        With `group` (m,) each group has k columns of its own.
+        """
+        m, d, k = by_axis.shape
+        value = self.weight[rows][:, :, None] * by_axis
+        row = d * rows[:, None, None] + np.arange(d)[:, None] + np.zeros(k, np.int64)
+        number = np.zeros(m, np.int64) if group is None else group
+        column = np.broadcast_to(k * number[:, None, None] + np.arange(k), value.shape)
+        used = value != 0.0
+        return row[used], column[used], value[used]
+
+    def of_lengths(self, columns: Array) -> tuple[Integers, Integers, Array]:
+        """Entries of changes (lengths, k) of measured less known lengths."""
+        white = self.white.whitened(columns)
+        row, column = np.nonzero(white)
+        return self.places.lengths.start + row, column, white[row, column]
+
+
+def _block(
+    kind: Kind, entries: tuple[Integers, Integers, Array], subject: Any, axis: Any = -1, start: Any = -1
+) -> Block:
+    subject = np.atleast_1d(np.asarray(subject, np.int64))
+    axis = np.broadcast_to(np.asarray(axis, np.int64), subject.shape)
+    return Block(kind, *entries, subject, axis, np.broadcast_to(np.asarray(start, np.int64), subject.shape))
+
+
+def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integers, Array]:
+    row, column, value = (np.concatenate(one) for one in zip(*parts, strict=True))
+    return row, column, value
+
+
+def _single_readings(at: _Place) -> Iterator[Block]:
+    m, d = at.weight.shape
+    rows = np.arange(m * d)
+    yield _block("reading", (rows, rows, at.weight.ravel()), np.repeat(at.chosen, d), np.tile(np.arange(d), m))
+
+
+def _single_lengths(at: _Place) -> Iterator[Block]:
+    """Lengths that share no reading with others."""
+    alone, white = at.white.alone, at.white.single
+    row, column = _pairs_within(white, white.group)
+    own, along = white.own[column], white.direction
+    value = ((row == column) - along[row] * along[column]) / own
+    yield _block("length", (at.places.lengths.start + row, column, value), alone)
+
+
+def _ends(at: _Place) -> Iterator[Block]:
+    """Readings of standards whose lengths are read together, each along the axes that change lengths differently."""
+    given = at.design.lengths
+    joint = np.setdiff1d(np.arange(len(given)), at.white.alone)
+    for reading in np.unique([given.first[joint], given.second[joint]]):
+        sign = (given.first == reading).astype(float) - (given.second == reading)
+        axes = _different(sign[:, None] * given.direction)
+        yield _block("end", at.of_lengths(sign[:, None] * at.unit[:, axes]), [reading] * len(axes), axes)
+
+
+def _different(columns: Array) -> list[int]:
+    """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of the first."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    chosen: list[int] = []
+    for k in np.argsort(-(size / size.max()).round(6), kind="stable").tolist():
+        cosine = np.abs(columns[:, chosen].T @ columns[:, k]) / (size[chosen] * max(size[k], np.finfo(float).tiny))
+        if size[k] > SLIGHT * size.max() and not (cosine > 1.0 - SLIGHT**2).any():
+            chosen.append(k)
+    return sorted(chosen)
+
+
+def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers]:
+    """All pairs of rows that whitening mixes, each with itself as well."""
+    every = np.arange(len(group))
+    if not white.direction.any():
+        return every, every
+    pairs = []
+    for certificate in np.unique(group):
+        own = np.flatnonzero(group == certificate)
+        pairs.append(np.stack(np.meshgrid(own, own, indexing="ij")).reshape(2, -1))
+    row, column = np.concatenate(pairs, axis=1)
+    return row, column
+
+
+def _single_items(at: _Place) -> Iterator[Block]:
+    """Priors, co-ordinates and distances: a value that is stated too large makes residuals smaller."""
+    design = at.design
+    kinds: tuple[tuple[Kind, slice, Array], ...] = (
+        ("prior", at.places.priors, design.priors.uncertainty),
+        ("coordinate", at.places.coordinates, design.coordinates.uncertainty),
+        ("distance", at.places.distances, design.distances.uncertainty),
+    )
+    for kind, rows, uncertainty in kinds:
+        every = np.arange(len(uncertainty))
+        axis = design.coordinates.axis if kind == "coordinate" else -1
+        yield _block(kind, (rows.start + every, every, -1.0 / uncertainty), every, axis)
+
+
+def _dirty_balls(at: _Place) -> Iterator[Block]:
+    """A ball that is read several times in a position, displaced there; read once, it is the same as its reading."""
+    d = at.design.dimension
+    key = at.readings.ball * len(at.design.position_names) + at.readings.position
+    _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+    number = np.where(count > 1, np.cumsum(count > 1) - 1, -1)
+    rows = np.flatnonzero(number[group] >= 0)
+    row = d * rows[:, None] + np.arange(d)
+    column = d * number[group[rows]][:, None] + np.arange(d)
+    subject = np.repeat(at.chosen[first[count > 1]], d)
+    axis = np.tile(np.arange(d), int((count > 1).sum()))
+    yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
+
+
+def _moved_balls(at: _Place) -> Iterator[Block]:
+    """Balls that have been displaced on their plate, along its axes, from one position on."""
+    d, readings = at.design.dimension, at.readings
+    place = position_order(at.design)[readings.position]
+    order = np.lexsort((np.arange(len(place)), place, readings.ball))
+    ball, place = readings.ball[order], place[order]
+    same_ball = np.diff(ball) == 0
+    starts = 1 + np.flatnonzero(same_ball & (np.diff(place) > 0))
+    end = np.searchsorted(ball, ball[starts], side="right")
+    group, rows = _runs(starts, end)
+    rows = order[rows]
+    turn = at.state.rotations[readings.position[rows]]
+    first = np.repeat(at.chosen[order[starts]], d)
+    yield _block("moved", at.of_readings(rows, turn, group), first, np.tile(np.arange(d), len(starts)))
+
+
+def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
+    """All of several ranges (g,) one after the other: the number of each one's range, and what stands in it.
+
+    >>> _runs(np.array([3, 7]), np.array([5, 8]))
+    (array([0, 0, 1]), array([3, 4, 7]))
+    """
+    length = end - start
+    group = np.repeat(np.arange(len(start)), length)
+    return group, np.arange(len(group)) - np.repeat(np.cumsum(length) - length - start, length)
+
+
+def position_order(design: Design) -> Integers:
+    """Place (positions,) of each position in the order in which the readings were taken."""
+    order = np.full(len(design.position_names), len(design.position_names))
+    found, first = np.unique(design.readings.position, return_index=True)
+    order[found[np.argsort(first)]] = np.arange(len(found))
+    return order
+
+
+def _slip_starts(at: _Place, rows: Integers) -> Integers:
+    """Places among a position's `rows` that a slip may come before."""
+    if at.every_start:
+        count = len(rows) - 2 * LEAST_PART + 1
+        if count < 1:
+            return np.zeros(0, np.int64)
+        return np.unique(np.linspace(LEAST_PART, len(rows) - LEAST_PART, min(count, MOST_STARTS)).astype(np.int64))
+    probe = at.readings.probe[rows]
+    changes = np.flatnonzero(np.diff(probe)) + 1
+    # Between probes only where each has its readings together.
+    between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
+    return np.unique(np.append(between, len(rows) // 2))
+
+
+def _slips(at: _Place) -> Iterator[Block]:
+    """Plates that slipped within a position."""
+    d = at.design.dimension
+    for k in at.has_plate:
+        rows = np.flatnonzero(at.readings.position == k)
+        starts = _slip_starts(at, rows)
+        starts = starts[(starts > 0) & (starts < len(rows))]
+        if not len(starts):
+            continue
+        group, late = _runs(starts, np.full(len(starts), len(rows)))
+        moved = rows[late]
+        first = at.chosen[rows[starts]]
+        shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
+        axes = np.tile(np.arange(d), len(starts))
+        entries = at.of_readings(moved, shifts, group)
+        yield _block("shift", entries, [k] * len(axes), axes, np.repeat(first, d))
+        turns = rotation_sensitivity(at.arm[moved] - at.arm[rows].mean(axis=0))
+        about = np.tile(np.arange(3) if d == 3 else np.array([2]), len(starts))
+        entries = at.of_readings(moved, turns, group)
+        yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
+
+
+def _probes(at: _Place) -> Iterator[Block]:
+    """Probes whose offsets are stated too large; of one that is estimated only its prior can be wrong."""
+    design, state = at.design, at.state
+    d, offsets = design.dimension, probe_offsets(design, state)[design.readings.probe]
+    given = design.lengths
+    all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
+    for probe in np.unique(design.readings.probe):
+        fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
+        if not fixed.any():
+            continue
+        rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[:, :, fixed]
+        rows = np.flatnonzero(at.readings.probe == probe)
+        apart = rate[given.first] - np.where(given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)])
+        of_lengths = np.einsum("md,mdk->mk", at.unit, apart)
+        entries = _joined(at.of_readings(rows, rate[at.chosen[rows]]), at.of_lengths(of_lengths))
+        yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
+
+
+def _length_values(at: _Place) -> Iterator[Block]:
+    """Certified lengths that are stated too long and are read several times, or together with others."""
+    given = at.design.lengths
+    known = np.ones(len(given), bool) if given.free is None else given.free < 0
+    numbers, first, count = np.unique(given.certificate[known], return_index=True, return_counts=True)
+    is_alone = np.isin(np.flatnonzero(known)[first], at.white.alone)
+    for number in numbers[(count > 1) | ~is_alone]:
+        entries = at.of_lengths(-1.0 * (given.certificate == number)[:, None])
+        yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
+
+
+def _scales(at: _Place) -> Iterator[Block]:
+    """Certificates of an artefact of which all values are too long by one ratio."""
+    design, places = at.design, at.places
+    known = np.ones(len(design.lengths), bool) if design.lengths.free is None else design.lengths.free < 0
+    for artefact in range(len(design.artefact_names)):
+        of_distances = np.flatnonzero(design.ball_artefact[design.distances.first] == artefact)
+        of_coordinates = np.flatnonzero(design.ball_artefact[design.coordinates.ball] == artefact)
+        of_lengths = known & (design.ball_artefact[design.readings.ball[design.lengths.first]] == artefact)
+        if len(of_distances) + len(of_coordinates) + len(np.unique(design.lengths.certificate[of_lengths])) < 2:
+            continue
+        parts = [
+            (start + rows, np.zeros(len(rows), np.int64), -given.value[rows] / given.uncertainty[rows])
+            for start, rows, given in (
+                (places.distances.start, of_distances, design.distances),
+                (places.coordinates.start, of_coordinates, design.coordinates),
+            )
+        ]
+        columns = -np.where(of_lengths, design.lengths.value, 0.0)[:, None]
+        yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
+
+
+def _expansions(at: _Place) -> Iterator[Block]:
+    """Artefacts that are larger in one position."""
+    design = at.design
+    values = length_values(design, at.state)
+    of_lengths = design.readings.position[design.lengths.first]
+    for k in range(len(design.position_names)):
+        rows = np.flatnonzero(at.readings.position == k)
+        if not len(rows) and not (of_lengths == k).any():
+            continue
+        away = at.arm[rows] - at.arm[rows].mean(axis=0) if len(rows) else at.arm[rows]
+        columns = np.where(of_lengths == k, values, 0.0)[:, None]
+        yield _block("expansion", _joined(at.of_readings(rows, away[:, :, None]), at.of_lengths(columns)), k)
+
+
+BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (
+    _single_readings,
+    _single_lengths,
+    _single_items,
+    _ends,
+    _dirty_balls,
+    _moved_balls,
+    _slips,
+    _probes,
+    _length_values,
+    _scales,
+    _expansions,
+)

@@ -1,0 +1,131 @@
+"""Redundancy, minimal detectable biases and their effects for all observations and events of a design."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.functions import Functions, Parameters
+from ballplate.simulator.estimation.hat import row_places
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.numerics.threads import single_threaded
+
+from ..running.steps import Report, unreported
+from ..uncertainty.quantities import QUANTITIES
+from .effects import SYMBOLS, Changes, Largest, changes_of
+from .events import event_groups
+from .leftover import Columns, leftover, too_many_entries
+from .patterns import patterns
+from .power import noncentrality
+from .reliability import Effects, Reliability
+from .response import responses
+from .search import FAMILY
+
+FALSE_ALARM, POWER = 0.001, 0.8
+
+
+def reliability(
+    experiment: Experiment,
+    false_alarm: float = FALSE_ALARM,
+    power: float = POWER,
+    sigma: Literal["estimated", "given"] | None = None,
+    report: Report = unreported,
+) -> Reliability:
+    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file says.
+
+    `report` is told the number of observations done.
+
+    :raises ExperimentError: it has more observations than there is memory for.
+    """
+    design = lay_out(experiment)
+    reason = too_many_entries(design)
+    if reason:
+        raise ExperimentError(
+            [experiment.message(("positions",), f"{reason}: read fewer balls, or in fewer positions")]
+        )
+    return reliability_of(design, false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment, report)
+
+
+@single_threaded
+def reliability_of(
+    design: Design,
+    false_alarm: float = FALSE_ALARM,
+    power: float = POWER,
+    sigma_is_estimated: bool = False,
+    experiment: Experiment | None = None,
+    report: Report = unreported,
+) -> Reliability:
+    """Reliability of a design at zero machine error, where sigma is known or estimated."""
+    at = linearise(design)
+    given = patterns(design, at.state, None)
+    functions = {symbol: QUANTITIES[symbol].functions(design, at.layout) for symbol in SYMBOLS}
+    changes = {
+        symbol: [changes_of(at, group) for group in groups if not isinstance(group, Parameters)]
+        for symbol, groups in functions.items()
+    }
+    places = row_places(design)
+    redundancy, left, information = np.zeros(len(places)), np.zeros(len(given)), np.zeros(len(given))
+    effects = {symbol: _nothing(len(given), groups) for symbol, groups in functions.items()}
+    done = 0
+    for one in responses(at, None, given):
+        report("observations", done, len(places))
+        done += len(one.rows)
+        redundancy[one.rows] = 1.0 - one.hat
+        information[one.index] = one.information
+        left[one.index] = one.information / np.where(one.square > 0.0, one.square, 1.0)
+        asked = np.unique(one.own.indices // design.dimension) if len(one.rows) else np.zeros(0, np.int64)
+        for symbol, groups in changes.items():
+            for among in groups:
+                _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
+    for kind, rows in (
+        ("reading", places.readings),
+        ("length", places.lengths),
+        ("prior", places.priors),
+        ("coordinate", places.coordinates),
+        ("distance", places.distances),
+    ):
+        own = np.flatnonzero(given.kind == kind)
+        left[own] = redundancy[rows][: len(own)]
+    repeats = design.readings.repeats[design.plate_readings]
+    every = patterns(design, at.state, None, every_start=True)
+    tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
+    limit = 0.5 * FAMILY / max(tests, 1)
+    freedom = design.observations - design.parameter_count + at.deficiency
+    return Reliability(
+        experiment.label if experiment else "",
+        experiment.title if experiment else "",
+        design,
+        given,
+        redundancy,
+        left,
+        design.dimension * int((repeats - 1).sum()),
+        information,
+        effects,
+        freedom,
+        at.deficiency,
+        sigma_is_estimated,
+        false_alarm,
+        power,
+        noncentrality(false_alarm, power, freedom - 1 if sigma_is_estimated else math.inf),
+        noncentrality(limit, power, freedom - 1 if sigma_is_estimated else math.inf),
+    )
+
+
+def _nothing(count: int, groups: tuple[Functions, ...]) -> Effects:
+    return Effects(groups, np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan))
+
+
+def _put(effects: Effects, index: Integers, changes: Changes, found: Largest) -> None:
+    """Enter what patterns `index` change, where that is more than what has been entered of other artefacts."""
+    more = comparable(found.change) > comparable(effects.change[index])
+    use = (found.function >= 0) & (more | (effects.first[index] < 0))
+    index, function = index[use], found.function[use]
+    effects.change[index], effects.uncertainty[index] = found.change[use], found.uncertainty[use]
+    effects.first[index], effects.second[index] = changes.first[function], changes.second[function]

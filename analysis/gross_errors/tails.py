@@ -1,0 +1,49 @@
+"""Chances of large sums of squares, as logarithms: those of gross mistakes are too small for a number."""
+
+from __future__ import annotations
+
+import numpy as np
+from ballplate.simulator.machines.protocol import Array
+
+# Below this, chances come from the leading term of their series.
+SMALLEST = 1e-280
+
+
+def log_chance(square: Array | float, total: float, dimensions: Array | float, freedom: float, given: bool) -> Array:
+    """Logarithms (k,) of the chance that `dimensions` of the residuals' `freedom` explain a sum of squares so large.
+
+    With `given` sigma chi-squared of `square` itself; otherwise that of the share of `square` in `total`, Fisher's F.
+
+    >>> log_chance(np.array([3.841459]), 100.0, 1.0, 90.0, True).round(6)
+    array([-2.995732])
+    >>> log_chance(np.array([4.0]), 94.0, 1.0, 91.0, False).round(4)
+    array([-3.0259])
+    """
+    from scipy.special import betainc, betaln, chdtrc, gammaln
+
+    square, q = np.broadcast_arrays(np.asarray(square, float), np.asarray(dimensions, float))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        if given:
+            chance = chdtrc(q, square)
+            half = 0.5 * square
+            # Gamma(a, h) = h^(a-1) exp(-h) (1 + (a-1)/h + ...) < that / (1 - (a-1)/h).
+            leading = (0.5 * q - 1.0) * np.log(half) - half - gammaln(0.5 * q)
+            leading -= np.log1p(-np.clip((0.5 * q - 1.0) / half, 0.0, 0.5))
+        else:
+            a, b = 0.5 * (freedom - q), 0.5 * q
+            left = np.clip(1.0 - square / total, 1e-300, 1.0)
+            chance = betainc(np.maximum(a, 1e-9), b, left)
+            leading = a * np.log(left) + b * np.log1p(-left) - np.log(a) - betaln(a, b)
+        found = np.where(chance > SMALLEST, np.log(np.maximum(chance, SMALLEST)), leading)
+    return np.asarray(np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(found, 0.0)))
+
+
+def normal_equivalent(log_p: float) -> float:
+    """What a normal variable exceeds in absolute value with the chance exp(`log_p`).
+
+    >>> round(normal_equivalent(np.log(0.05)), 4)
+    1.96
+    """
+    from scipy.special import ndtri_exp
+
+    return float(-ndtri_exp(log_p - np.log(2.0)))

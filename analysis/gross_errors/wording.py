@@ -1,0 +1,281 @@
+"""Suspects of a fit in words, with the lines of the readings' file, and as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Integers
+
+from ..results.formatting import SHOWN, number
+from .names import common_ball, length_name, name, reading_name
+from .patterns import Patterns, position_order
+from .search import MOST
+from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
+
+# A direction of a cause is told from so many standard uncertainties on.
+CLEAR = 3.0
+
+
+def diagnosis_lines(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
+    """A line for each thing suspected, mistakes first; `marks` tell where the readings stand."""
+    lines = [f"suspected: {words}" for words in _all_words(found, marks)]
+    if len(found.suspects) == MOST:
+        what = "look for what these have in common, or state larger uncertainties, or a richer error model"
+        lines.append(f"suspected: there may be more than these {MOST}; {what}")
+    return lines
+
+
+def _all_words(found: Diagnosis, marks: Sequence[Mark]) -> list[str]:
+    words = [suspect_words(one, marks) for one in found.suspects]
+    words += [scatter_words(found.scatter)] if found.scatter else []
+    return words + ([unexplained_words(found.unexplained)] if found.unexplained else [])
+
+
+def suspect_words(one: Suspect, marks: Sequence[Mark] = ()) -> str:
+    """What is suspected, how significant it is, and what to do."""
+    what, cure = _what(one, marks)
+    others = [*(_cause_name(one.patterns, columns) for columns in one.alternatives), *one.of_model]
+    told = f"; it cannot be told from {listing(others)}" if others else ""
+    return f"{what} {_significance(one)}{told}; {cure}"
+
+
+def scatter_words(one: MoreScatter) -> str:
+    """Which readings scatter more than the others."""
+    return (
+        f"readings {_scatter_place(one)} scatter {number(one.times, 2)} times as much as stated for the others "
+        f"{_significance(one)}; look for what was different there, or state their uncertainty in a column u"
+    )
+
+
+def unexplained_words(one: Unexplained) -> str:
+    """That no single mistake explains the residuals, and what may."""
+    best = f"what explains most is {one.words} {_significance(one)}" if one.words else f"{_significance(one)[1:-1]}"
+    return (
+        "the error model, a drift or the noise, for no single mistake explains the residuals, which are "
+        f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model"
+        f"{', or larger uncertainties' if one.too_large else ''}"
+    )
+
+
+def _scatter_place(one: MoreScatter) -> str:
+    if one.of.position >= 0:
+        return f"in position {one.design.position_names[one.of.position]}"
+    return f"with probe {one.design.probe_names[one.of.probe]}"
+
+
+def _significance(one: Suspect | MoreScatter | Unexplained) -> str:
+    return f"(statistic {number(one.statistic, 3)}, limit {number(one.limit, 3)})"
+
+
+def _cause_name(given: Patterns, columns: Sequence[int]) -> str:
+    """A cause by name, without the axis if it is about several."""
+    told = name(given, columns[0])
+    if given.kind[columns[0]] == "distance" and len(columns) > 1:
+        ball = common_ball(given.design, given.subject[list(columns)])
+        return f"all certified distances of ball {given.design.ball_label(ball)}"
+    return told if len(columns) == 1 else told.rpartition(", ")[0]
+
+
+def with_uncertainty(value: float, uncertainty: float) -> str:
+    """A value with its standard uncertainty in brackets, to the latter's first digit, or second if it is 1 or 2.
+
+    >>> with_uncertainty(4.128, 0.71), with_uncertainty(31.28, 17.3), with_uncertainty(0.1234, 0.0123)
+    ('4.1(0.7)', '31(17)', '0.123(0.012)')
+    """
+    exponent = math.floor(math.log10(uncertainty))
+    decimals = max(-exponent + int(uncertainty / 10.0**exponent < 3.0), 0)
+    return f"{value:.{decimals}f}({uncertainty:.{decimals}f})"
+
+
+def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
+    given, k = one.patterns, one.pattern
+    design, kind, subject, axis = given.design, given.kind[k], int(given.subject[k]), int(given.axis[k])
+    size = f"{with_uncertainty(1e6 * abs(one.value), 1e6 * one.standard_uncertainty)} {SHOWN[one.unit]}"
+    letter = AXIS_NAMES[axis] if axis >= 0 else ""
+    high = "high" if one.value > 0 else "low"
+    long = "long" if one.value > 0 else "short"
+    lines = _lines(_touched(one), marks)
+    leave = f"check or leave out {lines}" if lines else "check or leave out the readings"
+    if kind in ("reading", "end"):
+        return f"{reading_name(design, subject)} read {_sizes(one, 'too high')}", leave
+    if kind == "length":
+        return f"{name(given, k)} read {size} too {long}", leave
+    if kind == "prior":
+        return f"{name(given, k)} stated {size} too {high}", "check it in the experiment file"
+    if kind == "coordinate":
+        return f"{name(given, k)} certified {size} too {high}", "check the certificate"
+    if kind == "distance" and len(_significant(one)) > 1:
+        common = common_ball(design, given.subject[one.columns])
+        told = f"certified distances of ball {design.ball_label(common)}: {_from(common, one)}"
+        return told, "check the certificate"
+    if kind in ("distance", "length value"):
+        what = length_name(design, subject, False) if kind == "length value" else name(given, k)
+        return f"{what} certified {size} too {long}", "check the certificate"
+    if kind == "scale":
+        artefact = design.artefact_names[subject]
+        told = f"all that is certified of {artefact} is {size} too {long}"
+        return told, "check the certificate, and the temperature of the artefact and of the scales"
+    if kind == "probe":
+        told = f"offset {letter} of probe {design.probe_names[subject]} stated {size} too {high}"
+        if len(one.columns) > 1:
+            told = f"offset of probe {design.probe_names[subject]} stated {_sizes(one, 'too high')}"
+        return told, "qualify the probe again, or let its offset be estimated"
+    place = design.position_names[subject] if kind in ("shift", "turn", "expansion") else ""
+    if kind in ("ball", "moved"):
+        ball = design.ball_label(int(design.readings.ball[subject]))
+        place = design.position_names[design.readings.position[subject]]
+        if kind == "ball":
+            told = f"ball {ball} in position {place} read {_sizes(one, 'too high')} each time"
+            return told, f"clean the ball, and {leave}"
+        told = f"ball {ball} displaced on its plate from position {place} on, by {_sizes(one, 'along')}"
+        return told, "look whether it is loose, dirty or another one; from there on it is a ball of its own"
+    artefact = design.artefact_names[design.position_artefact[subject]]
+    if kind in ("shift", "turn"):
+        return (
+            f"{artefact} slipped in position {place}, by {_sizes(one, 'along')}, {_moment(one, marks)}",
+            "read the position again, or state two positions, one for each part",
+        )
+    parts = []
+    for column, value, uncertainty in zip(one.columns, one.values, one.standard_uncertainties, strict=True):
+        larger = "larger" if value > 0 else "smaller"
+        told = f"{with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)} {SHOWN[one.unit]} {larger}"
+        parts.append(f"{told} in position {design.position_names[given.subject[column]]}")
+    return f"{artefact} {' and '.join(parts)}", "check the temperature there"
+
+
+def _from(ball: int, one: Suspect) -> str:
+    """Sizes by which the distances of a ball are wrong, those that are significant."""
+    given, ends = one.patterns.design.distances, one.patterns.design.ball_names
+    parts = []
+    for place in _significant(one):
+        distance, value = int(one.patterns.subject[one.columns[place]]), float(one.values[place])
+        first, second = int(given.first[distance]), int(given.second[distance])
+        size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
+        other = ends[second if first == ball else first]
+        parts.append(f"to {other} {size} um too {'long' if value > 0 else 'short'}")
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _significant(one: Suspect) -> Integers:
+    """Places of the directions that are significant, at least of the most significant one."""
+    ratio = np.abs(one.values) / one.standard_uncertainties
+    return np.flatnonzero((ratio >= CLEAR) | (ratio == ratio.max()))
+
+
+def _sizes(one: Suspect, how: str) -> str:
+    """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "… along x"."""
+    given = one.patterns
+    parts = []
+    for place in _significant(one):
+        column, value = one.columns[place], float(one.values[place])
+        size = with_uncertainty(1e6 * abs(value), 1e6 * float(one.standard_uncertainties[place]))
+        letter, unit = AXIS_NAMES[given.axis[column]], SHOWN[given.unit(int(column))]
+        if how == "too high":
+            parts.append(f"{size} {unit} too {'high' if value > 0 else 'low'} in {letter}")
+        else:
+            preposition = "about" if given.kind[column] == "turn" else "along"
+            parts.append(f"{'' if value > 0 else '-'}{size} {unit} {preposition} {letter}")
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
+
+
+def _moment(one: Suspect, marks: Sequence[Mark]) -> str:
+    """When a plate slipped, by the lines of the readings next to it."""
+    design, start = one.patterns.design, int(one.patterns.start[one.pattern])
+    rows = np.flatnonzero(design.readings.position == int(one.patterns.subject[one.pattern]))
+    before = int(rows[np.searchsorted(rows, one.first) - 1])
+    if marks:
+        lines, file = (marks[before].line, marks[one.last].line), Path(marks[start].file).name
+        probably = f", probably before line {marks[start].line}" if one.last > one.first else ""
+        return f"between lines {lines[0]} and {lines[1]} of {file}{probably}"
+    return f"between {reading_name(design, before)} and {reading_name(design, one.last)}"
+
+
+def _touched(one: Suspect) -> list[int]:
+    """Readings that a suspect is about."""
+    given, k = one.patterns, one.pattern
+    design, kind, subject = given.design, given.kind[k], int(given.subject[k])
+    readings = design.readings
+    if kind in ("reading", "end"):
+        return [subject]
+    if kind == "length":
+        ends = (int(design.lengths.first[subject]), int(design.lengths.second[subject]))
+        return [i for i in ends if i >= 0]
+    if kind in ("ball", "moved"):
+        order = position_order(design)[readings.position]
+        here = order == order[subject] if kind == "ball" else order >= order[subject]
+        return _indices(np.flatnonzero((readings.ball == readings.ball[subject]) & here))
+    if kind in ("shift", "turn"):
+        return [int(given.start[k])]
+    return []
+
+
+def _indices(found: Integers) -> list[int]:
+    return [int(i) for i in found]
+
+
+def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
+    """Where readings stand, such as "lines 5 and 7 of readings.csv"; empty if they stand in no file."""
+    if not marks or not readings:
+        return ""
+    numbers = [str(marks[i].line) for i in readings]
+    file = Path(marks[readings[0]].file).name
+    if len(numbers) == 1:
+        return f"line {numbers[0]} of {file}"
+    return f"lines {', '.join(numbers[:-1])} and {numbers[-1]} of {file}"
+
+
+def diagnosis_data(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
+    """What is suspected as plain data in metres, radians and ratios."""
+    told = [_suspect_data(one, marks) for one in found.suspects]
+    if found.scatter:
+        what = f"scatter of the readings {_scatter_place(found.scatter)}"
+        told.append(_other_data(what, "scatter", found.scatter, scatter_words(found.scatter)))
+    if found.unexplained:
+        what = found.unexplained.words or "error model, drift or noise"
+        told.append(_other_data(what, "model", found.unexplained, unexplained_words(found.unexplained)))
+    return told
+
+
+def _suspect_data(one: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
+    given = one.patterns
+    return {
+        "name": name(given, one.pattern),
+        "kind": str(given.kind[one.pattern]),
+        "value": one.value,
+        "standard_uncertainty": one.standard_uncertainty,
+        "unit": one.unit,
+        "statistic": one.statistic,
+        "limit": one.limit,
+        "lines": [marks[i].line for i in _touched(one)] if marks else [],
+        "directions": [
+            {"name": name(given, k), "value": value, "standard_uncertainty": u, "unit": given.unit(k)}
+            for k, value, u in zip(
+                one.columns.tolist(), one.values.tolist(), one.standard_uncertainties.tolist(), strict=True
+            )
+        ],
+        "alternatives": [*(_cause_name(given, columns) for columns in one.alternatives), *one.of_model],
+        "words": suspect_words(one, marks),
+    }
+
+
+def _other_data(what: str, kind: str, one: MoreScatter | Unexplained, words: str) -> dict[str, Any]:
+    return {
+        "name": what,
+        "kind": kind,
+        "value": one.times,
+        "standard_uncertainty": None,
+        "unit": "1",
+        "statistic": one.statistic,
+        "limit": one.limit,
+        "lines": [],
+        "directions": [],
+        "alternatives": [],
+        "words": words,
+    }

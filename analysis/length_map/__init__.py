@@ -1,0 +1,1 @@
+"""Uncertainties of lengths over the whole volume."""

@@ -1,0 +1,92 @@
+"""A choice of positions and certificates: what was chosen, and what each gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
+
+from ..results.prediction import Prediction
+from .constraints import Budget, Spent
+from .criteria import CriterionName
+from .schedule import Completion
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something is undetermined."""
+
+    candidate: Candidate
+    without: float
+    with_: float
+
+    @property
+    def relative(self) -> float:
+        """How much larger the criterion is without it."""
+        return self.without / self.with_ - 1.0
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The best selection found for a budget; `bound` is NaN where there is none."""
+
+    budget: Budget
+    spent: Spent
+    chosen: tuple[Candidate, ...]
+    value: float
+    bound: float
+
+
+@dataclass(frozen=True, repr=False)
+class Selection:
+    """A selection and what is to be said of it; values in metres, those of `condition` ratios.
+
+    `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
+    order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
+    `interrupted` are all that were read in part, and `left_open` counts the directions of their own poses and lengths
+    that stay undetermined where they are left so; nothing else depends on these. What has been read and is `ignored` is
+    no part of it. `value` is infinite where the
+    selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
+    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
+    the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
+    """
+
+    experiment: Experiment
+    pool: Pool
+    criterion: CriterionName
+    unit: str
+    excluded: int
+    budget: Budget
+    chosen: tuple[Candidate, ...]
+    done: tuple[Candidate, ...]
+    spent: Spent
+    value: float
+    bound: float
+    drawn: float | None
+    drawn_words: str
+    drawn_spent: Spent | None
+    target: float | None
+    gains: tuple[Gain, ...]
+    left_out: tuple[Gain, ...]
+    plan: Prediction
+    curve: tuple[CurvePoint, ...] = ()
+    completed: Completion | None = None
+    interrupted: tuple[Candidate, ...] = ()
+    left_open: int = 0
+    ignored: tuple[Candidate, ...] = ()
+
+    @property
+    def efficiency(self) -> float:
+        """Bound over value: the selection is at most this far from the best possible."""
+        return self.bound / self.value
+
+    @property
+    def drawn_is_within(self) -> bool:
+        """Whether what it is compared with keeps to the budget; then the choice is never worse."""
+        spent, budget = self.drawn_spent, self.budget
+        return spent is None or spent.is_within(budget)
+
+    @property
+    def is_determined(self) -> bool:
+        return bool(np.isfinite(self.value))

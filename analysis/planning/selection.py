@@ -1,0 +1,238 @@
+"""A selection of positions and certificates as it is told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.pool import with_chosen
+
+from ..report.campaign import draw_campaign
+from ..results.formatting import aligned, finite, number
+from ..results.result import Result
+from .choice import CurvePoint, Gain, Selection
+from .constraints import HOUR, Budget, Spent
+from .criteria import DESCRIPTIONS
+from .done import base_name
+from .schedule import RunSheet, run_sheet
+from .sheet_forms import sheet_data, sheet_lines
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Candidates left out, and reasons for leaving candidates out of the pool, that are told.
+TOLD = 5
+
+
+@dataclass(frozen=True, repr=False)
+class Campaign(Selection, Result):
+    """A selection that shows itself, with the run sheet of what was chosen."""
+
+    @property
+    def label(self) -> str:
+        return self.plan.label
+
+    @property
+    def title(self) -> str:
+        return self.plan.title
+
+    @property
+    def sheet(self) -> RunSheet:
+        """The choice in the order in which it is to be read."""
+        return run_sheet(self.chosen, self.pool.changes, self.done, self.completed, self.interrupted)
+
+    @property
+    def chosen_experiment(self) -> Experiment:
+        """The experiment with the chosen positions and certificates alone, in the order of the run sheet."""
+        return with_chosen(self.experiment, self.sheet.chosen)
+
+    def headline(self) -> str:
+        count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
+        if not self.is_determined:
+            return f"{count}; something stays undetermined"
+        value = f"{1e6 * self.value:.4g} um" if self.unit == "m" else f"{self.value:.4g}"
+        return f"{count}, {self.criterion} {value}"
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each step of the run sheet, times in seconds."""
+        return list(sheet_data(self.sheet)["steps"])
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The criterion against the budget, what each position gains, and the positions in the volume.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        return draw_campaign(self, path)
+
+
+def _lines(found: Campaign) -> list[str]:
+    """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the run sheet."""
+    lines = [
+        f"{found.plan.label}: {found.plan.title}",
+        f"{len(found.pool.candidates)} candidates{_dropped(found)}; no more than {found.budget}",
+        f"{found.criterion}: {DESCRIPTIONS[found.criterion]}",
+        "",
+        *_comparison(found),
+    ]
+    if not found.is_determined:
+        lines.append("no choice was found that determines everything; below is what the nearest one leaves open")
+    elif math.isnan(found.bound):
+        lines.append(f"there is no bound of {found.criterion}")
+    else:
+        lines.append(f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}")
+    if found.excluded:
+        lines.append(f"left out of {found.criterion}: {found.excluded} that no choice from this pool determines")
+    lines += _interrupted(found)
+    if found.gains:
+        lines += ["", *_gain_table(found)]
+    if found.curve:
+        lines += ["", *_curve_table(found)]
+    return [*lines, "", *found.plan.lines()[1:], "", *sheet_lines(found.sheet)]
+
+
+def _interrupted(found: Campaign) -> list[str]:
+    """What becomes of positions that were read in part."""
+    names = {one.name for one in found.chosen}
+    lines = []
+    for one in found.interrupted:
+        text = f"{one.name} was interrupted after {one.readings} reading{'' if one.readings == 1 else 's'}"
+        if found.completed is not None and found.completed.whole.name == one.name:
+            text += f"; {found.completed.rest.readings} more complete it"
+        elif again := [name for name in names if name != one.name and base_name(name) == base_name(one.name)]:
+            text += f'; it is set up again as "{again[0]}"'
+        else:
+            text += "; it is left so"
+        lines.append(text)
+    if found.left_open:
+        count = "one direction" if found.left_open == 1 else f"{found.left_open} directions"
+        lines.append(f"too little was read there to determine {count} of where it stood; nothing else depends on that")
+    for one in found.ignored:
+        lines.append(
+            f"{one.name} is left out: nothing else worth its time reads the other balls of {one.item.artefact}; "
+            "take its readings out of the file"
+        )
+    return lines
+
+
+def _dropped(found: Campaign) -> str:
+    words = [f"{count} {reason}" for reason, count in sorted(found.pool.dropped.items(), key=lambda item: -item[1])]
+    if not words:
+        return ""
+    more = [f"{len(words) - TOLD} reasons more"] if len(words) > TOLD else []
+    return f" (and not offered: {'; '.join([*words[:TOLD], *more])})"
+
+
+def _comparison(found: Campaign) -> list[str]:
+    rows = [["", found.criterion, "", "hours", "readings", "positions"]]
+    rows.append(["chosen", *_value(found, found.value), *_spent(found.spent)])
+    if not math.isnan(found.bound):
+        rows.append(["bound of any choice", *_value(found, found.bound), "", "", ""])
+    if found.drawn is not None and found.drawn_spent is not None:
+        words = found.drawn_words + ("" if found.drawn_is_within else " (more than allowed)")
+        rows.append([words, *_value(found, found.drawn), *_spent(found.drawn_spent)])
+    if found.target is not None:
+        rows.append(["target (of u)", *_value(found, found.target), "", "", ""])
+    return aligned(rows, [False, True, False, True, True, True])
+
+
+def _value(found: Campaign, value: float) -> list[str]:
+    if math.isinf(value):
+        return ["-", "deficient"]
+    return [number(1e6 * value), "um"] if found.unit == "m" else [number(value), ""]
+
+
+def _spent(spent: Spent) -> list[str]:
+    return [f"{spent.seconds / HOUR:.2f}", str(spent.readings), str(spent.positions)]
+
+
+def _percent(ratio: float) -> str:
+    return f"{100 * ratio:.1f} %"
+
+
+def _gain_table(found: Campaign) -> list[str]:
+    rows = [["", f"{found.criterion} without it", "with it", "minutes"]]
+    rows += [["chosen: " + gain.candidate.name, *_gain(found, gain)] for gain in found.gains]
+    rows += [["left out: " + gain.candidate.name, *_gain(found, gain)] for gain in found.left_out[:TOLD]]
+    return aligned(rows, [False, True, True, True])
+
+
+def _gain(found: Campaign, gain: Gain) -> list[str]:
+    without, with_ = (" ".join(_value(found, value)).strip("- ").strip() for value in (gain.without, gain.with_))
+    return [without, with_, f"{gain.candidate.seconds / 60:.0f}"]
+
+
+def _curve_table(found: Campaign) -> list[str]:
+    rows = [["no more than", found.criterion, "", "bound", "hours", "readings", "positions"]]
+    for point in found.curve:
+        bound = "-" if math.isnan(point.bound) else _value(found, point.bound)[0]
+        rows.append([str(point.budget), *_value(found, point.value), bound, *_spent(point.spent)])
+    return aligned(rows, [False, True, False, True, True, True, True])
+
+
+def _data(found: Campaign) -> dict[str, Any]:
+    """A campaign as data for JSON, in metres and seconds."""
+    return {
+        "experiment": found.plan.label,
+        "candidates": len(found.pool.candidates),
+        "dropped": dict(found.pool.dropped),
+        "criterion": found.criterion,
+        "unit": found.unit,
+        "budget": _budget_data(found.budget),
+        "value": finite(found.value),
+        "bound": finite(found.bound),
+        "drawn": None if found.drawn is None else finite(found.drawn),
+        "drawn_spent": None if found.drawn_spent is None else _spent_data(found.drawn_spent),
+        "target": found.target,
+        "excluded": found.excluded,
+        "spent": _spent_data(found.spent),
+        "chosen": [candidate.name for candidate in found.chosen],
+        "done": [candidate.name for candidate in found.done],
+        "interrupted": [{"name": one.name, "readings": one.readings} for one in found.interrupted],
+        "completed": None if found.completed is None else found.completed.whole.name,
+        "left_open": found.left_open,
+        "ignored": [candidate.name for candidate in found.ignored],
+        "gains": [_gain_data(gain) for gain in found.gains],
+        "left_out": [_gain_data(gain) for gain in found.left_out],
+        "curve": [_point_data(point) for point in found.curve],
+        "run_sheet": sheet_data(found.sheet),
+        "plan": found.plan.to_dict(),
+    }
+
+
+def _budget_data(budget: Budget) -> dict[str, Any]:
+    return {"seconds": budget.seconds, "readings": budget.readings, "positions": budget.positions}
+
+
+def _spent_data(spent: Spent) -> dict[str, Any]:
+    return {"seconds": spent.seconds, "readings": spent.readings, "positions": spent.positions}
+
+
+def _gain_data(gain: Gain) -> dict[str, Any]:
+    return {
+        "name": gain.candidate.name,
+        "without": finite(gain.without),
+        "with": finite(gain.with_),
+        "seconds": gain.candidate.seconds,
+    }
+
+
+def _point_data(point: CurvePoint) -> dict[str, Any]:
+    return {
+        "budget": _budget_data(point.budget),
+        "spent": _spent_data(point.spent),
+        "chosen": [candidate.name for candidate in point.chosen],
+        "value": finite(point.value),
+        "bound": finite(point.bound),
+    }

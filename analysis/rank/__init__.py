@@ -1,0 +1,1 @@
+"""What a design leaves undetermined, and in which words."""

@@ -1,0 +1,443 @@
+"""What a design cannot determine, in the names of errors, balls and positions.
+
+A null direction is a change of parameters that no observation notices. It is told as what trades against
+what: error functions with their size and shape, the deformation of the artefact, the motion of positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.machines.protocol import Array, HasLines
+from ballplate.simulator.numerics.rounding import above, comparable, printable
+
+from .canonical import elementary_mixture, principal_directions
+from .missing_bars import reasons
+
+# Parts of a direction that move points by less than this fraction of its largest part are not told.
+NEGLIGIBLE = 0.01
+
+# What moves points by less than this fraction of a direction's largest part is rounding.
+ROUNDING = 1e-9
+
+# A gap beyond this is one to mere rounding, and counts as this.
+GREAT = 1e9
+
+# A direction is weak when one standard deviation along it moves corrected points, relative to one another, by more
+# than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
+WEAK = 10.0
+
+# Curves that no polynomial of this degree describes are called irregular.
+HIGHEST = 10
+SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
+
+
+@dataclass(frozen=True)
+class FunctionPart:
+    """An error function's share of a direction: its largest value along the axis, in `unit`, and its shape."""
+
+    name: str
+    meaning: str
+    peak: float
+    unit: str
+    shape: str
+
+
+@dataclass(frozen=True)
+class ArtefactPart:
+    """An artefact's share: the largest displacement of a ball in metres, and the deformation in words."""
+
+    name: str
+    peak: float
+    words: str
+    balls: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PositionPart:
+    """A position's or a probe's share: its shift in metres, its turn in radians, and their axes in words if any."""
+
+    name: str
+    shift: float
+    turn: float
+    along: str = ""
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class LengthPart:
+    """The change of an unknown length, in metres."""
+
+    name: str
+    change: float
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of parameters that observations do not show, or show too weakly.
+
+    Null directions are scaled so that the part that moves points most moves them by one micrometre; weak ones are
+    as long as their standard deviation. `standard_deviation` is what a weak one adds to corrected points, relative
+    to one another, in metres, as the root mean square over the evaluation `points`; it adds more than `limit`, beyond
+    which a direction is weak, at `beyond` of them. It is infinite for a null direction.
+    """
+
+    functions: tuple[FunctionPart, ...]
+    artefacts: tuple[ArtefactPart, ...]
+    positions: tuple[PositionPart, ...]
+    standard_deviation: float = float("inf")
+    probes: tuple[PositionPart, ...] = ()
+    lengths: tuple[LengthPart, ...] = ()
+    points: int = 0
+    beyond: int = 0
+    limit: float = float("inf")
+
+    def __str__(self) -> str:
+        return in_words(self)
+
+
+def rank_complaint(deficiency: int, expected: int | None) -> str:
+    """A rank that is not the expected one, in words that are true where the file expects nothing.
+
+    >>> rank_complaint(1, None)
+    'rank deficiency 1, and the file does not say expected_rank_deficiency: 1'
+    >>> rank_complaint(0, 2)
+    'full rank where the file expects rank deficiency 2'
+    """
+    found = f"rank deficiency {deficiency}" if deficiency else "full rank"
+    if expected is None:
+        return f"{found}, and the file does not say expected_rank_deficiency: {deficiency}"
+    return f"{found} where the file expects {f'rank deficiency {expected}' if expected else 'full rank'}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a design determines its parameters.
+
+    `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`; `gap` is the ratio
+    across the border between determined and undetermined, `GREAT` at most. `reasons` tell what bars and gauges lack.
+    """
+
+    parameters: int
+    observations: int
+    deficiency: int
+    expected: int | None
+    singular_values: Array
+    gap: float
+    null: tuple[Direction, ...]
+    weak: tuple[Direction, ...]
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the deficiency is the one the file states; a file that states none expects full rank."""
+        return self.deficiency == (self.expected or 0)
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong where the deficiency is not as expected; otherwise empty."""
+        return "" if self.as_expected else rank_complaint(self.deficiency, self.expected)
+
+
+def verdict(at: Linearisation, expected: int | None = None, target: Target | None = None) -> Verdict:
+    """Judge a design from its spectrum; how the balls follow the undetermined directions is asked for where there are
+    any.
+    """
+    design, layout, found = at.design, at.layout, at.spectrum
+    weak, effect = _weak_roots(at, target)
+    limit = weak_limit(design, target)
+    open_ = np.concatenate([at.shared_null, weak], axis=1)
+    return Verdict(
+        design.parameter_count,
+        design.observations,
+        found.deficiency,
+        expected,
+        found.values,
+        found.gap if np.isinf(found.gap) else min(found.gap, GREAT),
+        null_directions(at),
+        _weak_directions(design, layout, weak, effect, limit),
+        reasons(design, layout, open_),
+    )
+
+
+def null_directions(at: Linearisation) -> tuple[Direction, ...]:
+    """The undetermined directions, in a basis in which each involves as little as possible."""
+    found = []
+    for mixture in independent_mixture(at).T:
+        shared, balls = at.shared_null @ mixture, at.ball_null @ mixture
+        moved = np.abs(shared / at.layout.scale).max(initial=0.0)
+        size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
+        found.append(_describe(at.design, at.layout, shared / size, balls / size))
+    return tuple(found)
+
+
+def independent_mixture(at: Linearisation) -> Array:
+    """Mixtures (k, k) of the null directions in which they are told: each involves as little as possible."""
+    return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])
+
+
+def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
+    """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to corrected points."""
+    root, effect = _principal(at)
+    columns = np.flatnonzero(above(effect, weak_limit(at.design, target)))[::-1]
+    return root[:, columns], effect[columns]
+
+
+def effects(at: Linearisation) -> Array:
+    """What one standard deviation along each determined direction adds to corrected points, in metres, (rank,).
+
+    Relative to one another, that is, as the root mean square over the points; empty where the design has none.
+    """
+    return _principal(at)[1]
+
+
+def _principal(at: Linearisation) -> tuple[Array, Array]:
+    """Determined directions (s, rank), one standard deviation long, and the effect of each on corrected points."""
+    design, layout, found = at.design, at.layout, at.spectrum
+    if not len(design.points) or found.rank == 0:
+        return np.zeros((len(layout), 0)), np.zeros(0)
+    change = _changes(design, layout, at.shared)
+    # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
+    effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
+    return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
+
+
+def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k) metres."""
+    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
+    return without_rigid_motion(design.points, jacobian @ roots[layout.model])
+
+
+def weak_limit(design: Design, target: Target | None) -> float:
+    """The effect, in metres, beyond which a direction is weak."""
+    if target is None:
+        return WEAK * float(design.repeatability.max())
+    return float(target.at(0.5 * float(np.linalg.norm(design.upper - design.lower))))
+
+
+def _weak_directions(
+    design: Design, layout: SharedLayout, roots: Array, effect: Array, limit: float
+) -> tuple[Direction, ...]:
+    if not roots.shape[1]:
+        return ()
+    directions = []
+    of_points = np.sqrt(2.0 * (_changes(design, layout, roots) ** 2).mean(axis=1))
+    beyond = above(of_points, limit).sum(axis=0)
+    for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
+        description = _describe(design, layout, root, np.zeros_like(design.balls))
+        weak = replace(description, artefacts=(), standard_deviation=size, points=len(design.points))
+        directions.append(replace(weak, beyond=count, limit=limit))
+    return tuple(directions)
+
+
+def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
+    """A direction in words, with the sign that makes the first of its changes a positive one."""
+    shared, balls = _less_rounding(layout, shared, balls)
+    told = _told(design, layout, shared, balls)
+    if told.functions:
+        first = told.functions[0].peak
+    elif told.lengths:
+        first = told.lengths[0].change
+    else:
+        every = np.concatenate([shared / layout.scale, balls.ravel()])
+        first = float(every[comparable(np.abs(every)).argmax()])
+    return told if first >= 0.0 else _told(design, layout, -shared, -balls)
+
+
+def _less_rounding(layout: SharedLayout, shared: Array, balls: Array) -> tuple[Array, Array]:
+    """A direction with zeros for what is mere rounding."""
+    effect = np.abs(shared / layout.scale)
+    least = ROUNDING * max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+    return np.where(effect > least, shared, 0.0), np.where(np.abs(balls) > least, balls, 0.0)
+
+
+def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
+    d = design.dimension
+    functions = _function_parts(design, layout, shared)
+    effect = np.abs(shared / layout.scale)
+    largest = max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+    positions = []
+    for k in design.posed_positions:
+        columns = layout.pose_columns[k]
+        values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
+        if above(effect[columns[columns >= 0]].max(initial=0.0), NEGLIGIBLE * largest):
+            shift, turn = np.linalg.norm(values[:d]), np.linalg.norm(values[d:])
+            along, about = _single_axis(values[:d], " along "), _single_axis(values[d:], " about ")
+            positions.append(PositionPart(design.position_names[k], float(shift), float(turn), along, about))
+    artefacts = []
+    for artefact in np.flatnonzero(design.is_plate):
+        members = np.flatnonzero(design.ball_artefact == artefact)
+        moved = np.sqrt((balls[members] ** 2).sum(axis=1))
+        if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
+            touched = tuple(design.ball_names[b] for b in members[above(moved, 0.1 * moved.max())])
+            words = deformation(design.balls[members], balls[members])
+            artefacts.append(ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched))
+    probes = []
+    for k, columns in enumerate(layout.offset_columns):
+        values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
+        if above(np.abs(values).max(), NEGLIGIBLE * largest):
+            probes.append(PositionPart(design.probe_names[k], float(np.linalg.norm(values)), 0.0))
+    lengths = tuple(
+        LengthPart(name, float(change))
+        for name, change in zip(design.length_names, shared[layout.lengths], strict=True)
+        if above(abs(change), NEGLIGIBLE * largest)
+    )
+    return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes), lengths=lengths)
+
+
+def _single_axis(vector: Array, word: str) -> str:
+    """The axis that a vector lies along, if it lies along one."""
+    if len(vector) == 1 or not vector.any():
+        return ""
+    axis = int(comparable(np.abs(vector)).argmax())
+    return f"{word}{'xyz'[axis]}" if abs(vector[axis]) > 0.999 * np.linalg.norm(vector) else ""
+
+
+def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tuple[FunctionPart, ...]:
+    a, parameters = shared[layout.model], layout.parameters[layout.model]
+    effect = np.abs(a / layout.scale[layout.model])
+    largest = float(np.abs(shared / layout.scale).max(initial=0.0))
+    parts = []
+    model = design.model
+    for name in dict.fromkeys(p.function for p in parameters):
+        members = [i for i, p in enumerate(parameters) if p.function == name]
+        if not above(effect[members].max(), NEGLIGIBLE * largest):
+            continue
+        parameter = parameters[members[0]]
+        if isinstance(model, HasLines):
+            t = np.linspace(0.0, 1.0, 201)
+            lines = model.lines(name, t)
+            values = np.stack([line.basis @ a[members] for line in lines])
+            peak = float(values.flat[comparable(np.abs(values)).argmax()])
+            k = int(comparable(np.ptp(values, axis=1)).argmax())
+            form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
+            parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, form))
+        else:
+            parts.append((effect[members].max(), name, parameter.meaning, float(a[members[0]]), parameter.unit, ""))
+    order = np.argsort(-comparable([part[0] for part in parts]), kind="stable")
+    return tuple(FunctionPart(*parts[k][1:]) for k in order)
+
+
+def shape(t: Array, values: Array) -> str:
+    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it; none for a constant.
+
+    >>> t = np.linspace(0, 1, 50)
+    >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5), shape(t, 0 * t + 2)
+    ('linear', 'quadratic', 'of degree 5', '')
+    """
+    if not np.ptp(values):
+        return ""
+    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, HIGHEST)
+    size = float(np.abs(values).max())
+    for degree in range(1, HIGHEST + 1):
+        part = basis[:, : degree + 1]
+        left = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
+        if np.abs(left).max() <= 1e-3 * size:
+            return SHAPES.get(degree, f"of degree {degree}")
+    return "irregular"
+
+
+def deformation(places: Array, displacement: Array) -> str:
+    """Words for how an artefact deforms, from ball places and their displacements, both (n, d).
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    >>> deformation(square, square * [1.0, -1.0])
+    'stretches along its x and shrinks along its y'
+    """
+    n, d = places.shape
+    moved = without_rigid_motion(places, displacement[:, :, None])[:, :, 0]
+    total = float((moved**2).sum())
+    if total <= 1e-12 * float((displacement**2).sum()):
+        return "moves as a whole"
+    centred = places - places.mean(axis=0)
+    linear = np.linalg.lstsq(centred, moved, rcond=1e-9)[0].T
+    rest = moved - centred @ linear.T
+    extent = np.ptp(places, axis=0)
+    words = []
+    if above(((centred @ linear.T) ** 2).sum(), 0.02 * total):
+        names = ("x", "y", "z")
+        stretch = np.array([linear[i, i] * (extent[i] > 0) for i in range(d)])
+        flat = [i for i in range(d) if extent[i] > 0]
+        largest = np.abs(linear).max()
+        used = [i for i in flat if above(abs(stretch[i]), 0.05 * largest)]
+        if len(used) > 1 and np.ptp(stretch[used]) < 0.02 * largest and len(used) == len(flat):
+            words.append("changes its size as a whole")
+        else:
+            grow = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] > 0)
+            shrink = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] < 0)
+            if grow:
+                words.append(f"stretches along {grow}" + (f" and shrinks along {shrink}" if shrink else ""))
+        sheared = [
+            (i, j) for i in flat for j in flat if i < j and above(abs(linear[i, j] + linear[j, i]), 0.1 * largest)
+        ]
+        words += [f"shears in its {names[i]}{names[j]} plane" for i, j in sheared]
+    if above((rest**2).sum(), 0.02 * total):
+        out_of_plane = d == 3 and extent[2] == 0 and above((rest[:, 2] ** 2).sum(), 0.5 * float((rest**2).sum()))
+        words.append("bends out of its plane" if out_of_plane else "distorts unevenly")
+    return ", ".join(words) if words else "deforms"
+
+
+def in_words(direction: Direction) -> str:
+    """A direction as a sentence: what trades against what, and by how much."""
+    parts = []
+    if direction.functions:
+        told = [_function_words(part) for part in direction.functions[:8]]
+        more = len(direction.functions) - len(told)
+        parts.append(", ".join(told) + (f" and {more} errors more" if more > 0 else ""))
+    for artefact in direction.artefacts:
+        parts.append(f"{artefact.name} {artefact.words} (balls by up to {length(artefact.peak)})")
+    if direction.positions:
+        told = [_position_words(part) for part in direction.positions[:6]]
+        more = len(direction.positions) - len(told)
+        parts.append("moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else ""))
+    if direction.probes:
+        parts.append("offsets of probes: " + ", ".join(_position_words(part) for part in direction.probes[:6]))
+    if direction.lengths:
+        parts.append(", ".join(f"{part.name} ({length(part.change)})" for part in direction.lengths))
+    if np.isinf(direction.standard_deviation):
+        end = "change together without changing any observation" if len(parts) > 1 else "changes no observation"
+    else:
+        end = (
+            f"known only to {length(direction.standard_deviation)} in corrected points, relative to one another "
+            f"(root mean square over {direction.points} points; more than {length(direction.limit)} at "
+            f"{direction.beyond} of them)"
+        )
+    return "; ".join(parts) + f": {end}"
+
+
+def _function_words(part: FunctionPart) -> str:
+    form = f", {part.shape}" if part.shape else ""
+    amount = {"m": length, "rad": angle, "1": ratio}[part.unit](part.peak)
+    return f"{part.name} ({part.meaning}{form}) by {amount}"
+
+
+def _position_words(part: PositionPart) -> str:
+    amounts = [length(part.shift) + part.along] if part.shift > 1e-12 else []
+    amounts += [angle(part.turn) + part.about] if part.turn > 1e-12 else []
+    return f"{part.name} ({', '.join(amounts)})"
+
+
+def length(value: float) -> str:
+    """A small length in micrometres.
+
+    >>> length(2.5e-7)
+    '0.25 um'
+    """
+    return f"{printable(value * 1e6):.3g} um"
+
+
+def angle(value: float) -> str:
+    """A small angle in microradians."""
+    return f"{printable(value * 1e6):.3g} urad"
+
+
+def ratio(value: float) -> str:
+    """A small ratio in parts per million."""
+    return f"{printable(value * 1e6):.3g} ppm"

@@ -1,0 +1,566 @@
+"""A reproduction as text for people, as Markdown for documents, and as plain data for programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..results.formatting import aligned, number
+from .compare import (
+    ComparedColumn,
+    ComparedErratum,
+    ComparedProgress,
+    ComparedRemark,
+    Figure,
+    PlacedFigure,
+    ProgressLine,
+    Reproduction,
+    Section,
+)
+from .published import REPEATABILITY, SUM_OF_SQUARES, SYMBOLS, Document, Remark, Reservation, case_of
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading; level 1 is that of the whole."""
+
+    level: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A sentence or more."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table: its head, its rows, and which columns stand to the right."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    right: tuple[bool, ...]
+
+
+Block = Heading | Paragraph | Grid
+
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
+
+
+def reproduction_lines(found: Reproduction) -> list[str]:
+    """A reproduction as lines of text, tables being no wider than 80 characters."""
+    lines: list[str] = []
+    for block in _blocks(found):
+        if isinstance(block, Heading):
+            lines += [*([""] if lines else []), block.text]
+        elif isinstance(block, Paragraph):
+            lines.append(block.text)
+        else:
+            lines += ["", *aligned([block.head, *block.rows], block.right), ""]
+    # Of two empty lines one is enough, and none at the end.
+    return [line for k, line in enumerate(lines) if line or any(lines[k + 1 : k + 2])]
+
+
+def reproduction_markdown(found: Reproduction) -> str:
+    """A reproduction as Markdown, with the assumptions that each figure rests on."""
+    parts = []
+    for block in _blocks(found, with_assumptions=True):
+        if isinstance(block, Heading):
+            parts.append(f"{'#' * block.level} {block.text}")
+        elif isinstance(block, Paragraph):
+            parts.append(block.text)
+        else:
+            marks = ["---:" if right else "---" for right in block.right]
+            cells = [block.head, marks, *block.rows]
+            parts.append("\n".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |" for row in cells))
+    return "\n\n".join(parts)
+
+
+def _blocks(found: Reproduction, with_assumptions: bool = False) -> list[Block]:
+    stated = found.document.statements
+    shown = {assumption for section in found.sections for assumption in section.rests_on}
+    blocks: list[Block] = [
+        Heading(1, f"{stated.title}: published figures and those computed from the shipped designs"),
+        Paragraph(
+            "Ratios are published over ours. Agreement means that they are within "
+            f"{100 * stated.limits.figure:g} % after the common factor of their column, and that factor within "
+            f"{100 * stated.limits.factor:g} % of 1, unless a numbered exception states other limits."
+        ),
+        Heading(2, "Assumptions"),
+    ]
+    blocks += [Paragraph(f"{one.key}: {one.text}.") for one in stated.assumptions if one.key in shown]
+    for section in found.sections:
+        blocks += _section_blocks(found.document, section, with_assumptions)
+    return blocks + _exception_blocks(found) + _summary(found)
+
+
+def _section_blocks(document: Document, section: Section, with_assumptions: bool) -> list[Block]:
+    blocks: list[Block] = [
+        Heading(2, f"Section {section.name}: {section.title}"),
+        Paragraph(f"Rests on {_resting(document, section)}."),
+    ]
+    if section.ranks:
+        rows = [(case_of(one.design), _rank(one.published), _rank(one.ours), yes(one.agrees)) for one in section.ranks]
+        blocks.append(_grid(("rank of", "published", "ours", "agrees"), rows, 1))
+    if section.columns:
+        blocks.append(Paragraph("Columns of tables, their common factor, and how far figures are from it:"))
+        blocks.append(_factors(section.columns))
+        text = (
+            "Published and computed U in um and urad; the ratio as it is, and after the common factor. Notes refer to "
+            "the exceptions and open differences at the end."
+        )
+        blocks.append(Paragraph(text))
+        blocks.append(_figures(section.columns, with_assumptions))
+    blocks += [Paragraph(_remark(one)) for one in section.remarks]
+    for erratum in section.errata:
+        blocks += _erratum(erratum)
+    for progress in section.progress:
+        blocks += _progress(progress)
+    if section.differences:
+        blocks += _differences(section)
+    if section.skipped:
+        blocks.append(Paragraph(f"Left out: {section.skipped}."))
+    for block in section.illegible:
+        blocks.append(
+            Paragraph(
+                f"Not legible in the copy at hand: Table {block.table}, {block.what}"
+                + ("; ours, in um and urad, for whoever has it:" if block.told else ".")
+            )
+        )
+    if section.told:
+        blocks.append(_told(section))
+    return blocks
+
+
+def _grid(head: Sequence[str], rows: Iterable[Sequence[str]], left: int) -> Grid:
+    """A table whose first `left` columns stand to the left, and the last one too unless it is a number."""
+    right = [False] * left + [True] * (len(head) - left)
+    right[-1] = head[-1] not in ("agrees", "note", "rests on")
+    if head[-1] == "rests on":
+        right[-2] = False
+    return Grid(tuple(head), tuple(tuple(row) for row in rows), tuple(right))
+
+
+def yes(agrees: bool) -> str:
+    """Whether something agrees, so that what does not is seen."""
+    return "yes" if agrees else "NO"
+
+
+def _rank(deficiency: int | str) -> str:
+    if deficiency == "some":
+        return "deficient"
+    return f"deficient by {deficiency}" if deficiency else "full rank"
+
+
+def _resting(document: Document, section: Section) -> str:
+    """Keys of the assumptions of a section, those of single quantities apart."""
+    chosen = [one for one in document.statements.assumptions if one.key in section.rests_on]
+    general = [one for one in chosen if not one.quantities]
+    special = [one for one in chosen if one.quantities]
+    text = f"assumptions {', '.join(one.key for one in general)}"
+    return "; ".join([text, *(f"{' and '.join(one.quantities)} on {one.key}" for one in special)])
+
+
+def _factors(columns: Sequence[ComparedColumn]) -> Grid:
+    rows = []
+    for one in columns:
+        compared = [f for f in one.figures if f.exception is None]
+        deviation = max(abs(f.adjusted - 1.0) for f in compared)
+        rows.append(
+            (
+                one.column.table,
+                one.column.statistic,
+                one.column.case,
+                f"{one.factor:.3f}",
+                str(len(compared)),
+                f"{100 * deviation:.1f}",
+                yes(one.agrees),
+            )
+        )
+    head = ("table", "statistic", "case", "factor", "figures", "off by at most, %", "agrees")
+    return _grid(head, rows, 3)
+
+
+def _figures(columns: Sequence[ComparedColumn], with_assumptions: bool) -> Grid:
+    rows = []
+    for one in columns:
+        for figure in one.figures:
+            row = [
+                one.column.table,
+                figure.quantity,
+                one.column.statistic,
+                one.column.case,
+                number(1e6 * figure.published, 5),
+                number(1e6 * figure.ours, 5),
+                f"{figure.ratio:.3f}",
+                f"{figure.adjusted:.3f}",
+                _note(figure),
+            ]
+            rows.append(row + ([", ".join(figure.rests_on)] if with_assumptions else []))
+    head = ["table", "", "statistic", "case", "published", "ours", "ratio", "/ factor", "note"]
+    return _grid(head + (["rests on"] if with_assumptions else []), rows, 4)
+
+
+def _note(figure: Figure) -> str:
+    words = [] if figure.agrees else ["DIFFERS"]
+    if figure.exception is not None:
+        words.append(f"{'open' if figure.exception.open else 'see'} {figure.exception.key}")
+    return ", ".join(words)
+
+
+def _remark(one: ComparedRemark) -> str:
+    ratios = f"{number(one.least, 3)} to {number(one.largest, 3)}"
+    if number(one.least, 3) == number(one.largest, 3):
+        ratios = number(one.least, 3)
+    names = ", ".join(one.remark.quantities)
+    against = " over the repeatability" if _over_repeatability(one.remark) else ""
+    verdict = "agrees" if one.agrees else "DIFFERS"
+    what = "" if one.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
+    return f"Said: {one.remark.text}. Ratio of {what}{names}{against}: {ratios}, {_wanted(one.remark)}; {verdict}."
+
+
+def _over_repeatability(remark: Remark) -> bool:
+    return all(other == REPEATABILITY for _, other in remark.pairs)
+
+
+def _wanted(remark: Remark) -> str:
+    words = []
+    if remark.at_least is not None:
+        words.append(f"at least {remark.at_least:g}")
+    if remark.at_most is not None:
+        words.append(f"at most {remark.at_most:g}")
+    return "has to be " + " and ".join(words)
+
+
+def _erratum(one: ComparedErratum) -> list[Block]:
+    verdict = "confirmed" if one.agrees else "NOT confirmed"
+    blocks: list[Block] = [Paragraph(f"Erratum in Table {one.erratum.table}: {one.erratum.text}; {verdict}.")]
+    for statistic in one.erratum.statistics:
+        rows = []
+        for line in one.lines:
+            if line.statistic != statistic:
+                continue
+            for words, design, ratios, deviation in (
+                ("headed", line.headed, line.as_headed, line.deviation_headed),
+                ("meant", line.meant, line.as_meant, line.deviation_meant),
+            ):
+                shown = (f"{ratios[symbol]:.3f}" if symbol in ratios else "-" for symbol in SYMBOLS)
+                rows.append((words, design, *shown, f"{100 * deviation:.0f}"))
+        blocks.append(_grid((statistic, "ratio to ours of", *SYMBOLS, "off, %"), rows, 2))
+    return blocks
+
+
+def _progress(one: ComparedProgress) -> list[Block]:
+    progress = one.progress
+    text = f"Table {progress.table}, {case_of(progress.design)}: "
+    if progress.settles is None:
+        text += f"published with {len(progress.steps)} iterations"
+    else:
+        text += f"published as {'settling' if progress.settles else 'not settling'}"
+        text += f" within {len(progress.steps)} iterations" if progress.steps else ""
+    text += f", ours {'settles' if one.settled else 'does not'} ({one.iterations} in all); {_verdict(one)}."
+    if progress.reason:
+        text += f" Figures without a limit: {progress.reason}."
+    rows = [
+        (line.quantity, _figure(line.published), _figure(line.ours), _wanted_of(line), yes(line.agrees))
+        for line in one.lines
+    ]
+    return [Paragraph(text), _grid(("iteration", "published", "ours", "ours has to be", "agrees"), rows, 1)]
+
+
+def _figure(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3e}"
+
+
+def _verdict(one: ComparedProgress) -> str:
+    return "agrees" if one.agrees else "DIFFERS"
+
+
+def _wanted_of(line: ProgressLine) -> str:
+    if line.rule == "shown":
+        return "anything"
+    return f"at most {line.limit:g} times" if line.rule == "most" else f"within a factor {line.limit:g}"
+
+
+def _differences(section: Section) -> list[Block]:
+    blocks: list[Block] = []
+    rows = []
+    for one in section.differences:
+        if one.comparison.failed:
+            blocks.append(
+                Paragraph(f"{one.difference.design}: {len(one.comparison.failed)} data sets did not converge.")
+            )
+        rows += [
+            (
+                case_of(one.difference.design),
+                {"rms": "rms", "maximum": "largest"}[part.quantity],
+                number(1e6 * part.published),
+                *(number(1e6 * value, 3) for value in np.quantile(part.values, QUANTILES)),
+                f"{100 * part.below:.0f} %",
+                yes(part.agrees),
+            )
+            for part in one.parts
+        ]
+    first = section.differences[0].comparison
+    text = (
+        "Corrected distances by an estimator of distances alone, less those by the full one, in um: the figure of the "
+        f"one published data set, and the quantiles of {first.trials} data sets of ours, into whose range it has to "
+        f"fall, and within a factor {section.differences[0].limit:g} of whose median."
+    )
+    quantiles = ("least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest")
+    head = ("case", "", "published", *quantiles, "below", "agrees")
+    return [*blocks, Paragraph(text), _grid(head, rows, 2)]
+
+
+def _told(section: Section) -> Grid:
+    rows = [
+        (
+            case_of(one.design),
+            statistic,
+            *(number(1e6 * getattr(one.quantities[symbol], statistic)) for symbol in SYMBOLS),
+        )
+        for one in section.told
+        for statistic in ("maximum", "average")
+    ]
+    return _grid(("case", "statistic", *SYMBOLS), rows, 2)
+
+
+def _excepted(found: Reproduction) -> list[tuple[Reservation, list[Figure]]]:
+    """Exceptions that figures of the sections fall under, open ones first, each with its figures."""
+    figures = [f for section in found.sections for column in section.columns for f in column.figures]
+    pairs = [
+        (one, [f for f in figures if f.exception == one])
+        for one in sorted(found.document.statements.exceptions, key=lambda one: not one.open)
+    ]
+    return [(one, under) for one, under in pairs if under]
+
+
+def _exception_blocks(found: Reproduction) -> list[Block]:
+    blocks: list[Block] = []
+    excepted = _excepted(found)
+    for title, is_open in (("Open differences", True), ("Exceptions with a reason", False)):
+        chosen = [(one, under) for one, under in excepted if one.open == is_open]
+        if chosen:
+            blocks.append(Heading(2, title))
+        for one, under in chosen:
+            ratios = [f.adjusted for f in under]
+            many = f"{len(under)} figures" if len(under) > 1 else "1 figure"
+            between = " to ".join(dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios))))
+            blocks.append(
+                Paragraph(
+                    f"{one.key}: {' and '.join(one.quantities)} in {_tables(one)}, {many}: after the "
+                    f"common factor {between} times ours, held to {one.within[0]:g} to {one.within[1]:g}. "
+                    f"{_sentence(one.reason)}"
+                )
+            )
+    return blocks
+
+
+def _tables(one: Reservation) -> str:
+    *others, last = one.tables
+    return f"Tables {', '.join(others)} and {last}" if others else f"Table {last}"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _summary(found: Reproduction) -> list[Block]:
+    figures = [f for section in found.sections for column in section.columns for f in column.figures]
+    regular = [f for f in figures if f.exception is None]
+    excepted = [f for f in figures if f.exception is not None]
+    columns = [column for section in found.sections for column in section.columns]
+    parts = []
+    for words, ones in (
+        ("figures of tables within the common limit", [f.agrees for f in regular]),
+        ("exceptions within their own", [f.agrees for f in excepted]),
+        ("common factors", [column.factor_agrees for column in columns]),
+        ("statements on rank", [one.agrees for section in found.sections for one in section.ranks]),
+        ("remarks", [one.agrees for section in found.sections for one in section.remarks]),
+        ("errata confirmed", [one.agrees for section in found.sections for one in section.errata]),
+        ("fits of exact readings", [one.agrees for section in found.sections for one in section.progress]),
+        ("differences of estimators", [p.agrees for s in found.sections for one in s.differences for p in one.parts]),
+    ):
+        if ones:
+            parts.append((words, f"{sum(ones)} of {len(ones)}"))
+    unexplained = sum(len(under) for one, under in _excepted(found) if one.open)
+    if unexplained:
+        parts.append(("open differences, unexplained", f"{unexplained} figures"))
+    text = "Everything compared agrees within what is stated." if found.agrees else "NOT everything compared agrees."
+    blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), Paragraph(text)]
+    if regular:
+        deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
+        factors = [column.factor for column in columns]
+        text = (
+            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are no exceptions are "
+            f"off by {100 * float(np.median(deviations)):.1f} % (median) and {100 * deviations.max():.1f} % at most."
+        )
+        blocks.append(Paragraph(text))
+    return blocks
+
+
+def reproduction_data(found: Reproduction) -> dict[str, Any]:
+    """A reproduction as plain data in metres and radians; what is undetermined is None."""
+    stated = found.document.statements
+    shown = {key for section in found.sections for key in section.rests_on}
+    return {
+        "document": stated.title,
+        "agrees": found.agrees,
+        "limits": stated.limits.model_dump(),
+        "assumptions": {one.key: one.text for one in stated.assumptions if one.key in shown},
+        "exceptions": {
+            one.key: {"reason": one.reason, "open": one.open, "within": list(one.within), "figures": len(under)}
+            for one, under in _excepted(found)
+        },
+        "sections": [_section_data(section) for section in found.sections],
+    }
+
+
+def _section_data(section: Section) -> dict[str, Any]:
+    return {
+        "section": section.name,
+        "title": section.title,
+        "agrees": section.agrees,
+        "rests_on": list(section.rests_on),
+        "ranks": [
+            {
+                "design": one.design,
+                "published": one.published,
+                "ours": one.ours,
+                "gap": _finite(one.gap),
+                "agrees": one.agrees,
+            }
+            for one in section.ranks
+        ],
+        "factors": [
+            {
+                "table": one.column.table,
+                "design": one.column.design,
+                "statistic": one.column.statistic,
+                "factor": _finite(one.factor),
+                "within": list(one.within),
+                "agrees": one.factor_agrees,
+            }
+            for one in section.columns
+        ],
+        "figures": [_figure_data(one, figure) for one in section.columns for figure in one.figures],
+        "remarks": [
+            {
+                "text": one.remark.text,
+                "quantities": list(one.remark.quantities),
+                "least_ratio": _finite(one.least),
+                "largest_ratio": _finite(one.largest),
+                "at_least": one.remark.at_least,
+                "at_most": one.remark.at_most,
+                "agrees": one.agrees,
+            }
+            for one in section.remarks
+        ],
+        "errata": [
+            {
+                "table": one.erratum.table,
+                "text": one.erratum.text,
+                "confirmed": one.agrees,
+                "columns": [
+                    {
+                        "statistic": line.statistic,
+                        "headed": line.headed,
+                        "meant": line.meant,
+                        "ratios_as_headed": {k: _finite(v) for k, v in line.as_headed.items()},
+                        "ratios_as_meant": {k: _finite(v) for k, v in line.as_meant.items()},
+                        "deviation_as_headed": _finite(line.deviation_headed),
+                        "deviation_as_meant": _finite(line.deviation_meant),
+                    }
+                    for line in one.lines
+                ],
+            }
+            for one in section.errata
+        ],
+        "convergence": [
+            {
+                "table": one.progress.table,
+                "design": one.progress.design,
+                "published_settles": one.progress.settles,
+                "ours_settles": one.settled,
+                "iterations": one.iterations,
+                "figures": [
+                    {
+                        "quantity": line.quantity,
+                        "published": _finite(line.published),
+                        "ours": _finite(line.ours),
+                        "rule": line.rule,
+                        "limit": line.limit,
+                        "agrees": line.agrees,
+                    }
+                    for line in one.lines
+                ],
+                "agrees": one.agrees,
+            }
+            for one in section.progress
+        ],
+        "differences": [
+            {
+                "design": one.difference.design,
+                "trials": one.comparison.trials,
+                "not_converged": list(one.comparison.failed),
+                **{part.quantity: _placed_data(part) for part in one.parts},
+                "agrees": one.agrees,
+            }
+            for one in section.differences
+        ],
+        "computed_only": [
+            {
+                "design": one.design,
+                "quantities": {
+                    symbol: {
+                        "maximum": _finite(one.quantities[symbol].maximum),
+                        "average": _finite(one.quantities[symbol].average),
+                        "unit": one.quantities[symbol].unit,
+                    }
+                    for symbol in SYMBOLS
+                },
+            }
+            for one in section.told
+        ],
+        "illegible": [{"table": block.table, "what": block.what} for block in section.illegible],
+        "left_out": section.skipped or None,
+    }
+
+
+def _figure_data(one: ComparedColumn, figure: Figure) -> dict[str, Any]:
+    return {
+        "table": one.column.table,
+        "quantity": figure.quantity,
+        "statistic": one.column.statistic,
+        "case": one.column.case,
+        "design": one.column.design,
+        "unit": figure.unit,
+        "published": figure.published,
+        "ours": _finite(figure.ours),
+        "ratio": _finite(figure.ratio),
+        "ratio_after_factor": _finite(figure.adjusted),
+        "within": list(figure.within),
+        "exception": figure.exception.key if figure.exception else None,
+        "rests_on": list(figure.rests_on),
+        "agrees": figure.agrees,
+    }
+
+
+def _placed_data(part: PlacedFigure) -> dict[str, Any]:
+    return {
+        "published": part.published,
+        "median": part.median,
+        "quantiles": {str(q): float(v) for q, v in zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)},
+        "share_below_published": part.below,
+        "agrees": part.agrees,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

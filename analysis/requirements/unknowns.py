@@ -1,0 +1,274 @@
+"""What may be solved for: each unknown as a family of experiment files, one for each of its values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from itertools import product
+from typing import Literal
+
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.variants import node_at, override
+from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length_function
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, child
+
+from .steps import at_step, exact, round_down, round_up, step_of, times
+
+UnknownName = Literal["repeatability", "certificate", "repeats", "balls", "size"]
+NAMES: tuple[UnknownName, ...] = ("repeatability", "certificate", "repeats", "balls", "size")
+
+# Ratio to the present value at which a repeatability or certificate counts as exact, or as of no use.
+EXTREME = 10_000
+# Balls on a side, repeats of a reading, and ratio of the present size to the smallest, that are looked at.
+MOST_BALLS, MOST_REPEATS, SMALLEST = 30, 10_000, 20
+# Ratio of the largest size that is looked at to the present one; the volume is smaller.
+LARGEST = 100
+
+
+class NotVariableError(ValueError):
+    """The experiment has nothing of the kind, or several of which none is chosen; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One quantity of an experiment with values `first` to `last`, by their places in an order of small to large.
+
+    `tree` gives the file with a value, `words` the value in words and `value` in metres, or as a number. `grows`: a
+    larger value makes everything better; otherwise a smaller one does; `is_monotone` whether that is sure. `present`
+    is the value as drawn, in words, and `drawn` the value next to it.
+    """
+
+    name: UnknownName
+    title: str
+    present: str
+    drawn: int
+    first: int
+    last: int
+    grows: bool
+    is_monotone: bool
+    tree: Callable[[int], Node]
+    words: Callable[[int], str]
+    value: Callable[[int], float]
+
+
+def unknown(
+    name: UnknownName, experiment: Experiment, root: Node, artefact: str | None, calibration: int | None
+) -> Unknown:
+    """An unknown of the experiment whose file is `root`.
+
+    `artefact` and `calibration`, an index, choose where there are several.
+
+    :raises NotVariableError: the experiment has no such thing, or several.
+    """
+    if artefact is not None and artefact not in experiment.artefacts:
+        raise NotVariableError(f'unknown artefact "{artefact}"; {hint(artefact, experiment.artefacts)}')
+    if calibration is not None and calibration >= len(experiment.calibration):
+        count = len(experiment.calibration)
+        known = f"the indices are 0 to {count - 1}" if count else "there is none"
+        raise NotVariableError(f"there is no calibration[{calibration}]; {known}")
+    if name == "repeatability":
+        return _scaled(name, "machine's repeatability", root, ["machine.repeatability"])
+    if name == "certificate":
+        chosen = [
+            k
+            for k, one in enumerate(experiment.calibration)
+            if artefact in (None, one.artefact) and calibration in (None, k)
+        ]
+        if not chosen:
+            of = "" if artefact is None else f' of "{artefact}"'
+            raise NotVariableError(f"the file states no calibration{of}; without certificate there is none to improve")
+        paths = [f"calibration[{k}].standard_uncertainty" for k in chosen]
+        return _scaled(name, "certificate's standard uncertainty", root, paths)
+    if name == "repeats":
+        return _repeats(experiment, root, artefact)
+    return _of_plate(name, experiment, root, artefact)
+
+
+def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unknown:
+    """Uncertainties that are multiplied by the same factor; the first of them has three digits, the others less."""
+    nodes = [node_at(root, path) for path in paths]
+    leaves = [leaf for node in nodes if node is not None for leaf in _leaves(node)]
+    lead = exact(leaves[0].constant or leaves[0].slope)
+
+    def factor(step: int) -> Fraction:
+        return Fraction(at_step(step)) / Fraction(lead)
+
+    def tree(step: int) -> Node:
+        found = root
+        for path, node in zip(paths, nodes, strict=True):
+            assert node is not None
+            found = override(found, path, _with_leaves(node, factor(step)), node.mark)
+        return found
+
+    def words(step: int) -> str:
+        return _several([_text(leaf, factor(step)) for leaf in leaves])
+
+    middle = step_of(lead)
+    width = step_of(Decimal(EXTREME))
+    present = _several([_text(leaf, Fraction(1)) for leaf in leaves])
+    return Unknown(name, title, present, middle, middle - width, middle + width, False, True, tree, words, _metres)
+
+
+def _metres(step: int) -> float:
+    return float(at_step(step))
+
+
+def _leaves(node: Node) -> list[LengthFunction]:
+    if isinstance(node, Scalar):
+        return [parse_length_function(node.value)]
+    parts = node.items.values() if isinstance(node, Mapping) else node.items
+    return [leaf for part in parts for leaf in _leaves(part)]
+
+
+def _with_leaves(node: Node, factor: Fraction) -> Node:
+    """The node with all uncertainties multiplied and cut to three digits."""
+    if isinstance(node, Scalar):
+        return Scalar(node.mark, _text(parse_length_function(node.value), factor))
+    if isinstance(node, Mapping):
+        return Mapping(node.mark, {k: _with_leaves(v, factor) for k, v in node.items.items()}, node.key_marks)
+    return Sequence(node.mark, tuple(_with_leaves(one, factor) for one in node.items))
+
+
+def _text(leaf: LengthFunction, factor: Fraction) -> str:
+    """An uncertainty multiplied by a factor, as it is written; cut to three digits unless the factor is 1."""
+    constant = exact(leaf.constant)
+    if constant and factor != 1:
+        constant = round_down(times(constant, factor))
+    told = format_length(float(constant))
+    if not leaf.slope:
+        return told
+    divisor = 1 / exact(leaf.slope)
+    divisor = divisor if factor == 1 else round_up(times(divisor, 1 / factor))
+    return f"{told} + L/{float(divisor):.9g}"
+
+
+def _several(texts: list[str]) -> str:
+    """One text for all, where all are the same."""
+    return texts[0] if len(set(texts)) == 1 else listing(texts, 3)
+
+
+def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknown:
+    """How often everything is read: so many times, or so many times as often where repeats differ."""
+    places = [k for k, one in enumerate(experiment.positions) if artefact in (None, one.artefact)]
+    groups = [
+        (f"positions[{k}].readings[{j}]" if _has_groups(root, k) else f"positions[{k}]", group.repeats)
+        for k in places
+        for j, group in enumerate(experiment.positions[k].readings)
+    ]
+    counts = sorted({count for _, count in groups})
+    if not counts:
+        raise NotVariableError(f'"{artefact}" is never placed')
+    is_same = len(counts) == 1
+
+    def tree(step: int) -> Node:
+        found = root
+        for path, count in groups:
+            mark = root.mark
+            found = override(found, f"{path}.repeats", Scalar(mark, step if is_same else step * count), mark)
+        return found
+
+    def words(step: int) -> str:
+        return str(step) if is_same else f"{step} times as many"
+
+    present = str(counts[0]) if is_same else f"{counts[0]} to {counts[-1]}"
+    most = MOST_REPEATS if is_same else MOST_REPEATS // counts[-1]
+    return Unknown(
+        "repeats",
+        "repeats of every reading",
+        present,
+        counts[0] if is_same else 1,
+        1,
+        most,
+        True,
+        True,
+        tree,
+        words,
+        int,
+    )
+
+
+def _has_groups(root: Node, position: int) -> bool:
+    return child(node_at(root, f"positions[{position}]"), "readings") is not None
+
+
+def _of_plate(name: UnknownName, experiment: Experiment, root: Node, artefact: str | None) -> Unknown:
+    """Balls per side, or size, of a grid or square."""
+    fitting = [
+        one
+        for one, settings in experiment.artefacts.items()
+        if isinstance(settings, GridSettings | SquareSettings) and artefact in (None, one)
+    ]
+    if artefact is None:
+        plates = [one for one in fitting if experiment.artefacts[one].role == "plate"]
+        fitting = plates or fitting
+    if not fitting:
+        of = "no artefact is" if artefact is None else f'"{artefact}" is not'
+        raise NotVariableError(f"{of} of kind grid or square, whose {name} could be varied")
+    if len(fitting) > 1:
+        raise NotVariableError(f"there are several plates; choose one with --artefact: {listing(fitting)}")
+    plate = experiment.artefacts[fitting[0]]
+    assert isinstance(plate, GridSettings | SquareSettings)
+    path = f"artefacts[{fitting[0]}].{name}"
+    return _balls(plate, root, path) if name == "balls" else _size(plate, root, path)
+
+
+def _balls(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknown:
+    """Balls of a plate of the same size, in the order of their number."""
+    mark, present = root.mark, plate.balls
+    every: list[tuple[int, ...]]
+    if isinstance(present, int):
+        every = [(side,) for side in range(2, max(MOST_BALLS, present) + 1)]
+    else:
+        every = list(_grids(*present))
+
+    def tree(step: int) -> Node:
+        scalars = tuple(Scalar(mark, count) for count in every[step])
+        node = scalars[0] if isinstance(present, int) else Sequence(mark, scalars)
+        return override(root, path, node, mark)
+
+    def words(step: int) -> str:
+        return f"{every[step][0]} a side" if isinstance(present, int) else " x ".join(map(str, every[step]))
+
+    def value(step: int) -> float:
+        return every[step][0]
+
+    drawn = every.index((present,) if isinstance(present, int) else present)
+    last = len(every) - 1
+    return Unknown("balls", "balls of the plate", words(drawn), drawn, 0, last, True, False, tree, words, value)
+
+
+def _grids(columns: int, rows: int) -> Iterator[tuple[int, int]]:
+    """Columns and rows with which one side is within a ball of being in proportion to the other, by their number.
+
+    Of as many balls, those nearest to the proportion come first.
+    """
+    sides = range(2, max(MOST_BALLS, columns, rows) + 1)
+    near = [(n, m) for n, m in product(sides, sides) if abs(m * columns - n * rows) <= max(columns, rows)]
+    yield from sorted(near, key=lambda grid: (grid[0] * grid[1], abs(grid[1] * columns - grid[0] * rows), -grid[0]))
+
+
+def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknown:
+    """Size of a plate with the same balls, and the same ratio of its sides; its positions keep corner or centre."""
+    mark = root.mark
+    edges = [plate.size] if isinstance(plate, SquareSettings) else list(plate.size)
+    lead = exact(edges[0])
+
+    def texts(step: int) -> list[str]:
+        factor = Fraction(at_step(step)) / Fraction(lead)
+        return [format_length(float(round_down(times(exact(edge), factor), 6))) for edge in edges]
+
+    def tree(step: int) -> Node:
+        scalars = tuple(Scalar(mark, text) for text in texts(step))
+        node = scalars[0] if isinstance(plate, SquareSettings) else Sequence(mark, scalars)
+        return override(root, path, node, mark)
+
+    def words(step: int) -> str:
+        return " x ".join(texts(step))
+
+    present = " x ".join(map(format_length, edges))
+    first, drawn, last = (step_of(one) for one in (lead / SMALLEST, lead, lead * LARGEST))
+    return Unknown("size", "size of the plate", present, drawn, first, last, True, False, tree, words, _metres)

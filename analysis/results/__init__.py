@@ -1,0 +1,1 @@
+"""Results that show themselves, and how they are written."""

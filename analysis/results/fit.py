@@ -1,0 +1,337 @@
+"""The estimate from readings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+
+from ..gross_errors.suspects import Diagnosis
+from ..gross_errors.wording import diagnosis_data, diagnosis_lines
+from ..rank.verdict import Verdict
+from ..report.vectors import Vectors, draw_vectors
+from ..uncertainty.summaries import Quantity
+from ..uncertainty.tasks import TaskUncertainty
+from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .estimates import (
+    CorrectedPoints,
+    EstimatedFunctions,
+    ParameterEstimate,
+    correct,
+    estimated_functions,
+    labels,
+)
+from .formatting import SHOWN, aligned, finite, number, to_uncertainty
+from .parts import (
+    adjustment_data,
+    adjustment_lines,
+    plate_data,
+    plate_table,
+    quantities_data,
+    task_data,
+    task_table,
+    uncertainty_table,
+    verdict_data,
+    verdict_lines,
+)
+from .plates import PlateCoordinates
+from .prediction import length_headline, rank_words
+from .residuals import Residual, reading_residuals
+from .result import Result
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+# Steps of an iteration below this, in metres and radians, are told as rounding.
+LEAST_STEP = 1e-10
+
+# The largest residuals that the text names.
+SHOWN_RESIDUALS = 3
+
+
+@dataclass(frozen=True, repr=False)
+class Fit(Result):
+    """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
+
+    `x` (readings, d) are the scale readings in metres. `sigma` multiplies all stated uncertainties: estimated from the
+    residuals as the root of S^2 over the degrees of freedom, or 1 where the file says that they are given.
+    `adjustments` are those of a three-dimensional metric.
+    `diagnosis` is what the residuals make suspect, which nothing else here heeds, or `untested` says why there is none;
+    `marks` tell where readings stand.
+    With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1].
+    """
+
+    label: str
+    title: str
+    design: Design
+    x: Array
+    solution: Solution
+    verdict: Verdict
+    sigma: float
+    sigma_is_estimated: bool
+    degrees_of_freedom: int
+    quantities: dict[str, Quantity]
+    estimates: tuple[ParameterEstimate, ...]
+    largest: tuple[Residual, ...]
+    plates: tuple[PlateCoordinates, ...] = ()
+    adjustments: tuple[Adjustment, ...] = ()
+    tasks: tuple[TaskUncertainty, ...] = ()
+    diagnosis: Diagnosis = Diagnosis()
+    marks: tuple[Mark, ...] = ()
+    monomials: bool = False
+    untested: str = ""
+
+    def headline(self) -> str:
+        if not self.converged:
+            return f"the estimate has {self.solution.status}"
+        return ", ".join([rank_words(self.verdict), f"sigma {self.sigma:.3g}", *length_headline(self.quantities)])
+
+    def lines(self) -> list[str]:
+        record = self.solution.iterations
+        verdict = verdict_lines(self.verdict, with_values=True, lengths=self.quantities.get("U6"))
+        lines = [f"{self.label}: {self.title}", *verdict]
+        how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
+        summary = f"{self.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
+        if self.converged:
+            summary += f" with {freedom_words(self.degrees_of_freedom)}; sigma = {self.sigma:.4g} times the stated "
+            summary += f"uncertainties ({how})"
+        rows = [["iteration", "step", "S^2"]]
+        rows += [[str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
+        lines += [summary, "", *aligned(rows, [True, True, True])]
+        if not self.converged:
+            return lines
+        lines += ["", *self._residual_table()]
+        if self.diagnosis:
+            lines += diagnosis_lines(self.diagnosis, self.marks)
+        lines += ["", *uncertainty_table(self.quantities), ""]
+        lines += [*task_table(self.tasks), ""] if self.tasks else []
+        rows = [["parameter", "value", "standard uncertainty", "unit"]]
+        for estimate in (one for one in self.estimates if one.kind not in ("origin", "ball")):
+            rows.append(
+                [
+                    estimate.name,
+                    to_uncertainty(1e6 * estimate.value, 1e6 * estimate.standard_uncertainty),
+                    number(1e6 * estimate.standard_uncertainty, 3),
+                    SHOWN[estimate.unit],
+                ]
+            )
+        lines += aligned(rows, [False, True, True, False])
+        lines.append("(origins of positions and co-ordinates of balls are among the estimates of --json)")
+        if self.adjustments:
+            lines += ["", *adjustment_lines(self.adjustments)]
+        for plate in self.plates:
+            lines += ["", *plate_table(plate, named=len(self.plates) > 1)]
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        suspected: dict[str, Any] = {}
+        if self.diagnosis:
+            suspected = {"suspected": diagnosis_data(self.diagnosis, self.marks)}
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            **verdict_data(self.verdict),
+            "status": self.solution.status,
+            "sigma": self.sigma,
+            "sigma_is_estimated": self.sigma_is_estimated,
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "too_large": self.too_large,
+            "sum_of_squares": finite(self.solution.factor.sum_of_squares),
+            "iterations": [
+                {"step": finite(it.step), "sum_of_squares": finite(it.sum_of_squares)}
+                for it in self.solution.iterations
+            ],
+            "quantities": quantities_data(self.quantities),
+            **({"tasks": task_data(self.tasks)} if self.tasks else {}),
+            "largest_residuals": [
+                {
+                    "position": one.position,
+                    "ball": one.ball,
+                    "probe": one.probe,
+                    "axis": one.axis,
+                    "value": one.value,
+                    "unit": "m",
+                    "standard_uncertainties": one.standardised / self.sigma,
+                }
+                for one in self.largest
+            ],
+            **suspected,
+            "estimates": self._estimates_data(),
+            **({"plates": {plate.artefact: plate_data(plate) for plate in self.plates}} if self.plates else {}),
+            **({"adjustments": adjustment_data(self.adjustments)} if self.adjustments else {}),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each parameter."""
+        return [
+            {
+                "parameter": one.name,
+                "kind": one.kind,
+                "value": one.value,
+                "standard uncertainty": one.standard_uncertainty,
+                "unit": one.unit,
+            }
+            for one in self.estimates
+        ]
+
+    @property
+    def converged(self) -> bool:
+        return self.solution.status == "converged"
+
+    @cached_property
+    def functions(self) -> EstimatedFunctions:
+        """Everything estimated and the measuring tasks, as functions of the parameters; without sigma.
+
+        :raises ValueError: the estimate has not converged.
+        """
+        if not self.converged:
+            raise ValueError(f"the estimate has {self.solution.status}; nothing is known of its uncertainty")
+        return estimated_functions(linearised_fit(self.design, self.solution), self.monomials)
+
+    def covariance(self, *chosen: str) -> pandas.DataFrame:
+        """Covariance of estimates and measuring tasks, in products of their units; NaN where one is undetermined.
+
+        Each of `chosen` is a name or a kind: machine, pose (or origin, rotation), offset, length, ball, task; without
+        any it is that of everything. The uncertainties are multiplied by `sigma`, as everywhere in a fit.
+
+        :raises ValueError: there is no such name, or the estimate has not converged.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.covariance("machine", "r1c2: x").shape
+        (70, 70)
+        """
+        import pandas
+
+        found = self.functions.choose(chosen)
+        return pandas.DataFrame(self.sigma**2 * found.covariance(), found.labels, found.labels)
+
+    def correlation(self, *chosen: str) -> pandas.DataFrame:
+        """Correlation coefficients of what `covariance` gives; NaN also beside what has no uncertainty.
+
+        :raises ValueError: there is no such name, or the estimate has not converged.
+        """
+        found = self.covariance(*chosen)
+        spread = np.sqrt(np.diagonal(found))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return found / np.outer(spread, spread)
+
+    def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
+        """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint covariance.
+
+        `probe` is the name of one, or of one for each point; without any it is that of the evaluation points. Of
+        points outside the volume the correction is extrapolated.
+
+        :raises ValueError: points of another shape, an unknown probe, or an estimate that has not converged.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.correct([[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]], "down").covariance.shape
+        (6, 6)
+        """
+        design, given = self.design, np.asarray(points, float)
+        if given.ndim != 2 or given.shape[1] != design.dimension:
+            raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
+        names = design.probe_names
+        given_probe = names[design.point_probe] if probe is None else probe
+        asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
+        for name in asked:
+            if name not in names:
+                raise ValueError(f'no probe "{name}"; {hint(name, names)}')
+        if len(asked) not in (1, len(given)):
+            raise ValueError(f"{len(asked)} probes for {len(given)} points")
+        probes = np.broadcast_to([names.index(name) for name in asked], len(given))
+        return correct(self.functions.at, given, probes, self.sigma)
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Residuals of a two-dimensional fit that has converged, for each position."""
+        design = self.design
+        readings, residuals, _ = reading_residuals(design, self.solution, self.x)
+        places = self.x[design.plate_readings]
+        return tuple(
+            Vectors(
+                design.position_names[k],
+                places[mine],
+                residuals[mine],
+                tuple(design.ball_names[ball] for ball in readings.ball[mine]),
+            )
+            for k in np.unique(readings.position)
+            for mine in [readings.position == k]
+        )
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Residuals of a two-dimensional fit as magnified vectors where the balls were read.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else, the fit has three dimensions, or has not converged.
+        """
+        if self.design.dimension != 2 or not self.converged:
+            why = "has three dimensions" if self.converged else f"has {self.solution.status}"
+            raise ValueError(f"residuals are drawn of fits in two dimensions that have converged; this one {why}")
+        return draw_vectors(self.residual_vectors(), self.title, path)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is to be said of sigma where it comes from few degrees of freedom, and of what was not tested."""
+        found = []
+        if self.sigma_is_estimated:
+            remedy = "--sigma given takes the uncertainties as stated"
+            found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
+        if self.untested:
+            found.append(
+                f"{self.untested}: fit the means of repeated readings, with u as a column, to have them tested"
+            )
+        return tuple(filter(None, found))
+
+    @property
+    def too_large(self) -> bool:
+        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in a thousand."""
+        from scipy.special import chdtri
+
+        if not self.converged or self.degrees_of_freedom <= 0:
+            return False
+        return self.solution.factor.sum_of_squares > float(chdtri(self.degrees_of_freedom, 1e-3))
+
+    def _residual_table(self) -> list[str]:
+        """The largest residuals as lines of text."""
+        rows = [["largest residuals", "", "", "", "um", "standard uncertainties"]]
+        for one in self.largest[:SHOWN_RESIDUALS]:
+            rows.append(
+                [
+                    one.position,
+                    one.ball,
+                    one.probe,
+                    one.axis,
+                    number(1e6 * one.value),
+                    number(one.standardised / self.sigma),
+                ]
+            )
+        return aligned(rows, [False, False, False, False, True, True])
+
+    def _estimates_data(self) -> dict[str, Any]:
+        """Estimates by name; by kind and name where a model gives a parameter the name that another kind has."""
+        return {
+            name: {
+                "value": finite(one.value),
+                "standard_uncertainty": finite(one.standard_uncertainty),
+                "unit": one.unit,
+            }
+            for name, one in zip(labels(self.estimates), self.estimates, strict=True)
+        }
+
+
+def _step(step: float) -> str:
+    """The length of an iteration's step, in metres and radians; a last one may be mere rounding."""
+    return f"{step:.1e}" if not step < LEAST_STEP else f"below {LEAST_STEP:.0e}"

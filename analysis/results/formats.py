@@ -1,0 +1,186 @@
+"""Tables as text, Markdown, HTML, CSV and LaTeX."""
+
+from __future__ import annotations
+
+import io
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+from html import escape
+
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
+
+from .formatting import aligned
+from .table import Block, Row, Table
+
+WIDTH = 120
+
+
+def as_text(title: str, tables: Sequence[Table]) -> str:
+    """Tables for reading as they are."""
+    parts = [title]
+    for table in tables:
+        parts += ["", f"{table.caption}", *_text_rows(table)]
+        for note in table.notes:
+            parts += textwrap.wrap(note, WIDTH)
+    return "\n".join(parts) + "\n"
+
+
+def _text_rows(table: Table) -> list[str]:
+    stubs, count = len(table.headings), len(table.columns)
+    right = [False] * stubs + [True] * count
+    indent = "  " if table.block else ""
+    spanned = f"{table.spanner} " if table.spanner else ""
+    head = [*table.headings, *table.columns]
+    head[0] = head[0] or spanned.strip()
+    rows, titles = [head], {}
+    for block in table.blocks:
+        if block.title:
+            titles[len(rows)] = block.title
+        rows += [[indent + row.headings[0], *row.headings[1:], *(e.text for e in row.entries)] for row in block.rows]
+    lines = []
+    for k, line in enumerate(aligned(rows, right)):
+        lines += [titles[k]] if k in titles else []
+        lines.append(line)
+    return lines
+
+
+def as_markdown(title: str, tables: Sequence[Table]) -> str:
+    """Tables as GitHub and Pandoc read them."""
+    parts = [f"# {_markdown(title)}"]
+    for table in tables:
+        parts += ["", f"## {_markdown(table.caption)}"]
+        for block in table.blocks:
+            if block.title:
+                parts += ["", f"### {_markdown(block.title)}"]
+            spanned = f"{table.spanner} " if table.spanner else ""
+            head = [*table.headings, *(spanned + column for column in table.columns)]
+            marks = [" --- "] * len(table.headings) + [" ---: "] * len(table.columns)
+            parts += ["", _markdown_row(head), f"|{'|'.join(marks)}|"]
+            parts += [_markdown_row(_texts(row)) for row in block.rows]
+        for note in table.notes:
+            parts += ["", _markdown(note)]
+    return "\n".join(parts) + "\n"
+
+
+def _markdown_row(texts: Sequence[str]) -> str:
+    return "|" + "|".join(f" {_markdown(text)} " for text in texts) + "|"
+
+
+def _markdown(text: str) -> str:
+    r"""Text whose characters mean nothing but themselves.
+
+    >>> _markdown("a|b *c* <d>")
+    'a\\|b \\*c\\* \\<d\\>'
+    """
+    return re.sub(r"([\\`*_{}\[\]<>|#$~])", r"\\\1", text)
+
+
+def as_html(title: str, tables: Sequence[Table]) -> str:
+    """Tables as elements of a page, with a title in front."""
+    parts = [f"<p><strong>{escape(title)}</strong></p>"] if title else []
+    for table in tables:
+        spanned = f"{table.spanner} " if table.spanner else ""
+        head = [*table.headings, *(spanned + column for column in table.columns)]
+        stubs = len(table.headings)
+        parts.append(f"<table><caption>{escape(table.caption)}</caption>")
+        parts.append(f"<thead>{_html_row(head, 'th', stubs)}</thead>")
+        for block in table.blocks:
+            titled = f'<tr><th colspan="{len(head)}">{escape(block.title)}</th></tr>' if block.title else ""
+            rows = "\n".join(_html_row(_texts(row), "td", stubs) for row in block.rows)
+            parts.append(f"<tbody>{titled}{rows}</tbody>")
+        parts += ["</table>", *(f"<p>{escape(note)}</p>" for note in table.notes)]
+    return "\n".join(parts) + "\n"
+
+
+def _html_row(texts: Sequence[str], element: str, left: int) -> str:
+    """A row whose first cells are aligned to the left, the others to the right."""
+    sides = ["left"] * left + ["right"] * (len(texts) - left)
+    cells = (
+        f'<{element} style="text-align: {side}">{escape(text)}</{element}>'
+        for text, side in zip(texts, sides, strict=True)
+    )
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def as_csv(title: str, tables: Sequence[Table]) -> str:
+    """Tables with an empty line between them, each with a line of headings; blocks are a column."""
+    parts = []
+    for table in tables:
+        found = io.StringIO()
+        writer = CsvWriter(found)
+        spanned = f"{table.spanner} " if table.spanner else ""
+        first = [table.block] if table.block else []
+        headings = [heading or "figure" for heading in table.headings]
+        writer.writerow([*first, *headings, *(spanned + column for column in table.columns)])
+        for block in table.blocks:
+            label = [block.title.removeprefix(f"{table.block} ")] if table.block else []
+            writer.writerows([*label, *_texts(row)] for row in block.rows)
+        parts.append(found.getvalue())
+    return "\n".join(parts)
+
+
+def as_latex(title: str, tables: Sequence[Table]) -> str:
+    """A table environment for each table, without any package."""
+    parts = [f"% {' '.join(title.split())}"]
+    for table in tables:
+        stubs, count = len(table.headings), len(table.columns)
+        parts += ["\\begin{table}", "\\centering", f"\\caption{{{_latex(table.caption)}}}"]
+        parts += [f"\\begin{{tabular}}{{{'l' * stubs}{'r' * count}}}", "\\hline"]
+        if table.spanner:
+            parts.append(f"{'& ' * stubs}\\multicolumn{{{count}}}{{c}}{{{_latex(table.spanner)}}} \\\\")
+        parts += [_latex_row([*table.headings, *table.columns]), "\\hline"]
+        for block in table.blocks:
+            parts += _latex_block(block, stubs + count)
+        parts += ["\\end{tabular}", "\\end{table}"]
+        parts += [_latex(note) + "\n" for note in table.notes]
+    return "\n".join(parts) + "\n"
+
+
+def _latex_block(block: Block, columns: int) -> list[str]:
+    title = [f"\\multicolumn{{{columns}}}{{l}}{{{_latex(block.title)}}} \\\\"] if block.title else []
+    return [*title, *(_latex_row(_texts(row)) for row in block.rows), "\\hline"]
+
+
+def _latex_row(texts: Sequence[str]) -> str:
+    return " & ".join(_latex(text) for text in texts) + " \\\\"
+
+
+LATEX = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': "{\\char34}",
+    # A bracket after \\ would be its argument.
+    "[": "{[}",
+    "]": "{]}",
+    "*": "{*}",
+    **{character: f"\\{character}" for character in "&%$#_{}"},
+}
+
+
+def _latex(text: str) -> str:
+    r"""Text whose characters mean nothing but themselves, units of micrometres as they are printed.
+
+    >>> _latex("50 % of a_b, um")
+    '50 \\% of a\\_b, $\\mu$m'
+    """
+    if text in ("-", "um", "urad"):
+        return {"-": "--", "um": r"$\mu$m", "urad": r"$\mu$rad"}[text]
+    escaped = "".join(LATEX.get(character, character) for character in text)
+    return re.sub(r"(^|, | or )u(m|rad)\b", r"\1$\\mu$\2", escaped)
+
+
+def _texts(row: Row) -> list[str]:
+    return [*row.headings, *(entry.text for entry in row.entries)]
+
+
+FORMATS: dict[str, Callable[[str, Sequence[Table]], str]] = {
+    "text": as_text,
+    "markdown": as_markdown,
+    "csv": as_csv,
+    "latex": as_latex,
+}

@@ -1,0 +1,304 @@
+"""Parts of results as text for people, and as plain data for programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ballplate.simulator.numerics.rounding import printable
+
+from ..rank.verdict import GREAT, Verdict
+from ..uncertainty.scale import Scale
+from ..uncertainty.summaries import Quantity
+from ..uncertainty.tasks import TaskUncertainty, is_determined
+from .adjustments import ARCSECOND, Adjustment
+from .formatting import aligned, finite, number, percent, shown_unit, to_uncertainty, uncertainty_words
+from .plates import PlateCoordinates
+
+# Balls of a plate that a table has room for.
+MOST_BALLS = 100
+
+
+def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
+    """U1 to U6 as lines of text."""
+    rows = [["", "standard uncertainty of", "maximum", "average", "unit", "count", "largest at"]]
+    told: set[str] = set()
+    for symbol, quantity in quantities.items():
+        if ", " in quantity.unit:
+            # Lengths and angles have no common unit; each has a row of its own.
+            continue
+        name = symbol.partition(" ")[0]
+        count = str(quantity.count)
+        if quantity.undetermined:
+            count += f" ({quantity.undetermined} undetermined)"
+        rows.append(
+            [
+                "" if name in told else name,
+                quantity.description,
+                number(1e6 * quantity.maximum),
+                number(1e6 * quantity.average),
+                shown_unit(quantity.unit),
+                count,
+                quantity.largest,
+            ]
+        )
+        told.add(name)
+    lines = aligned(rows, [False, False, True, True, False, False, False])
+    places = list(dict.fromkeys(place for quantity in quantities.values() for place in quantity.places))
+    lines += [f"({', '.join(places)})"] if places else []
+    for quantity in quantities.values():
+        if quantity.within_target is not None:
+            by = uncertainty_words(quantity.coverage_factor)
+            lines.append(f"within the target accuracy ({by}): {percent(quantity.within_target)} of {quantity.symbol}")
+    return lines
+
+
+def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
+    """Measuring tasks as lines of text."""
+    expanded = f"expanded (k = {tasks[0].expansion:g}), um"
+    rows = [["task", "length, mm", "standard uncertainty, um", expanded, "target, um", "within target"]]
+    for task in tasks:
+        rows.append(
+            [
+                task.name,
+                number(1e3 * task.length, 6),
+                *(number(1e6 * u) for u in (task.standard_uncertainty, task.expanded_uncertainty)),
+                "" if task.target is None else number(1e6 * task.target),
+                _judged(task),
+            ]
+        )
+    with_target = any(task.target is not None for task in tasks)
+    by = next((uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), "")
+    note = [f"(the target is compared with the {by})"] if with_target else []
+    return [*aligned(rows, [False, True, True, True, True, False]), *note]
+
+
+def _judged(task: TaskUncertainty) -> str:
+    if not is_determined(task):
+        return "undetermined"
+    return "" if task.is_within is None else "yes" if task.is_within else "no"
+
+
+def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
+    """Measuring tasks as plain data in metres; what is undetermined is None."""
+    return {
+        task.name: {
+            "length": task.length,
+            "standard_uncertainty": finite(task.standard_uncertainty),
+            "expanded_uncertainty": finite(task.expanded_uncertainty),
+            "coverage_factor": task.expansion,
+            "target": task.target,
+            **({} if task.target is None else {"target_coverage_factor": task.coverage_factor}),
+            "within_target": task.is_within,
+            "unit": "m",
+        }
+        for task in tasks
+    }
+
+
+def verdict_lines(judged: Verdict, with_values: bool = False, lengths: Quantity | None = None) -> list[str]:
+    """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of them."""
+    lines = []
+    rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
+    if judged.expected is not None or not judged.as_expected:
+        wanted = judged.expected or 0
+        rank += ", as expected" if judged.as_expected else f", expected {wanted or 'full rank'}"
+        rank += " (the file does not say otherwise)" if judged.expected is None else ""
+    lines.append(f"{rank}; {judged.parameters} parameters, {judged.observations} observations")
+    values = judged.singular_values
+    if len(values) and with_values:
+        rank_of = len(values) - judged.deficiency
+        text = "no singular value counts"
+        if rank_of:
+            largest, smallest = printable(values[0]), printable(values[rank_of - 1])
+            text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
+        lines.append(text + ", in standard deviations per micrometre")
+    for title, directions in (("undetermined", judged.null), ("weakly determined", judged.weak)):
+        for k, direction in enumerate(directions[:20], start=1):
+            lines.append(f"{title} {k}: {direction}")
+        if len(directions) > 20:
+            lines.append(f"{title}: {len(directions) - 20} directions more")
+    if judged.weak and lengths is not None:
+        lines.append(f"all directions together: {_lengths_words(lengths)}")
+    lines += [f"reason: {reason}" for reason in judged.reasons]
+    return lines
+
+
+def _lengths_words(lengths: Quantity) -> str:
+    if math.isnan(lengths.average):
+        return "all are undetermined"
+    # Beside a share that is of an expanded uncertainty, it has to be said what this is.
+    symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
+    words = f"{symbol} {number(1e6 * lengths.average)} um on the average, {number(1e6 * lengths.maximum)} um at most"
+    open_ = f", {lengths.undetermined} of {lengths.count} distances undetermined" if lengths.undetermined else ""
+    return words + open_
+
+
+def target_lines(lengths: Quantity | None) -> list[str]:
+    """The share of lengths within the target accuracy, with U6, as a line of text; none where nothing is compared."""
+    if lengths is None or lengths.within_target is None:
+        return []
+    by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
+    return [f"within the target accuracy ({by}): {share} of {lengths.count} lengths; {_lengths_words(lengths)}"]
+
+
+def scale_lines(found: Scale | None) -> list[str]:
+    """What carries scale as lines of text, and a warning where it rests on offsets that are held exact."""
+    if found is None:
+        return []
+    told = []
+    for one in found.carriers:
+        if one.without is None:
+            told.append(one.words)
+            continue
+        without = "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
+        told.append(f"{one.words} ({without} without)")
+    lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm from {' and '.join(told)}"]
+    if not found.rests_on_offsets:
+        return lines
+    warning = "warning: the scale rests on probe offsets that are held exact"
+    if found.loosened is not None:
+        loose = found.loosened
+        average, most, before = (number(1e6 * value) for value in (loose.average, loose.maximum, loose.before))
+        warning += (
+            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but one, U6 would be "
+            f"{average} um on the average and {most} um at most instead of {before} um on the average"
+        )
+    return [*lines, f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets"]
+
+
+def scale_data(found: Scale | None) -> dict[str, Any] | None:
+    """What carries scale as plain data, relative standard uncertainties, and U6 in metres."""
+    if found is None:
+        return None
+    loose = found.loosened
+    return {
+        "standard_uncertainty": found.uncertainty,
+        "carried_by": [
+            {"text": one.words, "without": None if one.without is None else finite(one.without)}
+            for one in found.carriers
+        ],
+        "rests_on_exact_offsets": found.rests_on_offsets,
+        "with_uncertain_offsets": None
+        if loose is None
+        else {
+            "standard_uncertainty": loose.offset_uncertainty,
+            "U6_average": loose.average,
+            "U6_maximum": loose.maximum,
+        },
+    }
+
+
+def _border(judged: Verdict) -> str:
+    """What singular values come after those that count; what they are is not told where they are rounding."""
+    if not judged.deficiency:
+        return ""
+    if judged.gap >= GREAT:
+        return f", then rounding (gap above {GREAT:.0e})"
+    first = judged.singular_values[-judged.deficiency]
+    return f", then {printable(first):.3g} and below (gap {printable(judged.gap):.2g})"
+
+
+def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_BALLS) -> list[str]:
+    """A plate's co-ordinates in its own axes as lines of text, for the first balls of a large one."""
+    title = "co-ordinates of the balls in the plate's own axes"
+    lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
+    rows = [["ball", "x, mm", "y, mm", "standard uncertainty of x, um", "of y, um"]]
+    for name, values, uncertainties in zip(plate.names, plate.coordinates, plate.standard_uncertainties, strict=True):
+        x, y = (to_uncertainty(1e3 * v, 1e3 * u) for v, u in zip(values, uncertainties, strict=True))
+        rows.append([name, x, y, *(number(1e6 * u, 3) for u in uncertainties)])
+    lines += aligned(rows[: most + 1], [False, True, True, True, True])
+    return lines + ([f"({len(rows) - 1 - most} balls more in --json)"] if len(rows) - 1 > most else [])
+
+
+def adjustment_lines(found: Sequence[Adjustment]) -> list[str]:
+    """Adjustments as a table of text."""
+    rows = [["adjustment", "is off by", "standard uncertainty", "expanded, 95 %", "unit", "what to do"]]
+    for one in found:
+        shown = ARCSECOND if one.unit == "rad" else 1e-6
+        value, u, expanded = (
+            number(v / shown) for v in (one.value, one.standard_uncertainty, one.expanded_uncertainty)
+        )
+        rows.append([one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "um/m", one.words])
+    return [
+        *aligned(rows, [False, True, True, True, False, False]),
+        "(a scale is off by what readings lack of the true length; an angle by what it exceeds 90 deg)",
+    ]
+
+
+def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
+    """Adjustments as plain data; what is open is None."""
+    return {
+        one.name: {
+            "what": one.what,
+            "value": finite(one.value),
+            "standard_uncertainty": finite(one.standard_uncertainty),
+            "expanded_uncertainty": finite(one.expanded_uncertainty),
+            "unit": one.unit,
+            "words": one.words,
+        }
+        for one in found
+    }
+
+
+def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
+    """A plate's co-ordinates in its own axes as plain data in metres; what is undetermined is None."""
+    axes = plate.axes
+    return {
+        "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
+        "balls": {
+            name: {
+                axis: {"value": finite(value), "standard_uncertainty": finite(uncertainty), "unit": "m"}
+                for axis, value, uncertainty in zip("xy", values, uncertainties, strict=True)
+            }
+            for name, values, uncertainties in zip(
+                plate.names, plate.coordinates.tolist(), plate.standard_uncertainties.tolist(), strict=True
+            )
+        },
+    }
+
+
+def quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
+    return {symbol: quantity_data(quantity) for symbol, quantity in quantities.items()}
+
+
+def quantity_data(q: Quantity) -> dict[str, Any]:
+    compared: dict[str, Any] = {}
+    if q.within_target is not None:
+        compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
+    return {
+        "maximum": finite(q.maximum),
+        "average": finite(q.average),
+        "unit": q.unit,
+        "count": q.count,
+        "undetermined": q.undetermined,
+        "largest_at": q.largest,
+        **({"largest_places": list(q.places)} if q.places else {}),
+        **compared,
+        "description": q.description,
+    }
+
+
+def verdict_data(judged: Verdict) -> dict[str, Any]:
+    return {
+        "parameters": judged.parameters,
+        "observations": judged.observations,
+        "rank_deficiency": judged.deficiency,
+        "expected_rank_deficiency": judged.expected,
+        "as_expected": judged.as_expected,
+        "singular_values": [float(v) for v in judged.singular_values],
+        "gap": finite(judged.gap),
+        "undetermined": [str(direction) for direction in judged.null],
+        "reasons": list(judged.reasons),
+        "weakly_determined": [
+            {
+                "text": str(direction),
+                "standard_deviation": direction.standard_deviation,
+                "points": direction.points,
+                "points_beyond_limit": direction.beyond,
+                "limit": direction.limit,
+            }
+            for direction in judged.weak
+        ],
+    }

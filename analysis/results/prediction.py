@@ -1,0 +1,124 @@
+"""The predicted uncertainties of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+
+from ..montecarlo.comparison_tables import trials_data, trials_lines
+from ..rank.verdict import Verdict
+from ..report.pictures import draw_design
+from ..uncertainty.scale import Scale
+from ..uncertainty.summaries import Quantity
+from ..uncertainty.tasks import TaskUncertainty
+from .parts import (
+    quantities_data,
+    quantity_data,
+    scale_data,
+    scale_lines,
+    target_lines,
+    task_data,
+    task_table,
+    uncertainty_table,
+    verdict_data,
+    verdict_lines,
+)
+from .result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..montecarlo.experiments import Trials
+
+
+@dataclass(frozen=True, repr=False)
+class Prediction(Result):
+    """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they were asked for.
+
+    `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if that was asked for
+    and is determined. `monte_carlo` has replicates, if they were asked for.
+    """
+
+    label: str
+    title: str
+    design: Design
+    verdict: Verdict
+    quantities: dict[str, Quantity]
+    tasks: tuple[TaskUncertainty, ...] = ()
+    lengths: Quantity | None = None
+    scale: Scale | None = None
+    monte_carlo: Trials | None = None
+
+    def headline(self) -> str:
+        return ", ".join([rank_words(self.verdict), *length_headline(self.quantities)])
+
+    def lines(self) -> list[str]:
+        lines = self.table_lines()
+        return lines if self.monte_carlo is None else [*lines, "", *trials_lines(self.monte_carlo)]
+
+    def table_lines(self) -> list[str]:
+        """The same without replicates: title, verdict and table."""
+        lines = [f"{self.label}: {self.title}", *verdict_lines(self.verdict, with_values=True, lengths=self.lengths)]
+        lines += [] if self.quantities else target_lines(self.lengths)
+        lines += scale_lines(self.scale)
+        lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
+        return lines + ["", *task_table(self.tasks)] if self.tasks else lines
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            **verdict_data(self.verdict),
+            "sigma": 1.0,
+            "quantities": quantities_data(self.quantities),
+            **({} if self.quantities or self.lengths is None else {"lengths": quantity_data(self.lengths)}),
+            **({"tasks": task_data(self.tasks)} if self.tasks else {}),
+            "scale": scale_data(self.scale),
+            **({} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}),
+        }
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The positions in the volume, by their names or, where there are many, by their numbers.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        names = ", ".join(self.design.position_names)
+        return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each of U1 to U6."""
+        return [{"symbol": symbol, **quantity_row(quantity)} for symbol, quantity in self.quantities.items()]
+
+
+def rank_words(judged: Verdict) -> str:
+    """The rank in two words."""
+    return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
+
+
+def quantity_row(quantity: Quantity) -> dict[str, Any]:
+    """A quantity as the row of a table, in its own unit."""
+    return {
+        "standard uncertainty of": quantity.description,
+        "maximum": quantity.maximum,
+        "average": quantity.average,
+        "unit": quantity.unit,
+        "count": quantity.count,
+        "undetermined": quantity.undetermined,
+        "largest at": quantity.largest,
+    }
+
+
+def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:
+    """U6 in a few words; none where it was not asked for or is undetermined."""
+    lengths = quantities.get("U6")
+    if lengths is None or np.isnan(lengths.average):
+        return []
+    return [f"U6 {1e6 * lengths.average:.3g} um on average, {1e6 * lengths.maximum:.3g} um at most"]

@@ -1,0 +1,72 @@
+"""What readings differ by from the estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.numerics.rounding import comparable
+
+# Residuals that a fit names.
+LARGEST = 10
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties.
+
+    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the certificate's.
+    """
+
+    position: str
+    ball: str
+    probe: str
+    axis: str
+    value: float
+    standardised: float
+
+
+def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Readings, Array, Array]:
+    """Readings of plates, with what each differs by from the estimate, (m, d) metres and in standard uncertainties."""
+    chosen = design.plate_readings
+    readings = design.readings.select(chosen)
+    standardised = reading_blocks(design, solution.state, readings, x[chosen]).residual
+    return readings, standardised / reading_weights(design, readings), standardised
+
+
+def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
+    """The largest residuals of readings and of lengths, largest first."""
+    chosen = design.plate_readings
+    _, apart, residual = reading_residuals(design, solution, x)
+    off, uncertainty = length_deviations(design, solution.state, x)
+    standardised = np.concatenate([residual.ravel(), off / uncertainty])
+    value = np.concatenate([apart.ravel(), off])
+    found = []
+    for place in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
+        i, axis = divmod(place, design.dimension)
+        k = place - residual.size
+        reading = int(chosen[i] if k < 0 else design.lengths.first[k])
+        ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
+        if k >= 0:
+            second = design.lengths.second[k]
+            ball, words = (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
+        found.append(
+            Residual(
+                design.position_names[design.readings.position[reading]],
+                ball,
+                design.probe_names[design.readings.probe[reading]],
+                words,
+                float(value[place]),
+                float(standardised[place]),
+            )
+        )
+    return tuple(found)
+
+
+def _ball(design: Design, reading: int) -> str:
+    return design.ball_names[design.readings.ball[reading]]

@@ -1,0 +1,126 @@
+"""What the commands do, without a terminal: check a design, plan with it, fit readings to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.numerics.threads import single_threaded
+from ballplate.simulator.readings.reading_files import ObservedReadings
+
+from ..gross_errors.leftover import too_many_entries
+from ..gross_errors.search import diagnosis
+from ..gross_errors.suspects import Diagnosis
+from ..rank.verdict import verdict
+from ..uncertainty.scale import scale_of
+from ..uncertainty.summaries import Quantity, uncertainties
+from ..uncertainty.tasks import TaskUncertainty, task_uncertainties
+from .adjustments import Adjustment, adjustments
+from .estimates import estimated_functions, parameter_estimates
+from .fit import Fit
+from .plates import plate_coordinates
+from .prediction import Prediction
+from .residuals import largest_residuals
+
+
+@dataclass(frozen=True)
+class Worth:
+    """Uncertainties alone, for searches that judge many designs: rank deficiency, U1 to U6 and tasks as in a plan."""
+
+    deficiency: int
+    quantities: dict[str, Quantity]
+    tasks: tuple[TaskUncertainty, ...]
+
+
+def check(experiment: Experiment, design: Design | None = None, with_scale: bool = False) -> Prediction:
+    """Judge the rank of an experiment's design, or of what came of it, at zero machine error."""
+    return _predict(experiment, design or lay_out(experiment), False, with_scale)
+
+
+def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
+    """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
+    return _predict(experiment, lay_out(experiment), True, with_scale)
+
+
+@single_threaded
+def worth(experiment: Experiment) -> Worth:
+    """What `plan` finds, less the explanation of the rank, which takes most of its time."""
+    at = linearise(lay_out(experiment))
+    return Worth(at.deficiency, uncertainties(at, target=experiment.target_accuracy), task_uncertainties(at))
+
+
+@single_threaded
+def _predict(experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool) -> Prediction:
+    at, target = linearise(design), experiment.target_accuracy
+    judged = verdict(at, experiment.expected_rank_deficiency, target)
+    quantities: dict[str, Quantity] = {}
+    tasks: tuple[TaskUncertainty, ...] = ()
+    if with_quantities:
+        quantities = uncertainties(at, target=target)
+        tasks = task_uncertainties(at)
+        lengths = quantities.get("U6")
+    else:
+        lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
+    scale = scale_of(experiment, at) if with_scale else None
+    return Prediction(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
+
+
+@single_threaded
+def fit(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    sigma: Literal["estimated", "given"] | None = None,
+    monomials: bool = False,
+) -> Fit:
+    """Estimate machine errors, balls and poses from readings.
+
+    `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as the
+    coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
+    """
+    design = observed.design
+    solution = estimate(design, observed.x)
+    if solution.status != "converged":
+        judged = check(experiment, design).verdict
+        names = experiment.label, experiment.title
+        return Fit(*names, design, observed.x, solution, judged, 1.0, False, 0, {}, (), ())
+    at = linearised_fit(design, solution)
+    judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_accuracy)
+    freedom = design.observations - design.parameter_count + judged.deficiency
+    estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
+    scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
+    untested = too_many_entries(design)
+    return Fit(
+        experiment.label,
+        experiment.title,
+        design,
+        observed.x,
+        solution,
+        judged,
+        scale,
+        estimated,
+        freedom,
+        uncertainties(at, scale, experiment.target_accuracy),
+        parameter_estimates(estimated_functions(at, monomials), scale),
+        largest_residuals(design, solution, observed.x),
+        plate_coordinates(experiment, at, scale),
+        _adjustments(at, scale, freedom if estimated else np.inf),
+        task_uncertainties(at, scale),
+        Diagnosis() if untested else diagnosis(at, observed.x, freedom, estimated),
+        observed.marks,
+        monomials,
+        untested,
+    )
+
+
+def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjustment, ...]:
+    if not isinstance(at.design.model, SpatialMetricModel):
+        return ()
+    of_model = at.layout.model
+    return adjustments(at.state.a, sigma * at.shared[of_model], at.shared_null[of_model], freedom)

@@ -1,0 +1,1 @@
+"""Work spread over processes, how far it is, and what it needs."""

@@ -1,0 +1,17 @@
+"""Words for a want of memory."""
+
+from __future__ import annotations
+
+import errno
+import re
+
+WITH_SIZE = re.compile(r"Unable to allocate ([0-9.]+ [KMGTPE]?i?B|[0-9]+ bytes)")
+
+
+def want_of_memory(error: BaseException) -> str | None:
+    """What stands after the name of what has failed for want of memory; None of any other error."""
+    if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
+        return None
+    found = WITH_SIZE.search(str(error))
+    size = f": there is no room for another {found[1]}" if found else ""
+    return f"needs more memory than there is{size}"

@@ -1,0 +1,176 @@
+"""Work spread over processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+# Seconds between two looks of a worker at whether the process that started it still runs.
+PARENT_INTERVAL = 1.0
+
+# The name of joblib's threads that manage processes, and the seconds that one has to end.
+MANAGER, MANAGER_LIMIT = "ExecutorManagerThread", 0.2
+
+
+def in_processes(
+    function: Callable[..., Result],
+    arguments: Iterable[tuple[Any, ...]],
+    workers: int,
+    ordered: bool = True,
+    batch_size: int | str = 1,
+) -> Iterator[Result]:
+    """Results of a function, called with each of the arguments in one of several processes; one worker is this process.
+
+    In the order of the arguments, or as they come. An end before the last of them ends the workers as well, and so does
+    within seconds whatever ends this process.
+    """
+    if workers == 1:
+        for own in arguments:
+            yield function(*own)
+        return
+    from joblib import Parallel, delayed
+
+    kind = "generator" if ordered else "generator_unordered"
+    parallel = Parallel(
+        n_jobs=workers,
+        return_as=kind,
+        pre_dispatch="2*n_jobs",
+        batch_size=batch_size,
+        initializer=begin_worker,
+        initargs=(os.getpid(),),
+    )
+    results: Generator[Result, None, None] | None = None
+    finished = False
+    try:
+        with _signals_held():
+            results = parallel(delayed(function)(*own) for own in arguments)
+        # Not `yield from`, which would end the workers before the warning below is silenced.
+        for result in results:  # noqa: UP028
+            yield result
+        finished = True
+    finally:
+        if not finished and results is not None:
+            # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
+            with warnings.catch_warnings(), _managers_silenced():
+                warnings.simplefilter("ignore", UserWarning)
+                results.close()
+
+
+@contextmanager
+def _managers_silenced() -> Iterator[None]:
+    """Let threads that manage processes end without a word: what is taken away from them amid their work is no error.
+
+    Joblib's may look for a task that was just withdrawn.
+    """
+    before = threading.excepthook
+
+    def tell(arguments: threading.ExceptHookArgs) -> None:
+        if arguments.thread is None or arguments.thread.name != MANAGER:
+            before(arguments)
+
+    threading.excepthook = tell
+    try:
+        yield
+        for thread in threading.enumerate():
+            if thread.name == MANAGER:
+                thread.join(MANAGER_LIMIT)
+    finally:
+        threading.excepthook = before
+
+
+def begin_worker(parent: int) -> None:
+    """Prepare a process that works for another: it ends with that one, which alone answers interruptions.
+
+    An interruption from the keyboard reaches every process of the terminal.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    if sys.platform == "win32":
+        import _winapi
+
+        synchronize = 0x00100000
+        # There is an error where it has ended already.
+        with suppress(OSError):
+            _winapi.WaitForSingleObject(_winapi.OpenProcess(synchronize, False, parent), _winapi.INFINITE)
+    else:
+        while os.getppid() == parent:
+            time.sleep(PARENT_INTERVAL)
+    os._exit(1)
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Answer signals at the end; processes started meanwhile never see one from the keyboard.
+
+    An exception amid the start of processes would leave some that nobody knows of.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[tuple[int, FrameType | None]] = []
+    before = {}
+    for number in (signal.SIGINT, signal.SIGTERM):
+        handler = signal.getsignal(number)
+        if callable(handler):
+            before[number] = handler
+            signal.signal(number, lambda *arrived: held.append(arrived))
+    try:
+        _start_trackers()
+        with _interruptions_blocked():
+            yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if held:
+            first, frame = held[0]
+            before[signal.Signals(first)](first, frame)
+
+
+def _start_trackers() -> None:
+    """Start the processes that remove shared memory when this one has ended.
+
+    They let interruptions in again when they start, and say what they remove if this process was killed.
+    """
+    from joblib.externals.loky.backend import resource_tracker as of_joblib
+
+    sys.warnoptions.append("ignore:resource_tracker:UserWarning")
+    try:
+        of_joblib.ensure_running()
+        if sys.platform != "win32":
+            from multiprocessing import resource_tracker
+
+            resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove("ignore:resource_tracker:UserWarning")
+
+
+@contextmanager
+def _interruptions_blocked() -> Iterator[None]:
+    """Let processes inherit that interruptions are blocked, until they have loaded what ignores them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def processors() -> int:
+    """Number of processors that this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1

@@ -1,0 +1,155 @@
+"""A sweep from its file into its store: what the command and the face for Python share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ballplate.simulator.inputs.messages import in_one_line
+from filelock import FileLock, Timeout
+
+from ..results.result import Result
+from .bundle import Bundle, changes, definition
+from .execute import Runner, Summary, run_sweep
+from .frame import frame
+from .model import Sweep
+from .store import (
+    Store,
+    add_sweep,
+    definitions,
+    ensure_in_place,
+    keys,
+    mend,
+    of_other_methods,
+    open_store,
+    statuses,
+    unread,
+)
+from .store_file import StoreError, check_place
+
+if TYPE_CHECKING:
+    import pandas
+
+# Changes between two sweeps that are listed.
+MOST_CHANGES = 20
+
+
+class OtherSweepError(Exception):
+    """The store holds another sweep; the text says what is different, a line for each."""
+
+
+@dataclass(frozen=True)
+class Entered:
+    """A sweep in its store: its number there, whether there are others, and what is to be said of what it found."""
+
+    number: int
+    has_others: bool
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult(Result):
+    """A sweep as far as it is computed: a row of the store for each cell."""
+
+    label: str
+    title: str
+    store: Path
+    summary: Summary
+    table: pandas.DataFrame
+
+    def headline(self) -> str:
+        one = self.summary
+        left = f", {one.left} left" if one.left else ""
+        return f"{one.cells} cells, {one.done} done, {one.failed} failed{left}"
+
+    def lines(self) -> list[str]:
+        return [f"{self.label}: {self.title}", self.headline(), "", *self.table.to_string(index=False).splitlines()]
+
+    def to_dict(self) -> dict[str, Any]:
+        one = self.summary
+        counts = {"cells": one.cells, "done": one.done, "failed": one.failed, "left": one.left}
+        return {"sweep": self.label, "title": self.title, "store": str(self.store), **counts, "rows": self.rows()}
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each cell, with its values of the axes and its figures; None where there is none."""
+        table = self.table.astype(object)
+        return [{str(k): v for k, v in row.items()} for row in table.where(table.notna(), None).to_dict("records")]
+
+    def to_frame(self) -> pandas.DataFrame:
+        return self.table
+
+
+@contextmanager
+def writable_store(path: Path) -> Iterator[Store]:
+    """The store at a path, made where there is none, for one process alone.
+
+    :raises StoreError: no store, one that cannot be written, or one that another process is writing to.
+    """
+    check_place(path, create=True)
+    try:
+        with FileLock(f"{path}.lock", timeout=0):
+            store = open_store(path, create=True)
+            try:
+                yield store
+            finally:
+                store.close()
+    except Timeout:
+        raise StoreError(f"{path}: another process is computing into it; wait for it, or end it") from None
+
+
+def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
+    """Find a sweep in its store, or enter it; `beside` others that are there.
+
+    :raises OtherSweepError: the store holds another one with results.
+    :raises StoreError: what it holds cannot be read.
+    """
+    new = definition(sweep, bundle)
+    stored, unreadable = definitions(store)
+    number = next((k for k, old in stored.items() if not changes(old, new)), None)
+    has_results = "done" in statuses(store).values()
+    if number is None and unreadable and not beside:
+        which, why = next(iter(unreadable.items()))
+        text = f"what sweep {which} in it is of cannot be read ({why}); enter this one anew with --beside, where what"
+        raise StoreError(f"{store.path}: {text} is the same is not computed again")
+    if number is None and stored and has_results and not beside:
+        found = [f"  {in_one_line(line)}" for line in changes(stored[max(stored)], new)[:MOST_CHANGES]]
+        first = in_one_line(f"{store.path}: holds another sweep; what has changed:")
+        last = "name another store with --store, or keep both in this one with --beside"
+        raise OtherSweepError("\n".join([first, *found, last]))
+    if number is None:
+        number = add_sweep(store, new, bundle.files)
+    mended, strays = mend(store, number, len(sweep.cells))
+    remarks = [unread(store.path, mended, strays, len(sweep.cells), "", "what is missing is computed anew")]
+    found_keys = statuses(store)
+    for text in of_other_methods(key for key in keys(store, number).values() if (key, 0) in found_keys):
+        remarks.append(in_one_line(f"{store.path}: {text}, and computes these cells anew"))
+    has_others = len({*stored, *unreadable, number}) > 1
+    return Entered(number, has_others, tuple(filter(None, remarks)))
+
+
+def compute_sweep(
+    store: Store,
+    sweep: Sweep,
+    entered: Entered,
+    runner: AbstractContextManager[Runner],
+    retry_failed: bool = False,
+    fail_fast: bool = False,
+    report: Callable[[Summary], None] = lambda summary: None,
+) -> Summary:
+    """Compute what is left of a sweep that is entered.
+
+    :raises StoreError: the store cannot be written, or is not in its place any more.
+    :raises ChangedError: files of the sweep have been changed meanwhile.
+    """
+    with runner as working:
+        summary = run_sweep(store, entered.number, sweep, working, retry_failed, fail_fast, report)
+    ensure_in_place(store)
+    return summary
+
+
+def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) -> SweepResult:
+    """The rows of a sweep in its store."""
+    return SweepResult(sweep.source.stem, sweep.title, Path(store.path), summary, frame(store, entered.number))

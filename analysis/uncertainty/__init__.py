@@ -1,0 +1,1 @@
+"""Uncertainties of anything that the parameters determine."""

@@ -1,0 +1,1 @@
+"""Volumetric errors of a machine from its parametric errors."""

@@ -1,0 +1,230 @@
+"""Volumetric errors of a described machine: on a grid, along a line, and in lengths.
+
+Source: Park, Burdekin and Peggs, section 5. An error is where the tip is, less where the scales say: the correction to
+be added to a reading, opposite in sign to the error of indication. Random parts are standard deviations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from ballplate.simulator.machines.arrangement import AXES
+from ballplate.simulator.machines.curves import Points
+from ballplate.simulator.machines.description import (
+    Combination,
+    MachineDescription,
+    ParametricError,
+    PowerSeries,
+    reference_functions,
+    stated_function,
+    true_volumetric,
+)
+from ballplate.simulator.machines.kinematic import KinematicModel, error_function
+from ballplate.simulator.machines.protocol import Array, TrueMachine
+from ballplate.simulator.machines.volumetric import VolumetricModel, squareness_field, thermal_field
+
+# Points of a grid or a line: each takes half a kilobyte.
+MOST_POINTS = 200_000
+
+# Points along an axis at which a parametric error is told.
+ALONG = 101
+
+DIAGONALS: tuple[tuple[tuple[int, int, int], tuple[int, int, int]], ...] = (
+    ((0, 0, 0), (1, 1, 1)),
+    ((1, 0, 0), (0, 1, 1)),
+    ((0, 1, 0), (1, 0, 1)),
+    ((0, 0, 1), (1, 1, 0)),
+)
+"""The four body diagonals as the document numbers them: lower (0) or upper (1) end of each axis, from and to."""
+
+
+@dataclass(frozen=True, eq=False)
+class VolumetricErrors:
+    """Errors where the axes stand at `points` (m, 3): `systematic` (m, 3) and `deviation` (m, 3) of the random part."""
+
+    points: Array
+    systematic: Array
+    deviation: Array
+
+    @property
+    def resultant(self) -> Array:
+        """Length (m,) of the systematic error."""
+        return np.asarray(np.linalg.norm(self.systematic, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class LengthErrors:
+    """Errors (m,) of distances from `starts` to `ends` (m, 3): true distances less those that the scales say."""
+
+    starts: Array
+    ends: Array
+    nominal: Array
+    error: Array
+    deviation: Array
+
+
+@dataclass(frozen=True)
+class Volumetric:
+    """A machine with what its errors are computed by, made once."""
+
+    machine: MachineDescription
+
+    @cached_property
+    def truth(self) -> TrueMachine:
+        """The systematic errors as an error model."""
+        return true_volumetric(self.machine)
+
+    @cached_property
+    def approach(self) -> tuple[VolumetricModel, tuple[float | Points, ...]]:
+        """The model whose parameters are the values of the functions with a random part, and their deviations.
+
+        They are drawn anew whenever a point is approached.
+        """
+        machine = self.machine
+        random = [error for error in machine.errors if error.deviation is not None]
+        one = Combination(((1.0, PowerSeries((1.0,))),))
+        functions = tuple(error_function(error.name, one) for error in random)
+        chain = KinematicModel(machine.arrangement, functions, machine.lower, machine.upper, origin=machine.reference)
+        return VolumetricModel(chain, ()), tuple(error.deviation for error in random if error.deviation is not None)
+
+    @cached_property
+    def lasting(self) -> tuple[VolumetricModel, Array]:
+        """The model of what is wrong alike at all points, with the deviations: squareness and temperatures."""
+        machine = self.machine
+        fields = [(squareness_field(one.name), one.deviation) for one in machine.squareness if one.deviation]
+        for axis, known in machine.temperature.items():
+            if known.uncertainty:
+                fields.append((thermal_field(AXES.index(axis)), abs(known.expansion) * known.uncertainty))
+        chain = KinematicModel(machine.arrangement, (), machine.lower, machine.upper, origin=machine.reference)
+        return VolumetricModel(chain, tuple(one for one, _ in fields)), np.array([size for _, size in fields])
+
+    @property
+    def is_random(self) -> bool:
+        """Whether anything has a random part."""
+        return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
+
+    def systematic(self, points: Array) -> Array:
+        """Systematic errors (m, 3) where the axes stand at points (m, 3)."""
+        probe = np.broadcast_to(self.machine.probe, points.shape)
+        return np.asarray(self.truth.model.error(points, self.truth.a, probe) - probe)
+
+    def random_roots(self, points: Array) -> tuple[Array, Array]:
+        """Sensitivities times deviations: (m, 3, k) of what each approach draws, and (m, 3, l) of what lasts."""
+        probe = np.broadcast_to(self.machine.probe, points.shape)
+        model, deviations = self.approach
+        columns = model.jacobian(points, np.zeros(len(deviations)), probe)
+        for k, (function, deviation) in enumerate(zip(model.chain.functions, deviations, strict=True)):
+            if isinstance(deviation, Points):
+                columns[:, :, k] *= np.interp(points[:, function.axis], deviation.positions, deviation.values)[:, None]
+            else:
+                columns[:, :, k] *= deviation
+        probing = np.broadcast_to(self.machine.probing * np.eye(3), (len(points), 3, 3))
+        lasting, sizes = self.lasting
+        return (
+            np.concatenate([columns, probing], axis=2),
+            lasting.jacobian(points, np.zeros(len(sizes)), probe) * sizes,
+        )
+
+    def errors(self, points: Array) -> VolumetricErrors:
+        """Errors where the axes stand at points (m, 3); random parts add in quadrature."""
+        drawn, lasting = self.random_roots(points)
+        deviation = np.sqrt((drawn**2).sum(axis=2) + (lasting**2).sum(axis=2))
+        return VolumetricErrors(points, self.systematic(points), deviation)
+
+    def lengths(self, starts: Array, ends: Array) -> LengthErrors:
+        """Errors of distances between points (m, 3).
+
+        The two ends are approached one after the other: what an approach draws is independent at the two, also of a
+        function that has the same position at both. Squareness and temperature are wrong alike at both.
+        """
+        difference = ends - starts
+        nominal = np.linalg.norm(difference, axis=1)
+        moved = self.systematic(ends) - self.systematic(starts)
+        direction = difference / nominal[:, None]
+        # |d + m| - |d| without the difference of two long lengths.
+        error = (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1)) / (
+            np.linalg.norm(difference + moved, axis=1) + nominal
+        )
+        drawn_first, lasting_first = self.random_roots(starts)
+        drawn_last, lasting_last = self.random_roots(ends)
+        along = [
+            np.einsum("mi,mik->mk", direction, one)
+            for one in (drawn_first, drawn_last, np.asarray(lasting_last - lasting_first))
+        ]
+        deviation = np.sqrt(sum((one**2).sum(axis=1) for one in along))
+        return LengthErrors(starts, ends, nominal, error, np.asarray(deviation))
+
+    def diagonals(self) -> LengthErrors:
+        """Length errors of the four body diagonals."""
+        ends = np.array([self.machine.lower, self.machine.upper])
+        starts, stops = (np.array([[ends[one[way][k], k] for k in range(3)] for one in DIAGONALS]) for way in (0, 1))
+        return self.lengths(starts, stops)
+
+    def grid(self, counts: tuple[int, int, int]) -> Array:
+        """Points (m, 3) of a grid over the volume, z changing fastest."""
+        ends = zip(self.machine.lower, self.machine.upper, counts, strict=True)
+        sides = [np.linspace(low, high, count) for low, high, count in ends]
+        return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def parallel(self, at: dict[str, float]) -> tuple[Array, Array]:
+        """Ends (3,) of the line along the axis that has no position in `at`."""
+        ends = np.array([self.machine.lower, self.machine.upper])
+        for name, value in at.items():
+            ends[:, AXES.index(name)] = value
+        return ends[0], ends[1]
+
+
+def between(start: Array, end: Array, count: int) -> Array:
+    """Points (count, 3), evenly spaced from start to end."""
+    return np.asarray(np.linspace(start, end, count))
+
+
+@dataclass(frozen=True, eq=False)
+class AlongAxis:
+    """A parametric error along its axis: at `positions` (m,), as stated, at the reference point, and deviation.
+
+    `stated` and `values` are None of an error that is random alone; `measured` has the positions and values of a table.
+    """
+
+    error: ParametricError
+    positions: Array
+    stated: Array | None
+    values: Array | None
+    deviation: Array | None
+    measured: Points | None
+
+    @property
+    def range(self) -> float:
+        """Largest less smallest value at the reference point, 0 of a random error."""
+        return 0.0 if self.values is None else float(np.ptp(self.values))
+
+
+def along_axes(machine: MachineDescription) -> list[AlongAxis]:
+    """All parametric errors that the machine has."""
+    functions = reference_functions(machine)
+    found = []
+    for error in machine.errors:
+        positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], ALONG)
+        table = error.shape if isinstance(error.shape, Points) else None
+        if table is not None:
+            positions = np.union1d(positions, [x for x in table.positions if positions[0] <= x <= positions[-1]])
+        t = machine.scaled(error.axis, positions)
+        shape = stated_function(machine, error)
+        deviation = error.deviation
+        found.append(
+            AlongAxis(
+                error,
+                positions,
+                None if shape is None else shape.values(t)[:, 0],
+                functions[error.name].values(t)[:, 0] if error.name in functions else None,
+                None
+                if deviation is None
+                else np.interp(positions, deviation.positions, deviation.values)
+                if isinstance(deviation, Points)
+                else np.full(len(positions), deviation),
+                table,
+            )
+        )
+    return found

@@ -1,0 +1,1 @@
+"""A laid-out experiment as arrays."""

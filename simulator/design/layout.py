@@ -1,0 +1,303 @@
+"""From an experiment to its design: names become indices, and every artefact gets a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior, RadiusCalibration
+from ..geometry.artefacts import BryanGaugeSettings
+from ..inputs.messages import ExperimentError
+from ..inputs.yamltree import Mark
+from ..machines.protocol import Array
+from ..machines.settings import build_error_model
+from ..numerics.rounding import comparable
+from .arrays import Design, pose_size
+from .length_standards import standard_lengths
+from .observations import Coordinates, Distances, Priors, Readings
+
+# Evaluation points of an experiment that names none.
+DEFAULT_POINTS = 200
+DEFAULT_SEED = 1
+
+# Directions below this fraction of the largest do not count when a frame is fixed or a line recognised.
+FLAT = 1e-9
+
+
+def lay_out(experiment: Experiment) -> Design:
+    """Design of an experiment.
+
+    >>> from pathlib import Path
+    >>> from ballplate.simulator.experiment.load import load
+    >>> design = lay_out(load(Path("designs/quickstart.yaml"))[0])
+    >>> design.dimension
+    3
+    """
+    machine, d = experiment.machine, experiment.dimension
+    lower, upper = machine.volume.lower, machine.volume.upper
+    model = build_error_model(experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper)))
+    artefacts = list(experiment.artefacts)
+    layouts = [experiment.layouts[name] for name in artefacts]
+    sizes = [len(layout.names) for layout in layouts]
+    first_ball = dict(zip(artefacts, np.cumsum([0, *sizes[:-1]]), strict=True))
+    balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
+    for item in experiment.calibration:
+        if isinstance(item, RadiusCalibration):
+            own = slice(
+                first_ball[item.artefact], first_ball[item.artefact] + len(experiment.layouts[item.artefact].names)
+            )
+            balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
+    is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
+    probe_index = {name: k for k, name in enumerate(experiment.probes)}
+    places = experiment.positions
+    readings = _readings(experiment, first_ball, probe_index)
+    position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
+    rotations = np.array([place.pose.rotation for place in places])
+    origins = np.array([place.pose.origin for place in places])
+    distances = _distances(experiment, first_ball)
+    lengths, length_names, drawn = standard_lengths(
+        experiment, readings, first_ball, rotations, position_artefact, balls
+    )
+    coordinates = _coordinates(experiment, first_ball)
+    ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
+    points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
+    if not len(points):
+        points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
+    held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
+    for k, place in enumerate(places):
+        if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
+            # A pivot has a place; how the bar turns about it is what the readings say.
+            held[k] = np.arange(pose_size(d)) >= d
+    return Design(
+        model=model,
+        lower=lower,
+        upper=upper,
+        repeatability=machine.repeatability,
+        probe_names=tuple(experiment.probes),
+        probes=np.array([experiment.probes[name] for name in experiment.probes]),
+        artefact_names=tuple(artefacts),
+        is_plate=is_plate,
+        ball_names=tuple(name for layout in layouts for name in layout.names),
+        ball_artefact=ball_artefact,
+        balls=balls,
+        position_names=tuple(place.name for place in places),
+        position_artefact=position_artefact,
+        rotations=rotations,
+        origins=origins,
+        held=held,
+        readings=readings,
+        distances=distances,
+        coordinates=coordinates,
+        lengths=lengths,
+        points=points,
+        point_probe=probe_index[experiment.evaluation.probe],
+        priors=_priors(experiment, held, len(model.parameters)),
+        free_offsets=_free_offsets(experiment),
+        is_gauge=np.array([isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]),
+        length_names=length_names,
+        drawn_lengths=drawn,
+        task_names=tuple(task.name for task in tasks),
+        task_points=np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
+        task_probes=np.array([[probe_index[name] for name in task.probes] for task in tasks], np.int64).reshape(-1, 2),
+        task_targets=tuple(task.target for task in tasks),
+    )
+
+
+def _free_offsets(experiment: Experiment) -> NDArray[np.bool_] | None:
+    """Which probe offsets are parameters (l, d)."""
+    if not experiment.offset_uncertainties:
+        return None
+    free = [name in experiment.offset_uncertainties for name in experiment.probes]
+    return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
+
+
+def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) -> Priors:
+    """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
+
+    :raises ExperimentError: a prior is about a pose parameter that is held.
+    """
+    given = list(experiment.priors)
+    places = [place.name for place in experiment.positions]
+    messages = []
+    for prior in given:
+        if prior.position is not None and held[places.index(prior.position), prior.component]:
+            text = f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other positions'
+            messages.append(prior.mark.message(prior.path, text))
+    if messages:
+        raise ExperimentError(messages)
+    nowhere = Mark(str(experiment.source), 0, 0)
+    for name, uncertainty in experiment.offset_uncertainties.items():
+        for axis in np.flatnonzero(np.isfinite(uncertainty)):
+            value, u = float(experiment.probes[name][axis]), float(uncertainty[axis])
+            label = f"probe {name}: offset {'xyz'[axis]}"
+            given.append(Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere))
+    probes = list(experiment.probes)
+    return Priors(
+        tuple(prior.name for prior in given),
+        np.array([-1 if p.position is None else places.index(p.position) for p in given], np.int64),
+        np.array([-1 if p.probe is None else probes.index(p.probe) for p in given], np.int64),
+        np.array([p.component for p in given], np.int64),
+        np.array([p.by_model for p in given], float).reshape(len(given), parameters),
+        np.array([p.value for p in given], float),
+        np.array([p.standard_uncertainty for p in given], float),
+    )
+
+
+def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
+    """Points (count, d) drawn evenly from the volume."""
+    generator = np.random.default_rng(np.random.SeedSequence(seed))
+    return np.asarray(lower + (upper - lower) * generator.random((count, len(lower))))
+
+
+def _readings(experiment: Experiment, first_ball: dict[str, int], probe_index: dict[str, int]) -> Readings:
+    """All readings in the order of the file, the same one named twice merged into one with more repeats."""
+    rows = []
+    uncertainties = [experiment.machine.repeatability]
+    for k, place in enumerate(experiment.positions):
+        for group in place.readings:
+            balls = first_ball[place.artefact] + group.ball_indices
+            # Readings of the same ball with different uncertainties stay apart.
+            kind = 0
+            if group.standard_uncertainty is not None:
+                kind = len(uncertainties)
+                uncertainties.append(group.standard_uncertainty)
+            for name in group.probes:
+                columns = np.full((len(balls), 5), (0, k, probe_index[name], kind, group.repeats), np.int64)
+                columns[:, 0] = balls
+                rows.append(columns)
+    table = np.concatenate(rows)
+    unique, first, inverse = np.unique(table[:, :4], axis=0, return_index=True, return_inverse=True)
+    repeats = np.bincount(inverse.ravel(), weights=table[:, 4], minlength=len(unique)).astype(np.int64)
+    order = np.argsort(first, kind="stable")
+    ball, position, probe, kind_of = unique[order].T
+    uncertainty = np.array(uncertainties)[kind_of] if len(uncertainties) > 1 else None
+    return Readings(ball, position, probe, repeats[order], uncertainty)
+
+
+def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordinates:
+    ball, axis, value, uncertainty = [], [], [], []
+    for item in experiment.calibration:
+        if isinstance(item, CoordinateCalibration):
+            count = len(item.axes)
+            ball.append(np.repeat(first_ball[item.artefact] + item.balls, count))
+            axis.append(np.tile(np.array(item.axes, np.int64), len(item.balls)))
+            value.append(item.values.ravel())
+            uncertainty.append(np.tile(item.standard_uncertainties, len(item.balls)))
+    return Coordinates(_integers(ball), _integers(axis), _floats(value), _floats(uncertainty))
+
+
+def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
+    """Calibrated distances between balls of plates."""
+    plates = [
+        (item, np.asarray(item.pairs + first_ball[item.artefact], np.int64))
+        for item in experiment.calibration
+        if isinstance(item, DistanceCalibration) and experiment.artefacts[item.artefact].role == "plate"
+    ]
+    return Distances(
+        _integers([pairs[:, 0] for _, pairs in plates]),
+        _integers([pairs[:, 1] for _, pairs in plates]),
+        _integers([np.full(len(pairs), item.dimensions) for item, pairs in plates]),
+        _floats([item.values for item, _ in plates]),
+        _floats([item.standard_uncertainties for item, _ in plates]),
+    )
+
+
+def _held(
+    balls: Array,
+    ball_artefact: NDArray[np.int64],
+    position_artefact: NDArray[np.int64],
+    rotations: Array,
+    coordinates: Coordinates,
+    d: int,
+) -> NDArray[np.bool_]:
+    """Which pose parameters are held (k, pose size).
+
+    An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it. As many
+    parameters of the artefact's first pose are held as are left free: all of them when only distances are
+    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose, a
+    single ball every turn.
+    """
+    held = np.zeros((len(position_artefact), pose_size(d)), bool)
+    for artefact in np.unique(position_artefact):
+        positions = np.flatnonzero(position_artefact == artefact)
+        own = np.flatnonzero(ball_artefact == artefact)
+        idle = _idle_turns(balls[own])
+        for k in positions:
+            held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
+        chosen = np.isin(coordinates.ball, own)
+        fixed = _motion_of_coordinates(
+            balls[coordinates.ball[chosen]] - balls[own].mean(axis=0), coordinates.axis[chosen], d
+        )
+        # Turns that no reading shows are dealt with already, in every position.
+        free = _null_space(np.concatenate([fixed, idle.T]))
+        first = rotations[positions[0]]
+        motions = _in_machine_axes(np.concatenate([idle, free], axis=1), first)
+        held[positions[0]] |= _pivots(motions, held[positions[0]])
+    return held
+
+
+def _idle_turns(balls: Array) -> Array:
+    """Motions (pose size, k) of an artefact about its centre that move none of its balls (n, d)."""
+    d = balls.shape[1]
+    centred = balls - balls.mean(axis=0)
+    moves = _motion_of_coordinates(np.repeat(centred, d, axis=0), np.tile(np.arange(d), len(balls)), d)
+    size = np.abs(centred).max(initial=0.0)
+    if size == 0.0:
+        return np.eye(pose_size(d))[:, d:]
+    turns = _null_space(moves[:, d:] / size)
+    return np.concatenate([np.zeros((d, turns.shape[1])), turns])
+
+
+def _in_machine_axes(motions: Array, rotation: Array) -> Array:
+    """Motions (pose size, k) of an artefact's frame as changes of the pose that undo them: a shift and a turn."""
+    d = len(rotation)
+    turned = rotation @ motions[d:] if d == 3 else motions[d:]
+    return np.concatenate([rotation @ motions[:d], turned])
+
+
+def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Array:
+    """How a small motion of the artefact's frame changes co-ordinates (m, pose size)."""
+    m = len(axis)
+    rows = np.zeros((m, pose_size(d)))
+    rows[np.arange(m), axis] = 1.0
+    for turn in range(pose_size(d) - d):
+        omega = np.eye(3)[turn if d == 3 else 2]
+        padded = np.zeros((m, 3))
+        padded[:, :d] = places
+        rows[:, d + turn] = np.cross(omega, padded)[np.arange(m), axis]
+    return rows
+
+
+def _null_space(rows: Array) -> Array:
+    """Orthonormal columns that span what the rows leave free."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    # What the triangular factor leaves free, the rows do; their own decomposition grows with their number squared.
+    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    _, values, directions = np.linalg.svd(triangle)
+    rank = int((values > FLAT * values[0]).sum())
+    return np.asarray(directions[rank:].T)
+
+
+def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+    """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first, then largest."""
+    chosen = np.zeros(len(motions), bool)
+    waiting = [] if already is None else np.flatnonzero(already).tolist()
+    left = motions.copy()
+    for k in range(motions.shape[1]):
+        size = np.where(chosen, -1.0, (left**2).sum(axis=1))
+        row = waiting[k] if k < len(waiting) else int(comparable(size).argmax())
+        if size[row] <= FLAT:
+            break
+        chosen[row] = True
+        direction = left[row] / np.sqrt(left[row] @ left[row])
+        left = left - np.outer(left @ direction, direction)
+    return chosen
+
+
+def _integers(parts: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.concatenate(parts).astype(np.int64) if parts else np.zeros(0, np.int64)
+
+
+def _floats(parts: list[Array]) -> Array:
+    return np.concatenate(parts).astype(float) if parts else np.zeros(0)

@@ -1,0 +1,118 @@
+"""The lengths that ball bars, Bryan gauges and other length standards contribute to a design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+
+from ..experiment.model import DistanceCalibration, Experiment, RadiusCalibration
+from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ..machines.protocol import Array, Integers
+from .observations import Lengths, Readings
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A length: indices of the readings of its ends (-1: pivot), its direction, and what is known of it."""
+
+    value: float
+    certificate: tuple[object, int]
+    uncertainty: float = 0.0
+    projected: bool = False
+    scatters: bool = True
+    free: int = -1
+    first: int = -1
+    second: int = -1
+    direction: tuple[float, ...] = ()
+
+
+def standard_lengths(
+    experiment: Experiment,
+    readings: Readings,
+    first_ball: dict[str, int],
+    rotations: Array,
+    position_artefact: Integers,
+    balls: Array,
+) -> tuple[Lengths, tuple[str, ...], Array]:
+    """The lengths of all standards, and names and drawn values of those that are unknown.
+
+    A length standard contributes each of its calibrated distances once for every position and probe with
+    which both its balls are read. The error of a certificate is the same in all of them, but where the readings'
+    repeatability is ignored: then the stated uncertainty stands for all that a length may be off, each time anew.
+    A Bryan gauge contributes its radius with every reading. Without a certificate the length of a ball bar and the
+    radius of a gauge are unknown, and the same wherever they are read.
+    """
+    artefacts = list(experiment.artefacts)
+    rows: list[_Row] = []
+    names: list[str] = []
+    drawn: list[float] = []
+    read: dict[tuple[int, int, int], int] = {}
+    standards = [k for k, one in enumerate(experiment.artefacts.values()) if one.role == "length_standard"]
+    for i in np.flatnonzero(np.isin(position_artefact[readings.position], standards)).tolist():
+        read[int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])] = i
+    anew = count()
+
+    def between(number: int, kinds: list[tuple[_Row, Array]]) -> Iterator[_Row]:
+        for k in np.flatnonzero(position_artefact == number):
+            for probe in range(len(experiment.probes)):
+                for kind, pair in kinds:
+                    first, second = (read.get((int(k), probe, int(ball)), -1) for ball in pair)
+                    if first < 0 or second < 0:
+                        continue
+                    along = rotations[k] @ (balls[pair[0]] - balls[pair[1]])
+                    unit = along / np.sqrt(along @ along)
+                    # What repeatability does not excuse is off anew each time.
+                    own = kind.certificate if kind.scatters else ("anew", next(anew))
+                    yield replace(kind, first=first, second=second, direction=tuple(unit), certificate=own)
+
+    def unknown(name: str, what: str, value: float) -> _Row:
+        names.append(f"{name}: {what}")
+        drawn.append(value)
+        return _Row(value=value, certificate=(name, 0), free=len(names) - 1)
+
+    certified = set()
+    for i, item in enumerate(experiment.calibration):
+        certified.add(item.artefact)
+        if isinstance(item, DistanceCalibration) and experiment.artefacts[item.artefact].role == "length_standard":
+            given = zip(item.pairs, item.values.tolist(), item.standard_uncertainties.tolist(), strict=True)
+            is_projected, scatters = item.form == "projection", item.repeatability == "included"
+            kinds = [
+                (_Row(value, (i, j), u, is_projected, scatters), first_ball[item.artefact] + pair)
+                for j, (pair, value, u) in enumerate(given)
+            ]
+            rows += between(artefacts.index(item.artefact), kinds)
+    for number, (name, settings) in enumerate(experiment.artefacts.items()):
+        if isinstance(settings, TwoSpheresSettings) and settings.role == "length_standard" and name not in certified:
+            kind = unknown(name, "length", settings.length)
+            rows += between(number, [(kind, first_ball[name] + np.array([0, 1]))])
+        elif isinstance(settings, BryanGaugeSettings):
+            known = [one for one in experiment.calibration if one.artefact == name]
+            kind = unknown(name, "radius", settings.radius) if not known else _certified_radius(name, known[0])
+            for k in np.flatnonzero(position_artefact[readings.position] == number):
+                along = rotations[readings.position[k]] @ balls[readings.ball[k]]
+                unit = along / np.sqrt(along @ along)
+                rows.append(replace(kind, first=int(k), direction=tuple(unit)))
+    return _arrays(rows, experiment.dimension), tuple(names), np.array(drawn, float)
+
+
+def _certified_radius(name: str, item: object) -> _Row:
+    assert isinstance(item, RadiusCalibration)
+    return _Row(item.value, (name, 0), item.standard_uncertainty)
+
+
+def _arrays(rows: list[_Row], dimension: int) -> Lengths:
+    numbers = {one: i for i, one in enumerate(dict.fromkeys(row.certificate for row in rows))}
+    return Lengths(
+        np.array([row.first for row in rows], np.int64),
+        np.array([row.second for row in rows], np.int64),
+        np.array([row.value for row in rows], float),
+        np.array([row.uncertainty for row in rows], float),
+        np.array([row.projected for row in rows], bool),
+        np.array([row.direction for row in rows], float).reshape(-1, dimension),
+        np.array([row.scatters for row in rows], bool),
+        np.array([numbers[row.certificate] for row in rows], np.int64),
+        np.array([row.free for row in rows], np.int64),
+    )

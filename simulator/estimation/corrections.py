@@ -1,0 +1,35 @@
+"""How corrected points depend on the shared parameters: the rows behind U4, U6 and measuring tasks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..design.arrays import Design, State, probe_offsets
+from ..machines.protocol import Array, Integers
+from .observations import offset_sensitivity
+from .parameters import SharedLayout
+
+
+def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:
+    """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of indices (m,), metres."""
+    return np.asarray(points + design.model.error(points, state.a, probe_offsets(design, state)[probes]))
+
+
+def correction_rows(design: Design, layout: SharedLayout, state: State, points: Array, probes: Integers) -> Array:
+    """Derivative (m, d, s) of the corrected points by the shared parameters, estimated probe offsets included.
+
+    `points` (m, d) are scale readings with probes of indices `probes` (m,).
+    """
+    offsets = probe_offsets(design, state)[probes]
+    jacobian = design.model.jacobian(points, state.a, offsets)
+    rows = np.zeros((*jacobian.shape[:2], len(layout)))
+    rows[:, :, layout.model] = jacobian
+    if design.free_offsets is None:
+        return rows
+    by_offset = offset_sensitivity(design.model, points, state.a, offsets)
+    for probe in np.unique(probes):
+        estimated = layout.offset_columns[probe] >= 0
+        own = np.flatnonzero(probes == probe)
+        columns = layout.offset_columns[probe][estimated]
+        rows[own[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[own][:, :, estimated]
+    return rows

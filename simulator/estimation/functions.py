@@ -1,0 +1,222 @@
+"""Functions of a design's parameters whose uncertainties are asked for: of parameters, of places, and of distances.
+
+They are told without numbers of a particular state, so that a plan, a fit, replicates and a search for mistakes can
+each make what they need of the same description.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..design.arrays import Design, State
+from ..inputs.quantities import Target
+from ..machines.protocol import Array, Integers, Unit
+from .corrections import corrected_points, correction_rows
+from .covariance import MICROMETRE, blank
+from .linearisation import LinearFunctions, Linearisation
+from .parameters import AXIS_NAMES, SharedLayout
+
+# Places whose derivatives by all shared parameters are formed at once.
+PLACES_AT_ONCE = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Linear functions `rows` (m, s) of the shared parameters, each with its name and its unit."""
+
+    rows: Array
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls of indices `index` (n,), in the frame of their artefact."""
+
+    index: Integers
+
+    @property
+    def labels(self) -> Integers:
+        """Numbers (n,) by which places are named."""
+        return self.index
+
+    def name(self, design: Design, label: int) -> str:
+        return f"ball {design.ball_label(label)}"
+
+    def at(self, design: Design, state: State) -> Array:
+        """Where the places (n, d) are."""
+        return state.balls[self.index]
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Corrected points for scale readings `points` (n, d) with probes of indices `probes` (n,)."""
+
+    points: Array
+    probes: Integers
+
+    @property
+    def labels(self) -> Integers:
+        """Numbers (n,) by which places are named."""
+        return np.arange(len(self.points))
+
+    def name(self, design: Design, label: int) -> str:
+        """A point by its number from 1, as in the file."""
+        return f"point {label + 1}"
+
+    def at(self, design: Design, state: State) -> Array:
+        """Where the places (n, d) are."""
+        return corrected_points(design, state, self.points, self.probes)
+
+
+Places = Balls | Points
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """All co-ordinates of places, those of a place together."""
+
+    places: Places
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Distances between all `places` or, with `pairs` (m, 2) of their indices, between those, which have `names`.
+
+    `targets` are the uncertainties that each of these is to have, None where nothing is to be reached.
+    """
+
+    places: Places
+    pairs: Integers | None = None
+    names: tuple[str, ...] = ()
+    targets: tuple[Target | None, ...] = ()
+
+
+Functions = Parameters | Coordinates | Distances
+
+
+def coordinate_names(design: Design, places: Places) -> list[str]:
+    """Names of all co-ordinates of places."""
+    axes = AXIS_NAMES[: design.dimension]
+    names = [places.name(design, label) for label in places.labels.tolist()]
+    return [f"{name} {axis}" for name in names for axis in axes]
+
+
+def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
+    """Name of a co-ordinate by the label of its place and its axis, or of a distance by the labels of both places."""
+    assert not isinstance(functions, Parameters)
+    places = functions.places
+    if isinstance(functions, Coordinates):
+        return f"{places.name(design, first)} {AXIS_NAMES[second]}"
+    if functions.pairs is None:
+        return f"{places.name(design, first)} to {places.name(design, second)}"
+    is_pair = (places.labels[functions.pairs] == (first, second)).all(axis=1)
+    return functions.names[int(is_pair.argmax())]
+
+
+@dataclass(frozen=True, eq=False)
+class Displacements:
+    """How `places` (n, d) are displaced: by `common` (n, d, r) times r standard normal variables that all share, and
+    `own` (n, d, d) times d of their own.
+
+    `null` (n, d, k) moves them along undetermined directions from where they are `drawn` (n, d), by what is no mere
+    rounding of `size` (n, d).
+    """
+
+    places: Array
+    common: Array
+    own: Array
+    null: Array
+    drawn: Array
+    size: Array
+
+    @property
+    def uncertainties(self) -> Array:
+        """Standard uncertainties (n, d) of the co-ordinates; NaN where open."""
+        values = np.sqrt((self.common**2).sum(axis=2) + (self.own**2).sum(axis=2))
+        return blank(values, self.null, self.size)
+
+    def select(self, chosen: Integers | slice) -> Displacements:
+        """Those of some places."""
+        arrays = (self.places, self.common, self.own, self.null, self.drawn, self.size)
+        return Displacements(*(array[chosen] for array in arrays))
+
+
+def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Displacements:
+    """Displacements of places, in units of the standard deviation of a unit-weight observation.
+
+    With `narrow` those of points have variables of their own, no more than there are parameters that move points;
+    otherwise those of the linearisation, which balls and observations have in common.
+    """
+    design, drawn = at.design, at.as_drawn.state
+    if isinstance(places, Balls):
+        own, index = at.balls.own[places.index], places.index
+        size = np.full((len(index), design.dimension), MICROMETRE)
+        where = places.at(design, at.state), places.at(design, drawn)
+        return Displacements(where[0], at.balls.common[index], own, at.ball_null[index], where[1], size)
+    n, d = places.points.shape
+    columns = moving_columns(at.layout, places)
+    root = at.shared[columns]
+    if narrow and root.shape[0] < root.shape[1]:
+        # A root of the same covariance.
+        root = np.asarray(np.linalg.qr(root.T, mode="r")).T
+    common = np.zeros((n, d, root.shape[1] if narrow else at.balls.common.shape[2]))
+    null, size = np.empty((n, d, at.shared_null.shape[1])), np.empty((n, d))
+    for some, rows in point_rows(design, at.layout, at.state, places):
+        common[some, :, : root.shape[1]] = rows[:, :, columns] @ root
+        if at.drawn is not None:
+            rows = correction_rows(design, at.layout, drawn, places.points[some], places.probes[some])
+        null[some] = rows @ at.shared_null
+        size[some] = np.sqrt(((rows * at.spectrum.scale) ** 2).sum(axis=2))
+    corrected = places.at(design, at.state)
+    as_drawn = corrected if at.drawn is None else places.at(design, drawn)
+    return Displacements(corrected, common, np.zeros((n, d, d)), null, as_drawn, size)
+
+
+def moving_columns(layout: SharedLayout, places: Points) -> Integers:
+    """Columns of the shared parameters that move corrected points; poses, for instance, do not."""
+    offsets = layout.offset_columns[np.unique(places.probes)].ravel()
+    return np.concatenate([np.arange(len(layout))[layout.model], np.sort(offsets[offsets >= 0])])
+
+
+def point_rows(design: Design, layout: SharedLayout, state: State, places: Points) -> Iterator[tuple[slice, Array]]:
+    """Derivatives (m, d, s) of corrected points by the shared parameters, some points at a time."""
+    for start in range(0, len(places.points), PLACES_AT_ONCE):
+        some = slice(start, start + PLACES_AT_ONCE)
+        yield some, correction_rows(design, layout, state, places.points[some], places.probes[some])
+
+
+def linear_functions(at: Linearisation, functions: Functions) -> LinearFunctions:
+    """Derivatives of all functions: dense, for some of them rather than for all distances of a large plate."""
+    found = _derivatives(at, at.state, functions)
+    if at.drawn is None or isinstance(functions, Parameters):
+        return found
+    return replace(found, drawn=_derivatives(at, at.drawn.state, functions))
+
+
+def _derivatives(at: Linearisation, state: State, functions: Functions) -> LinearFunctions:
+    if isinstance(functions, Parameters):
+        return LinearFunctions(functions.rows)
+    places, design = functions.places, at.design
+    where = places.at(design, state)
+    n, d = where.shape
+    if isinstance(places, Points):
+        by_shared = np.concatenate([rows for _, rows in point_rows(design, at.layout, state, places)])
+        by_balls = np.zeros((n, d, 0))
+    else:
+        by_shared = np.zeros((n, d, len(at.layout)))
+        by_balls = np.zeros((n, d, len(design.balls), d))
+        by_balls[np.arange(n)[:, None], np.arange(d), places.index[:, None], np.arange(d)] = 1.0
+    by_all = np.concatenate([by_shared, by_balls.reshape(n, d, -1)], axis=2)
+    if isinstance(functions, Coordinates):
+        found = by_all.reshape(n * d, -1)
+    else:
+        first, second = np.triu_indices(n, 1) if functions.pairs is None else functions.pairs.T
+        unit = where[first] - where[second]
+        unit /= np.sqrt((unit**2).sum(axis=1))[:, None]
+        found = np.einsum("md,mds->ms", unit, by_all[first] - by_all[second])
+    shared, balls = found[:, : len(at.layout)], found[:, len(at.layout) :]
+    return LinearFunctions(shared, balls.reshape(len(found), -1, d) if balls.shape[1] else None)

@@ -1,0 +1,131 @@
+"""An experiment linearised at a state: the one place where layout, factor, spectrum and covariance come together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..design.arrays import Design, State, nominal_state
+from ..machines.protocol import Array
+from ..numerics.threads import single_threaded
+from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, blank, spectrum
+from .elimination import Factor, eliminate
+from .parameters import SharedLayout, shared_layout
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFunctions:
+    """Derivatives of m functions: `shared` (m, s) by the shared parameters, `balls` (m, n, d) by those of all balls,
+    None where no ball has a part in them; `drawn` are the same at the design as drawn, None where these are.
+    """
+
+    shared: Array
+    balls: Array | None = None
+    drawn: LinearFunctions | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """A design at a `state`, with its `factor` and `spectrum` there.
+
+    Square roots of covariances are in units of the standard deviation of a unit-weight observation. After a fit what is
+    undetermined is what the design leaves open as it is drawn: `drawn` then is the linearisation there, at whose state
+    functions are looked at to see whether a null direction changes them. It is None where that is this one.
+    """
+
+    design: Design
+    layout: SharedLayout
+    state: State
+    factor: Factor
+    spectrum: Spectrum
+    drawn: Linearisation | None = None
+
+    @property
+    def deficiency(self) -> int:
+        return self.spectrum.deficiency
+
+    @property
+    def rank(self) -> int:
+        return self.spectrum.rank
+
+    @property
+    def as_drawn(self) -> Linearisation:
+        """The linearisation whose null directions tell what is undetermined."""
+        return self.drawn or self
+
+    @cached_property
+    def shared(self) -> Array:
+        """Square root (s, rank) of the covariance of the shared parameters."""
+        return self.spectrum.root
+
+    @property
+    def shared_null(self) -> Array:
+        """Undetermined directions (s, deficiency) of the shared parameters."""
+        return self.as_drawn.spectrum.null
+
+    @cached_property
+    def balls(self) -> BallCovariance:
+        """Square root of the covariance of the balls; it takes most of the time, and is made when it is asked for."""
+        return ball_covariance(self.design, self.factor, self.spectrum)
+
+    @property
+    def ball_null(self) -> Array:
+        """How undetermined directions move the balls, (n, d, deficiency)."""
+        return self.as_drawn.balls.null
+
+    def of_shared(self, rows: Array, drawn: Array | None = None) -> Array:
+        """Standard deviations (m,) of `rows` (m, s) applied to the shared parameters; NaN where open.
+
+        `drawn` (m, s) are the same functions linearised as drawn, if they are others there.
+        """
+        result = np.sqrt(((rows @ self.shared) ** 2).sum(axis=1))
+        rows = rows if drawn is None else drawn
+        size = np.sqrt(((rows * self.as_drawn.spectrum.scale) ** 2).sum(axis=1))
+        return blank(result, rows @ self.shared_null, size)
+
+    def uncertainty(self, functions: LinearFunctions) -> Array:
+        """Standard deviations (m,) of functions; NaN where open."""
+        values = np.sqrt((self._root(functions) ** 2).sum(axis=1))
+        as_drawn = functions.drawn or functions
+        change = as_drawn.shared @ self.shared_null
+        size = ((as_drawn.shared * self.as_drawn.spectrum.scale) ** 2).sum(axis=1)
+        if as_drawn.balls is not None:
+            change = change + np.einsum("mnd,ndk->mk", as_drawn.balls, self.ball_null)
+            size = size + MICROMETRE**2 * (as_drawn.balls**2).sum(axis=(1, 2))
+        return blank(values, change, np.sqrt(size))
+
+    def covariance(self, one: LinearFunctions, other: LinearFunctions) -> Array:
+        """Covariances (m, k) of functions with others, what is undetermined left out."""
+        first, second = self._root(one), self._root(other)
+        width = min(first.shape[1], second.shape[1])
+        return np.asarray(first[:, :width] @ second[:, :width].T)
+
+    def _root(self, functions: LinearFunctions) -> Array:
+        """Derivatives (m, r) by standard normal variables: those of what is shared, of kept balls, of each ball."""
+        common = functions.shared @ self.shared
+        if functions.balls is None:
+            return np.asarray(common)
+        of_balls = np.einsum("mnd,ndr->mr", functions.balls, self.balls.common)
+        of_balls[:, : self.rank] += common
+        own = np.einsum("mnd,ndj->mnj", functions.balls, self.balls.own)
+        return np.concatenate([of_balls, own.reshape(len(own), -1)], axis=1)
+
+    def of_balls(self) -> Array:
+        """Standard deviations (n, d) of the ball co-ordinates; NaN where open."""
+        result = np.sqrt((self.balls.common**2).sum(axis=2) + (self.balls.own**2).sum(axis=2))
+        return blank(result, self.ball_null, np.full(result.shape, MICROMETRE))
+
+
+@single_threaded
+def linearise(
+    design: Design, state: State | None = None, x: Array | None = None, drawn: Spectrum | None = None
+) -> Linearisation:
+    """Linearise a design at a `state`, as it is drawn unless told, with scale readings `x` (readings, d) or error-free
+    ones. With a spectrum `drawn` rank and null space are those, see `spectrum`.
+    """
+    state = nominal_state(design) if state is None else state
+    layout = shared_layout(design)
+    factor = eliminate(design, layout, state, x)
+    return Linearisation(design, layout, state, factor, spectrum(factor, drawn))

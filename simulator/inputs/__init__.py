@@ -1,0 +1,1 @@
+"""Files as text, numbers with units, and what is wrong with them; nothing of ball plates."""

@@ -1,0 +1,75 @@
+"""Collects what is wrong with an experiment file while it is read, so that everything is said at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
+from .yamltree import Mapping, Mark, Node, Sequence, mark_of, to_python, written
+
+
+@dataclass(eq=False)
+class Problems:
+    """Messages about the tree below ``root``; ``doubts`` are about what is possible, and unlikely to be meant.
+
+    Adding one too many raises an ``ExperimentError`` with all of them: each takes time to word, and a file may have
+    hundreds of thousands.
+    """
+
+    root: Node
+    messages: list[Message] = field(default_factory=list)
+    doubts: list[Message] = field(default_factory=list)
+    _known: set[Message] = field(default_factory=set)
+
+    def add(self, steps: Steps, text: str, of_key: bool = False) -> None:
+        """Add a message about a path; ``of_key`` places it at the key instead of the value."""
+        self.add_at(mark_of(self.root, steps, of_key), steps, text)
+
+    def doubt(self, steps: Steps, text: str) -> None:
+        """Add a doubt about a path."""
+        self.doubts.append(mark_of(self.root, steps).message(format_path(steps), text))
+
+    def add_at(self, mark: Mark, steps: Steps, text: str) -> None:
+        """Add a message about a path, placed elsewhere, such as in a table that the path names."""
+        message = mark.message(format_path(steps), text)
+        if message in self._known:
+            return
+        if len(self.messages) >= MOST_MESSAGES:
+            raise ExperimentError([*self.messages, mark.message("", ENOUGH)])
+        self._known.add(message)
+        self.messages.append(message)
+
+    def take(self, error: ExperimentError, steps: Steps) -> None:
+        """Add the messages about a table that a path names."""
+        for message in error.messages:
+            if message.line:
+                self.messages.append(message)
+            else:
+                self.add(steps, f"{message.file}: {message.text}")
+
+    def has_below(self, steps: Steps) -> bool:
+        """Tell whether there is a message about a path or something below it."""
+        path = format_path(steps)
+        return any(
+            message.path == path or message.path.startswith((f"{path}.", f"{path}[")) for message in self.messages
+        )
+
+
+def written_keys(root: Node, section: str) -> tuple[str, ...]:
+    """Return the keys of a section as written, whether or not their values are right."""
+    node = written(root, section)
+    return tuple(node.items) if isinstance(node, Mapping) else ()
+
+
+def written_count(root: Node, *steps: Step) -> int:
+    """Return the number of entries of a list at a path, right or wrong."""
+    node = written(root, *steps)
+    return len(node.items) if isinstance(node, Sequence) else 0
+
+
+def written_text(root: Node, *steps: Step) -> str | None:
+    """Return a name as written at a path, or None where there is none."""
+    node = written(root, *steps)
+    value = to_python(node) if node is not None else None
+    is_name = isinstance(value, str | int) and not isinstance(value, bool)
+    return str(value) if is_name else None

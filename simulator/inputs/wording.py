@@ -1,0 +1,262 @@
+"""Turns pydantic's errors into messages for the person who wrote the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from .messages import MOST_MESSAGES, Steps
+from .settings import describe, hint, listing, shorten
+from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python
+
+Schema = AnyMapping[str, Any]
+
+# Kinds by other names that they have, in lower case without what is no letter.
+OTHER_NAMES = {
+    **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),
+    **dict.fromkeys(("bryangauge", "bryan"), "bryan_gauge"),
+}
+
+# Type of error → what was expected instead.
+EXPECTED = {
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "tuple_type": "a list in brackets",
+    "dict_type": "a mapping, key: value",
+    "model_type": "a mapping, key: value",
+    "model_attributes_type": "a mapping, key: value",
+}
+COMPARISONS = {
+    "greater_than": ("gt", "above"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "below"),
+    "less_than_equal": ("le", "at most"),
+}
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A path below the validated node and what to say about it; ``of_key``: about the key, not its value."""
+
+    steps: Steps
+    text: str
+    of_key: bool = False
+
+
+def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Explanation]:
+    """Explain errors of validating ``node``; ``schema`` is the JSON schema of what it should be."""
+    explanations: list[Explanation] = []
+    choices: dict[Steps, dict[str, list[tuple[Explanation, bool]]]] = {}
+    # What is explained beyond would not be told.
+    for error in errors[: 2 * MOST_MESSAGES]:
+        place = _place(error, node)
+        # Pydantic counts entries that are wrong in themselves as missing.
+        items = getattr(place.node, "items", ())
+        if error["type"] == "too_short" and items and len(items) >= error["ctx"]["min_length"]:
+            continue
+        explanation = _explain(error, place, node, schema)
+        if place.choice is None:
+            explanations.append(explanation)
+            continue
+        above, label = place.choice
+        # The choice fails already because of the form that was written, not because of a mistake within it.
+        is_other_form = explanation.steps == above and (
+            error["type"] in EXPECTED or (error["type"] == "literal_error" and not isinstance(place.node, Scalar))
+        )
+        choices.setdefault(above, {}).setdefault(label, []).append((explanation, is_other_form))
+    for by_label in choices.values():
+        explanations += _nearest_choice(list(by_label.values()))
+    return list(dict.fromkeys(explanations))
+
+
+def _nearest_choice(choices: list[list[tuple[Explanation, bool]]]) -> list[Explanation]:
+    same_form = [choice for choice in choices if not any(other_form for _, other_form in choice)] or choices
+    deepest = max(len(explanation.steps) for choice in same_form for explanation, _ in choice)
+    nearest = [choice for choice in same_form if any(len(one.steps) == deepest for one, _ in choice)]
+    if len(nearest) == 1:
+        return [explanation for explanation, _ in nearest[0]]
+    firsts = [choice[0][0] for choice in nearest]
+    return [Explanation(firsts[0].steps, " – or: ".join(dict.fromkeys(first.text for first in firsts)))]
+
+
+@dataclass(frozen=True)
+class _Place:
+    steps: Steps
+    # The node at the path, or above it where the last step does not exist.
+    node: Node
+    # Where one of several forms was tried, and which.
+    choice: tuple[Steps, str] | None
+
+
+def _place(error: ErrorDetails, root: Node) -> _Place:
+    steps: Steps = ()
+    node, choice, tagged = root, None, False
+    for i, step in enumerate(error["loc"]):
+        is_last = i == len(error["loc"]) - 1
+        below = child(node, step)
+        # The tag of a form, unless the file has such a key.
+        if below is None and isinstance(step, str) and step.startswith("<"):
+            continue
+        if not tagged and isinstance(node, Mapping) and _kind(node) == step:
+            tagged = True
+        elif below is not None:
+            steps, node, tagged = (*steps, step), below, False
+        elif is_last and error["type"] == "missing":
+            steps = (*steps, step)
+        elif choice is None and step != "[key]":
+            choice = (steps, str(step))
+    return _Place(steps, node, choice)
+
+
+def _kind(node: Node) -> str | None:
+    kind = child(node, "kind")
+    return str(kind.value) if isinstance(kind, Scalar) else None
+
+
+def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> Explanation:
+    kind, context, steps, node = error["type"], error.get("ctx", {}), place.steps, place.node
+    value = to_python(node) if isinstance(node, Scalar) else () if isinstance(node, Sequence) else {}
+    if kind == "missing":
+        if isinstance(steps[-1], int):
+            return Explanation(steps[:-1], _wrong_length(root, steps[:-1], schema))
+        about = _description(schema, root, steps)
+        return Explanation(steps, f'missing; add "{steps[-1]}"{about}')
+    if kind == "extra_forbidden":
+        known = [key for one in _schemas_at(schema, root, steps[:-1]) for key in one.get("properties", {})]
+        written = to_python_keys(root, steps[:-1])
+        free = [key for key in dict.fromkeys(known) if key not in written]
+        # A misspelt key may stand beside the right one.
+        meant = hint(str(steps[-1]), known)
+        meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
+        return Explanation(steps, f"unknown key; {meant}", of_key=True)
+    if isinstance(node, Scalar) and node.value is None:
+        return Explanation(steps, "empty; give a value, or leave it out")
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        kinds = _allowed(schema, root, (*steps, "kind"))
+        tag = child(node, "kind")
+        if tag is None:
+            return Explanation((*steps, "kind"), f'missing; add "kind", one of: {listing(kinds)}')
+        if isinstance(tag, Scalar) and tag.value is not None:
+            other = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
+            meant = f'write "{other}"' if other in kinds else hint(str(tag.value), kinds)
+            return Explanation((*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}')
+        return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
+    if kind == "literal_error":
+        return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))
+    if kind in EXPECTED:
+        about = _description(schema, root, steps) if not steps or isinstance(steps[-1], str) else ""
+        quotes = "; put it in quotes" if kind == "string_type" and isinstance(node, Scalar) else ""
+        return Explanation(steps, f"expected {EXPECTED[kind]}, found {describe(value)}{quotes}{about}")
+    if kind in ("too_short", "too_long", "string_too_short"):
+        return Explanation(steps, _wrong_length(root, steps, schema))
+    if kind in COMPARISONS:
+        bound, word = COMPARISONS[kind]
+        return Explanation(steps, f"{describe(value)} is out of range; give one {word} {context[bound]}")
+    if kind == "finite_number":
+        return Explanation(steps, f"{describe(value)} is not finite; give a finite number")
+    if kind == "string_pattern_mismatch":
+        return Explanation(steps, f"{describe(value)} holds a control character; remove it")
+    if kind == "value_error":
+        return Explanation(steps, str(context["error"]))
+    return Explanation(steps, error["msg"][:1].lower() + error["msg"][1:])
+
+
+def to_python_keys(root: Node, steps: Steps) -> tuple[str, ...]:
+    """Return the keys of the mapping at a path, none where there is no mapping."""
+    node: Node | None = root
+    for step in steps:
+        node = child(node, step)
+    return tuple(node.items) if isinstance(node, Mapping) else ()
+
+
+def _wrong_literal(value: Any, allowed: list[str]) -> str:
+    if isinstance(value, str):
+        meant = hint(value, allowed)
+        others = "" if meant.startswith("known") else f" allowed: {listing(allowed, 12)}"
+        return f'unknown value "{shorten(value)}"; ' + (
+            f"{meant}{others}" if others else f"allowed: {listing(allowed, 12)}"
+        )
+    return f"expected one of: {listing(allowed, 12)}; found {describe(value)}"
+
+
+def _wrong_length(root: Node, steps: Steps, schema: Schema) -> str:
+    node: Node | None = root
+    for step in steps:
+        node = child(node, step)
+    if isinstance(node, Scalar):
+        return "empty; give a text"
+    items = getattr(node, "items", ())
+    bounds = [
+        (one.get("minItems", one.get("minProperties", 0)), one.get("maxItems", one.get("maxProperties")))
+        for one in _schemas_at(schema, root, steps)
+        if one.get("type") == ("array" if isinstance(node, Sequence) else "object")
+    ]
+    lower, upper = bounds[0] if bounds else (1, None)
+    if not items and upper is None:
+        return "empty; give at least one entry" + _description(schema, root, steps)
+    number = str(lower) if lower == upper else f"at least {lower}" if upper is None else f"{lower} to {upper}"
+    if upper is not None and upper == lower + 1:
+        number = f"{lower} or {upper}"
+    plural = "entry" if len(items) == 1 else "entries"
+    return f"has {len(items)} {plural}; {number} are needed{_description(schema, root, steps)}"
+
+
+def _description(schema: Schema, root: Node, steps: Steps) -> str:
+    for one in _schemas_at(schema, root, steps, expanded=False):
+        # The description of a whole class is its docstring, written for another reader.
+        if "description" in one and "properties" not in one:
+            return f" ({one['description'].rstrip('.')})"
+    return ""
+
+
+def _allowed(schema: Schema, root: Node, steps: Steps) -> list[str]:
+    allowed: list[str] = []
+    for one in _schemas_at(schema, root, steps, any_kind=True):
+        allowed += [str(value) for value in one.get("enum", [one["const"]] if "const" in one else [])]
+    return list(dict.fromkeys(allowed))
+
+
+def _schemas_at(
+    schema: Schema, root: Node, steps: Steps, expanded: bool = True, any_kind: bool = False
+) -> list[Schema]:
+    """Return the schemas that apply at a path, those of other kinds left out."""
+    found: list[Schema] = [schema]
+    node: Node | None = root
+    for step in steps:
+        parts = [part for one in found for part in _expand(one, schema, None if any_kind else node)]
+        found = [below for part in parts for below in _below(part, step)]
+        node = child(node, step)
+    if not expanded:
+        return found
+    return [part for one in found for part in _expand(one, schema, None if any_kind else node)]
+
+
+def _expand(part: Schema, schema: Schema, node: Node | None) -> Iterator[Schema]:
+    if "$ref" in part:
+        yield from _expand(schema["$defs"][part["$ref"].removeprefix("#/$defs/")], schema, node)
+        return
+    for choice in (*part.get("anyOf", ()), *part.get("oneOf", ())):
+        yield from _expand(choice, schema, node)
+    kind = part.get("properties", {}).get("kind", {}).get("const")
+    if kind is None or node is None or _kind(node) in (None, kind):
+        yield part
+
+
+def _below(part: Schema, step: str | int) -> Iterator[Schema]:
+    if isinstance(step, str):
+        if step in part.get("properties", {}):
+            yield part["properties"][step]
+        elif isinstance(part.get("additionalProperties"), dict):
+            yield part["additionalProperties"]
+    elif step < len(part.get("prefixItems", ())):
+        yield part["prefixItems"][step]
+    elif isinstance(part.get("items"), dict):
+        yield part["items"]

@@ -1,0 +1,1 @@
+"""What keeps figures the same on every machine."""

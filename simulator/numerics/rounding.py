@@ -1,0 +1,56 @@
+"""Comparisons and printed digits that rounding cannot change.
+
+Linear algebra kernels differ in the order of their sums, and so in the last digits of a result. Numbers that are equal
+but for rounding, as those of a symmetrical design, are made equal to the bit before they are compared, sorted or
+chosen from; of equal ones the first is taken then.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..machines.protocol import Array
+
+# Binary digits in which numbers have to agree, about six decimal ones.
+DIGITS = 20
+
+# Numbers below this fraction of the largest beside them are zero but for rounding.
+NOTHING = 1e-12
+
+
+def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None) -> Array:
+    """Numbers (...) to `digits` binary digits, and 0 for what is nothing beside the largest, of all or along an axis.
+
+    Binary ones, as a decimal fraction or one with a small divisor then never lies half-way between two of them.
+
+    >>> int(np.argmax([0.3, 0.1 + 0.2])), int(np.argmax(comparable([0.3, 0.1 + 0.2])))
+    (1, 0)
+    >>> comparable([1.0, -1e-17, np.nan, np.inf]).tolist()
+    [1.0, 0.0, nan, inf]
+    """
+    values = np.asarray(values, float)
+    known = np.isfinite(values)
+    size = np.abs(values, where=known, out=np.zeros(values.shape))
+    is_something = size > NOTHING * size.max(axis=axis, initial=0.0, keepdims=True)
+    mantissa, exponent = np.frexp(np.where(known & is_something, values, 0.0))
+    found = np.ldexp(np.round(np.ldexp(mantissa, digits)), exponent - digits) + 0.0
+    return np.asarray(np.where(known, found, values))
+
+
+def above(values: ArrayLike, limit: float) -> NDArray[np.bool_]:
+    """Which of `values` exceed a limit by more than rounding.
+
+    >>> above([0.1 + 0.2, 0.31, np.nan], 0.3).tolist()
+    [False, True, False]
+    """
+    return np.asarray(np.asarray(values, float) > limit + 2.0**-DIGITS * abs(limit))
+
+
+def printable(value: float, digits: int = 9) -> float:
+    """A number to `digits` significant ones, so that a half is rounded to fewer digits in one way.
+
+    >>> f"{0.1875 - 1e-16:.3g}", f"{printable(0.1875 - 1e-16):.3g}"
+    ('0.187', '0.188')
+    """
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,136 @@
+"""Says which lines of a file of readings cannot be right, and what they probably are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..design.arrays import Design
+from ..estimation.length_ratios import LengthRatio, doubtful_lengths
+from ..experiment.model import SLIGHTLY
+from ..inputs.messages import ExperimentError, Message
+from ..inputs.quantities import format_length
+from ..inputs.yamltree import Mark
+from ..machines.protocol import Array
+from .gross_errors import WrongPosition, WrongReading, find_misreadings
+
+
+def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
+    """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they are said to be of.
+
+    `marks` tell where each of the design's readings stands. The rules are those of `estimation.misreadings` and
+    `estimation.length_ratios`.
+
+    :raises ExperimentError: some readings are wrong; names all of them.
+    """
+    positions, readings = find_misreadings(design, x)
+    messages = [_of_position(design, wrong, marks) for wrong in positions]
+    told: set[int] = set()
+    for wrong in readings:
+        if wrong.reading not in told:
+            messages.append(_of_reading(design, wrong, marks))
+            told |= {wrong.reading, wrong.partner}
+    if not messages:
+        doubtful = doubtful_lengths(design, x)
+        messages = [marks[one.reading].message("", _of_length(design, one)) for one in doubtful if one.is_impossible]
+    if messages:
+        raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
+
+
+def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
+    """Sentences about standards whose lengths are all off by a factor that machines hardly have."""
+    return tuple(_of_length(design, one) for one in doubtful_lengths(design, x))
+
+
+def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
+    """A sentence about readings outside the volume, where error models are extrapolated, or none.
+
+    By less than a thousandth of the volume a reading is outside if an artefact was not set up just as drawn.
+    """
+    beyond = np.maximum(design.lower - x, x - design.upper)
+    far = np.flatnonzero((beyond > SLIGHTLY * (design.upper - design.lower)).any(axis=1))
+    if not len(far):
+        return ()
+    i = int(far[beyond[far].max(axis=1).argmax()])
+    axis = int(beyond[i].argmax())
+    how = "below" if x[i, axis] < design.lower[axis] else "above"
+    readings = design.readings
+    where = f" (line {marks[i].line})" if marks else ""
+    count = "1 reading is" if len(far) == 1 else f"{len(far)} readings are"
+    return (
+        f"{count} outside the measuring volume, and the error model is extrapolated there; furthest is ball "
+        f"{design.ball_label(int(readings.ball[i]))} in position {design.position_names[readings.position[i]]} "
+        f"with probe {design.probe_names[readings.probe[i]]}, at {'xyz'[axis]} = {_shown(float(x[i, axis]))}, "
+        f"{_shown(float(beyond[i, axis]))} {how} it{where}; correct machine.volume, or the readings",
+    )
+
+
+def _of_length(design: Design, one: LengthRatio) -> str:
+    name = design.artefact_names[one.artefact]
+    what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
+    word = "stated" if one.is_known else "drawn"
+    stated = f"the {word} {format_length(one.stated)}" if one.is_radius else f"the {word} ones"
+    why = "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    ratio = f"{one.ratio:.3g}" if one.is_impossible else f"{one.ratio:.4f}"
+    return (
+        f"{name}: the read {what} {verb} {ratio} of {stated}{f'; {why}' if one.is_known else ''}: correct the "
+        f"{'radius' if one.is_radius else 'length'} in the experiment file, or the unit of the readings"
+    )
+
+
+def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) -> Message:
+    first = marks[int(np.flatnonzero(design.readings.position == wrong.position)[0])]
+    name = design.position_names[wrong.position]
+    artefact = design.artefact_names[design.position_artefact[wrong.position]]
+    if wrong.turned:
+        text = (
+            f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the names of the balls "
+            "that are read there, or the turn that the experiment file states for the position"
+        )
+    else:
+        text = (
+            f"position {name}: only {wrong.agreeing} of {wrong.count} readings fit the {artefact} in any one pose; "
+            "correct the names of the balls that are read there, or the artefact"
+        )
+    return first.message("", text)
+
+
+def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> Message:
+    readings, i = design.readings, wrong.reading
+    ball = design.ball_label(int(readings.ball[i]))
+    position = design.position_names[readings.position[i]]
+    far = _shown(float(np.sqrt(wrong.misfit @ wrong.misfit)))
+    if wrong.undecided:
+        elsewhere = design.position_names[readings.position[wrong.partner]]
+        text = (
+            f"ball {ball} in position {position} stands {far} from where it stands in position {elsewhere}, "
+            f"line {marks[wrong.partner].line}; correct or remove one of the two lines"
+        )
+    elif wrong.other_ball >= 0:
+        other = design.ball_label(wrong.other_ball)
+        text = f"ball {ball} in position {position} stands where ball {other} should be; "
+        if wrong.partner >= 0:
+            text += f"swap the names of the balls in lines {marks[i].line} and {marks[wrong.partner].line}"
+        else:
+            text += "correct its name, or remove the line"
+    elif wrong.other_probe >= 0:
+        probe, other = design.probe_names[readings.probe[i]], design.probe_names[wrong.other_probe]
+        text = f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the name of the probe"
+    else:
+        along = ", ".join(
+            f"{axis} {'+' if part > 0 else ''}{_shown(float(part))}"
+            for axis, part in zip("xyz", wrong.misfit, strict=False)
+            if abs(part) > 0.01 * np.abs(wrong.misfit).max()
+        )
+        text = f"ball {ball} in position {position} is {far} from where it should be ({along}); correct or remove it"
+    return marks[i].message("", text)
+
+
+def _shown(length: float) -> str:
+    """A length to three digits.
+
+    >>> _shown(0.0123456)
+    '12.3 mm'
+    """
+    return format_length(float(f"{length:.3g}"))

@@ -1,0 +1,55 @@
+"""Readings of an experiment's true machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..design.arrays import Design, State
+from ..design.layout import lay_out
+from ..design.observations import Readings
+from ..experiment.model import Experiment
+from ..inputs.messages import ExperimentError
+from ..machines.protocol import Array, ErrorModel
+from ..machines.truth import true_machine
+from .generate import NoReadingError, exact_readings, noisy_readings, on_true_machine, true_artefacts
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Scale readings `x` (readings, d) in metres of the true artefacts on the true machine, `truth` on `model`.
+
+    `generator` goes on where the readings have ended; None where there is no noise.
+    """
+
+    design: Design
+    truth: State
+    model: ErrorModel
+    readings: Readings
+    x: Array
+    seed: int
+    generator: np.random.Generator | None
+
+
+def simulated_readings(experiment: Experiment, seed: int | None = None, exact: bool = False) -> Simulated:
+    """Readings that the true machine gives of artefacts that differ from their certificates as stated, with noise.
+
+    `seed` replaces that of the experiment. `exact` leaves all noise out, and artefacts are as drawn.
+
+    :raises ExperimentError: the true machine's errors are so large that there is no reading.
+    """
+    design = lay_out(experiment)
+    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    chosen = experiment.seed if seed is None else seed
+    generator = None if exact else np.random.default_rng(np.random.SeedSequence(chosen))
+    try:
+        if generator is None:
+            readings, x = exact_readings(on_truth, truth)
+        else:
+            truth = replace(truth, balls=true_artefacts(design, generator))
+            readings, x = noisy_readings(on_truth, truth, generator)
+    except NoReadingError as error:
+        raise ExperimentError([experiment.message(("true_machine",), f"{error}; state smaller ones")]) from None
+    return Simulated(design, truth, on_truth.model, readings, x, chosen, generator)

@@ -1,0 +1,206 @@
+"""A quantity added as one entry in one file, U7, the body diagonals of the volume: every command then has it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ballplate import quickstart
+from ballplate.simulator.design.layout import lay_out
+
+from tests.reference import dense
+
+TOP = Path(__file__).parents[2]
+
+ENTRY = """\
+    "U7": QuantityKind(
+        "lengths of the body diagonals",
+        lambda design, layout: (
+            Distances(
+                Points(
+                    np.stack(np.meshgrid(*zip(design.lower, design.upper)), axis=-1).reshape(-1, design.dimension),
+                    np.full(2**design.dimension, design.point_probe),
+                ),
+                np.array([(i, 2**design.dimension - 1 - i) for i in range(2 ** (design.dimension - 1))]),
+                tuple(f"diagonal {i + 1}" for i in range(2 ** (design.dimension - 1))),
+            ),
+        ),
+        are_lengths=True,
+        effect="body diagonals",
+    ),
+"""
+END = "}\n\n\n# What all quantities"
+
+SWEEP = """\
+title: repeatability
+base: base.yaml
+axes:
+  u: {path: machine.repeatability, values: [0.4 um, 0.8 um]}
+trials: 128
+"""
+
+# Everything that a person sees, with and without the entry.
+SCRIPT = """
+import contextlib, io, json, sys
+from pathlib import Path
+
+import ballplate as bp
+from ballplate.cli import main
+from ballplate.requirements.goals import SYMBOLS
+from ballplate.planning.criteria import NAMES
+
+def said(*arguments):
+    stream = io.StringIO()
+    with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(io.StringIO()):
+        try:
+            main(list(arguments))
+        except SystemExit:
+            pass
+    return stream.getvalue()
+
+folder = Path(sys.argv[1])
+places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
+start = bp.quickstart()
+pool = start.with_(pool={"candidates": [places | {"probes": ["down"]}]})
+sweep, store = str(folder / "sweep.yaml"), str(folder / "store")
+said("sweep", sweep, "--store", store, "--workers", "1")
+found, biases = bp.run(start, trials=256), bp.reliability(start)
+plans = {name: bp.plan(pool, name, positions=7).to_dict() for name in NAMES if name.startswith("U7")}
+print(json.dumps({
+    "run": found.to_dict(),
+    "table": found.table_lines(),
+    "trials": found.lines()[len(found.table_lines()) :],
+    "plans": plans,
+    "help": said("plan", "--help"),
+    "schema": json.loads(said("schema", "sweep")),
+    "reliability": biases.to_dict()["events"],
+    "reliability table": " ".join(biases.lines()),
+    "goals": list(SYMBOLS),
+    "reach": said("reach", str(folder / "base.yaml"), "--goal", "U7 average 0.2 um", "--by", "repeatability"),
+    "export": said("export", store, "-o", "-"),
+    "report": said("report", store, "--format", "markdown"),
+}))
+"""
+
+
+def package(folder: Path) -> Path:
+    """A copy of the package, and the file of quantities in it."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(TOP / "analysis", folder / "ballplate", ignore=ignored)
+    for part in ("simulator", "designs"):
+        shutil.copytree(TOP / part, folder / "ballplate" / part, ignore=ignored)
+    return folder / "ballplate" / "uncertainty" / "quantities.py"
+
+
+def told(folder: Path) -> dict[str, Any]:
+    """What the package in a folder says."""
+    work = folder / "work"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir()
+    shutil.copy(TOP / "designs" / "quickstart.yaml", work / "base.yaml")
+    (work / "sweep.yaml").write_text(SWEEP)
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, str(work)],
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What is told with the entry, and after it has been removed."""
+    folder = tmp_path_factory.mktemp("package")
+    file = package(folder)
+    text = file.read_text(encoding="utf-8")
+    assert text.count(END) == 1
+    file.write_text(text.replace(END, ENTRY + END), encoding="utf-8")
+    added = told(folder)
+    file.write_text(text, encoding="utf-8")
+    return added, told(folder)
+
+
+def diagonals() -> np.ndarray:
+    """Standard uncertainties of the four lengths between opposite corrected corners, by the dense reference."""
+    design = lay_out(quickstart())
+    problem = dense.planned(design, 5, 5)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (design.upper - design.lower)
+    offsets = np.tile(design.probes[design.point_probe], (8, 1))
+
+    def lengths(step: dense.Values) -> dense.Values:
+        places = dense.corrected(problem, design.lower + corners, dense.unpack(problem, step)[3], offsets)
+        return dense.length(places[:4] - places[:3:-1])
+
+    return dense.linearised(problem).of(dense.jacobian(lengths, problem.parameters))
+
+
+def test_run_has_it_as_a_dense_computation(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    found, expected = both[0]["run"]["quantities"]["U7"], diagonals()
+    assert found["count"] == 4 and found["undetermined"] == 0
+    assert found["maximum"] == pytest.approx(expected.max(), rel=1e-9)
+    assert found["average"] == pytest.approx(expected.mean(), rel=1e-9)
+    row = next(line for line in both[0]["table"] if line.startswith("U7"))
+    assert "lengths of the body diagonals" in row and f"{1e6 * expected.max():.4g}" in row
+
+
+def test_monte_carlo_follows_it(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    found = both[0]["run"]["monte_carlo"]["quantities"]["U7"]
+    assert found["linear"]["maximum"] == pytest.approx(diagonals().max(), rel=1e-4)
+    assert abs(found["spread_ratio"]["value"] - 1.0) < 4.0 * found["spread_ratio"]["standard_error"]
+    assert any(line.startswith("U7") for line in both[0]["trials"])
+
+
+def test_a_plan_makes_it_small(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    for name, statistic in (("U7", "average"), ("U7-maximum", "maximum")):
+        plan = both[0]["plans"][name]
+        # What a selection is worth is what `run` makes of the design.
+        assert plan["value"] == pytest.approx(plan["plan"]["quantities"]["U7"][statistic], rel=1e-6)
+        assert plan["bound"] <= plan["value"] <= plan["drawn"]
+    assert "U7, U7-maximum" in " ".join(both[0]["help"].split())
+
+
+def test_reliability_goals_and_reach_know_it(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    added = both[0]
+    uncertain = [event["effects"]["U7"]["standard_uncertainty"] for event in added["reliability"]]
+    assert {event["effects"]["U7"]["at"] for event in added["reliability"]} - {""} <= {
+        f"diagonal {i}" for i in range(1, 5)
+    }
+    expected = diagonals()
+    for value in uncertain:
+        assert np.abs(value / expected - 1.0).min() < 1e-6
+    assert "U7 (body diagonals)" in added["reliability table"]
+    assert "U7" in added["goals"] and "average U7" in added["reach"]
+
+
+def test_sweeps_reports_and_the_schema_have_it(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    added = both[0]
+    record = added["schema"]["properties"]["record"]
+    assert "U7" in record["items"]["enum"] and "U7" in record["default"]
+    head, *rows = [line.split(",") for line in added["export"].splitlines()]
+    assert len(rows) == 2 and {"U7_maximum_m", "U7_average_m", "U7_spread_ratio"} <= set(head)
+    smaller, larger = (float(row[head.index("U7_average_m")]) for row in rows)
+    assert 0.0 < smaller < larger
+    assert "U7 maximum" in added["report"]
+
+
+def test_nothing_of_it_is_left_once_the_entry_is_gone(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    added, removed = both
+    assert "U7" in json.dumps(added)
+    assert "U7" not in json.dumps({name: text for name, text in removed.items() if name != "reach"})
+    assert removed["reach"] == "" and removed["plans"] == {}
+    # All else is as it was.
+    for symbol, quantity in removed["run"]["quantities"].items():
+        assert added["run"]["quantities"][symbol] == quantity
+    for symbol, figures in removed["run"]["monte_carlo"]["quantities"].items():
+        assert added["run"]["monte_carlo"]["quantities"][symbol] == figures

@@ -1,0 +1,114 @@
+"""The main table of a result in every form, read back and compared with its rows."""
+
+from __future__ import annotations
+
+import io
+import re
+from html.parser import HTMLParser
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pandas
+import pytest
+from ballplate.results.prediction import Prediction
+from ballplate.results.result import Result
+
+PLACES = {"planes": ["z"], "levels": ["100 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}, "probes": ["down"]}
+
+
+class Cells(HTMLParser):
+    """Rows of cells of a table, and the tags that are open."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+
+
+def from_markdown(text: str) -> list[list[str]]:
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    cells = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in rows if "---" not in line]
+    return [[re.sub(r"\\(.)", r"\1", cell) for cell in row] for row in cells]
+
+
+@pytest.fixture(scope="module")
+def results() -> list[Result]:
+    experiment = bp.quickstart()
+    deficient = experiment.with_({f"positions[{name}]": None for name in ("x low", "x high", "y low")})
+    return [
+        bp.run(experiment),
+        bp.run(deficient),
+        bp.fit(experiment, bp.simulate(experiment)),
+        bp.reliability(experiment),
+        bp.reach(experiment, "U6 average 0.2 um", ["repeatability"]),
+        bp.plan(experiment.with_(pool={"candidates": [PLACES]}), positions=7),
+    ]
+
+
+def assert_shows(cells: list[list[str]], rows: list[dict[str, Any]]) -> None:
+    """Headings, every text as it is, and every number to four digits."""
+    assert cells[0] == list(rows[0]) and len(cells) == len(rows) + 1
+    for shown, row in zip(cells[1:], rows, strict=True):
+        for text, value in zip(shown, row.values(), strict=True):
+            if isinstance(value, float) and np.isnan(value):
+                assert text == "undetermined"
+            elif isinstance(value, float) and np.isfinite(value):
+                assert float(text) == pytest.approx(value, rel=5.1e-4)
+            elif isinstance(value, str):
+                assert text == value
+
+
+def test_every_form_has_every_row(results: list[Result]) -> None:
+    for result in results:
+        rows = result.rows()
+        page = Cells(result.to_html())
+        assert not page.open and result._repr_html_() == result.to_html()
+        assert_shows(page.rows, rows)
+        assert_shows(from_markdown(result.to_markdown()), rows)
+        latex = result.to_latex()
+        assert latex.count(r"\begin{table}") == latex.count(r"\end{table}") == 1
+        assert len(re.findall(r"\\\\$", latex, re.MULTILINE)) == len(rows) + 1
+
+
+def test_csv_has_all_digits(results: list[Result]) -> None:
+    for result in results:
+        frame, found = result.to_frame(), pandas.read_csv(io.StringIO(result.to_csv()))
+        for name in frame.select_dtypes("number"):
+            np.testing.assert_array_equal(found[name].to_numpy(float), frame[name].to_numpy(float))
+
+
+def test_what_is_undetermined_says_so(results: list[Result]) -> None:
+    deficient = results[1]
+    shown = from_markdown(deficient.to_markdown())
+    assert isinstance(deficient, Prediction) and deficient.verdict.deficiency > 0
+    unknown = [symbol for symbol, one in deficient.quantities.items() if np.isnan(one.average)]
+    assert unknown and unknown == [row[0] for row in shown[1:] if "undetermined" in row]
+    assert "rank deficiency" in deficient.to_latex()
+
+
+def test_without_rows_the_result_is_told_in_words() -> None:
+    found = bp.check(bp.quickstart())
+    assert not found.rows()
+    for text in (found.to_markdown(), found.to_latex(), found.to_html()):
+        assert "full rank" in text and "|" not in text and "tabular" not in text and "<table" not in text
+
+
+def test_names_mean_nothing_but_themselves() -> None:
+    named = bp.quickstart().with_(title="a < b & c | d")
+    assert "a &lt; b &amp; c" in bp.run(named).to_html() and r"a \< b & c \| d" in bp.run(named).to_markdown()

@@ -1,0 +1,186 @@
+"""What is printed where the terminal or the pipe has another encoding than UTF-8, as on Windows."""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from ballplate.cli import main
+
+ROOT = Path(__file__).parents[2]
+TITLE = "Prüfkörper “A” – 0.5 µm ± 2 µm × 3, ≤ 20 °C …"
+# By hand: what code page 437 has stays, the rest is spelt.
+READABLE = {
+    "ascii": 'Pr\\xfcfk\\xf6rper "A" - 0.5 um +/- 2 um x 3, <= 20 degC ...',
+    "cp437": 'Prüfkörper "A" - 0.5 µm ± 2 µm x 3, ≤ 20 °C ...',
+    "cp1252": "Prüfkörper “A” – 0.5 µm ± 2 µm × 3, <= 20 °C …",
+    "utf-8": TITLE,
+}
+PEOPLE = [
+    "check plate.yaml",
+    "run plate.yaml",
+    "reliability plate.yaml",
+    "lengths plate.yaml",
+    "fit plate.yaml readings.csv",
+    "map machine.yaml",
+    "sweep sizes.yaml --workers 1",
+    "report sizes.sqlite --format text",
+]
+PROGRAMS = [
+    "check --json plate.yaml",
+    "check --format junit plate.yaml",
+    "check --format github plate.yaml",
+    "run --json plate.yaml",
+    "simulate plate.yaml -o -",
+    "fit --json plate.yaml readings.csv",
+    "map machine.yaml --format csv",
+    "map machine.yaml --json",
+    "export sizes.sqlite -o -",
+    "report sizes.sqlite --format csv",
+    "report sizes.sqlite --format markdown",
+    "spline errors.csv --coefficients -",
+    "schema",
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An experiment, its readings, a machine and a sweep with names that not every encoding has."""
+    top = tmp_path_factory.mktemp("encodings")
+    lines = (ROOT / "designs/quickstart.yaml").read_text(encoding="utf-8").splitlines()
+    text = "\n".join(f"title: '{TITLE}'" if line.startswith("title:") else line for line in lines)
+    text = text.replace("z low", "µ ü").replace("_coefficients: 5", "_coefficients: 3")
+    (top / "plate.yaml").write_text(text, encoding="utf-8")
+    lines = (ROOT / "designs/park/machines/gec-like.yaml").read_text(encoding="utf-8").splitlines()
+    text = "\n".join(f"title: '{TITLE}'" if line.startswith("title:") else line for line in lines)
+    shutil.copytree(ROOT / "designs/park/machines", top, dirs_exist_ok=True)
+    (top / "machine.yaml").write_text(text, encoding="utf-8")
+    (top / "sizes.yaml").write_text(
+        f"title: '{TITLE}'\nbase: plate.yaml\n"
+        "axes: {µ: {paths: ['artefacts.plate.balls[0]', 'artefacts.plate.balls[1]'], values: [4, 5]}}\n",
+        encoding="utf-8",
+    )
+    points = "\n".join(f"{10 * k},{k % 3}" for k in range(30))
+    (top / "errors.csv").write_text(f"position_mm,error_um\n{points}\n", encoding="utf-8")
+    before = Path.cwd()
+    os.chdir(top)
+    try:
+        assert main(["simulate", "plate.yaml", "-o", "readings.csv"]) == 0
+        assert main(["sweep", "sizes.yaml", "--workers", "1"]) == 0
+    finally:
+        os.chdir(before)
+    return top
+
+
+def printed(command: str, encoding: str, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:
+    """Standard output and standard error as bytes, of streams as Python opens them for a pipe."""
+    out, err = io.BytesIO(), io.BytesIO()
+    with monkeypatch.context() as patch:
+        streams = [
+            io.TextIOWrapper(out, encoding=encoding, errors="strict", write_through=True),
+            io.TextIOWrapper(err, encoding=encoding, errors="backslashreplace", write_through=True),
+        ]
+        patch.setattr(sys, "stdout", streams[0])
+        patch.setattr(sys, "stderr", streams[1])
+        assert main(command.split()) == 0
+        for stream in streams:
+            stream.flush()
+        return out.getvalue(), err.getvalue()
+
+
+@pytest.mark.parametrize("command", PEOPLE)
+def test_text_can_be_read_in_any_encoding(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    whole = printed(command, "utf-8", monkeypatch)[0].decode("utf-8")
+    for encoding in ("ascii", "cp437", "cp1252"):
+        out = printed(command, encoding, monkeypatch)[0].decode(encoding)
+        assert len(out.splitlines()) == len(whole.splitlines())
+        assert out.count("?") == whole.count("?")
+        assert out.count(READABLE[encoding]) == whole.count(TITLE)
+        if whole.isascii():
+            assert out == whole
+
+
+def test_the_title_is_printed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    told = [command for command in PEOPLE if TITLE.encode() in printed(command, "utf-8", monkeypatch)[0]]
+    assert len(told) >= 5
+
+
+@pytest.mark.parametrize("command", PROGRAMS)
+def test_data_are_utf_8_whatever_the_encoding(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    whole = printed(command, "utf-8", monkeypatch)[0]
+    assert whole.decode("utf-8")
+    for encoding in ("ascii", "cp437", "cp1252", "utf-16"):
+        assert printed(command, encoding, monkeypatch)[0] == whole
+    if "--json" in command:
+        data = json.loads(whole)
+        assert "title" not in data or data["title"] == TITLE
+    if "junit" in command:
+        assert TITLE in ElementTree.tostring(ElementTree.fromstring(whole), "unicode")
+
+
+def test_messages_can_be_read_in_any_encoding(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "µ.yaml").write_text("title: x\n", encoding="utf-8")
+    for encoding, expected in (("ascii", "u.yaml:1:1: "), ("cp437", "µ.yaml:1:1: ")):
+        found = subprocess.run(
+            [sys.executable, "-m", "ballplate", "check", "µ.yaml"],
+            cwd=folder,
+            env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+        )
+        told = found.stderr.decode(encoding)
+        assert found.returncode == 3 and told.startswith(expected) and "Traceback" not in told
+        assert "(name -> artefact: grid" in told
+
+
+def test_files_are_utf_8_with_line_feeds(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Whatever the locale: with that of C and without Python's UTF-8 mode, files would be ASCII."""
+    outputs = {"simulate": ("-o", tmp_path / "µ.csv"), "lengths": ("--csv", tmp_path / "ü.csv")}
+    for command, (option, path) in outputs.items():
+        found = subprocess.run(
+            [sys.executable, "-X", "utf8=0", "-m", "ballplate", command, "plate.yaml", option, path],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"},
+            capture_output=True,
+        )
+        assert found.returncode == 0 and b"Traceback" not in found.stderr, found.stderr
+        assert path.read_bytes().decode("utf-8").count("\n") > 10 and b"\r" not in path.read_bytes()
+    assert "µ ü" in (tmp_path / "µ.csv").read_text(encoding="utf-8")
+
+
+def opened(tree: ast.AST) -> list[ast.Call]:
+    """Calls that open text files: open(), and the methods of paths, but those of the module os and of bytes."""
+    found = []
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        if isinstance(node.func, ast.Name):
+            is_opened = node.func.id == "open"
+        else:
+            is_os = getattr(getattr(node.func, "value", None), "id", "") == "os"
+            is_opened = getattr(node.func, "attr", "") in ("open", "read_text", "write_text") and not is_os
+        modes = [one.value for one in node.args if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+        if is_opened and not any("b" in mode and set(mode) <= set("rwxab+") for mode in modes):
+            found.append(node)
+    return found
+
+
+def test_every_file_is_opened_with_an_encoding() -> None:
+    """That of the system, which counts where none is stated, is another one on Windows."""
+    assert len(opened(ast.parse("open(a)\na.open('rb')\na.read_text()\nos.open(a, 1)\n"))) == 2
+    count = 0
+    for path in (path for package in ("analysis", "simulator") for path in (ROOT / package).rglob("*.py")):
+        for call in opened(ast.parse(path.read_bytes())):
+            count += 1
+            assert "encoding" in [one.arg for one in call.keywords], f"{path}:{call.lineno}"
+    assert count >= 8

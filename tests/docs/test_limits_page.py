@@ -1,0 +1,82 @@
+"""The page of limits tells those that the program has."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from ballplate.cli import lengths as lengths_command
+from ballplate.cli import spline
+from ballplate.error_curve import error_curve as curve
+from ballplate.estimators import distances as estimators
+from ballplate.gross_errors import leftover
+from ballplate.length_map import length_map as lengths
+from ballplate.montecarlo import trials
+from ballplate.planning import criteria, information
+from ballplate.requirements import search
+from ballplate.simulator.experiment import (
+    calibrations,
+    checks,
+    curves,
+    machine_sections,
+    pool_groups,
+    priors,
+    references,
+    sections,
+    variants,
+)
+from ballplate.simulator.geometry import artefacts, directions
+from ballplate.simulator.inputs import messages, tables, yamltree
+from ballplate.simulator.splines import read
+from ballplate.sweeps import axes, bundle, load, settings
+from ballplate.volumetric import volumetric_errors as volumetric
+
+PAGE = Path("docs/reference/limits.md")
+
+LIMITS = {
+    "size of a file": (yamltree.MOST_BYTES // 10**6,),
+    "values in a YAML file": (yamltree.MOST_NODES,),
+    "depth of a YAML file": (yamltree.DEEPEST,),
+    "rows of a table": (tables.MOST_ROWS,),
+    "columns of a table": (tables.MOST_COLUMNS,),
+    "errors that are listed": (messages.MOST_MESSAGES,),
+    "files that a sweep": (bundle.MOST_BYTES // 10**6,),
+    "readings, repeats": (references.MOST_READINGS,),
+    "balls of an artefact": (artefacts.MOST_BALLS, references.MOST_BALLS_OF_ALL),
+    "parameters besides": (checks.MOST_SHARED,),
+    "balls that calibrated": (calibrations.MOST_TIED_BALLS,),
+    "lengths of standards": (checks.MOST_LENGTHS,),
+    "lengths of one standard": (checks.MOST_JOINT_LENGTHS,),
+    "directions of a gauge": (directions.MOST_DIRECTIONS,),
+    "evaluation points |": (sections.MOST_POINTS,),
+    "derivatives of": (checks.MOST_DERIVATIVES,),
+    "measuring tasks": (sections.MOST_TASKS,),
+    "priors": (priors.MOST_PRIORS,),
+    "variants": (variants.MOST_VARIANTS,),
+    "points of a curve": (curves.MOST_POINTS,),
+    "coefficients of a polynomial": (machine_sections.MOST_COEFFICIENTS,),
+    "`plan` | candidates of": (pool_groups.MOST_CANDIDATES,),
+    "`plan` | candidates' matrices": (information.MOST_BYTES // 10**6,),
+    "`plan` | evaluation points": (criteria.MOST_POINTS,),
+    "balls, balls read": (variants.MOST_OF_ALL,),
+    "`run --trials`": (trials.MOST_TRIALS,),
+    "`sweep` | synthetic": (settings.MOST_TRIALS,),
+    "`fit`, `reliability` |": (leftover.MOST_ENTRIES,),
+    "`compare`, `fit --estimator` |": (estimators.MOST_DERIVATIVES,),
+    "`compare --points`": (estimators.MOST_POINTS,),
+    "`sweep` | cells": (load.MOST_CELLS,),
+    "`sweep` | values": (axes.MOST_VALUES,),
+    "`reach`": (search.MOST_POINTS,),
+    "`lengths` |": (lengths.MOST_POINTS,),
+    "`lengths --pairs`": (lengths_command.MOST_PAIRS,),
+    "`map`": (volumetric.MOST_POINTS,),
+    "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, spline.MOST_ORDER),
+}
+
+
+@pytest.mark.parametrize("what", LIMITS)
+def test_the_page_tells_the_limit(what: str) -> None:
+    (row,) = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith(f"| {what}")]
+    numbers = [int(found.replace(" ", "")) for found in re.findall(r"[0-9]+(?: [0-9]{3})*", row)]
+    assert tuple(numbers[-len(LIMITS[what]) :]) == LIMITS[what]

@@ -1,0 +1,56 @@
+"""More observations than there is memory to test for mistakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ballplate.gross_errors.leftover import entries, leftover
+from ballplate.gross_errors.redundancy import reliability
+from ballplate.results.study import fit
+from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings.reading_files import read_readings
+
+QUICKSTART = Path("designs/quickstart.yaml")
+CERTIFIED = Path("designs/certified")
+
+
+def test_the_entries_are_those_that_are_kept() -> None:
+    """Of 25 balls, read ten times in three dimensions, four have calibrated distances: 754 observations."""
+    (experiment,) = load(QUICKSTART)
+    design = lay_out(experiment)
+    assert entries(design)[0] == 25 * 10 * 3 + 4
+    # Of full rank, so that each parameter makes a column: those of the machine, of five poses, and of four balls.
+    assert entries(design) == leftover(linearise(design), None, 1).common.shape
+
+
+def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    (experiment,) = load(QUICKSTART)
+    rows, columns = entries(lay_out(experiment))
+    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
+    with pytest.raises(ExperimentError) as caught:
+        reliability(experiment)
+    assert str(caught.value) == (
+        f"{QUICKSTART}:39:1: positions: "
+        f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; "
+        f"at most {rows - 1} are possible with {columns} parameters of machine, poses and tied balls: "
+        "read fewer balls, or in fewer positions"
+    )
+    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
+    reliability(experiment)
+
+
+def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    (experiment,) = load(CERTIFIED / "three-planes.yaml")
+    observed = read_readings(CERTIFIED / "three-planes.csv", lay_out(experiment))
+    rows, columns = entries(observed.design)
+    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
+    tested = fit(experiment, observed)
+    assert tested.untested == "" and tested.doubts == ()
+    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
+    found = fit(experiment, observed)
+    assert f"at most {rows - 1} are possible" in found.doubts[0] and "fit the means of repeated" in found.doubts[0]
+    assert found.estimates == tested.estimates and not found.diagnosis

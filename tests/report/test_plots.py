@@ -1,0 +1,79 @@
+"""Results that draw themselves: a figure, a file, what a notebook shows, and what is said where that cannot be."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.cli import main
+from ballplate.results.fit import Fit
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+REAL = Path("designs/hocken_borchardt/real.yaml"), Path("designs/hocken_borchardt/real-readings.csv")
+PLACES = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
+
+
+@pytest.fixture(scope="module")
+def planar() -> Fit:
+    return bp.fit(bp.load(REAL[0], "with scale"), REAL[1])
+
+
+def test_a_figure_is_the_picture_of_the_command(planar: Fit, tmp_path: Path) -> None:
+    """The same bytes from the method, and from the figure that it gives back when a notebook shows it."""
+    arguments = ["fit", *map(str, REAL), "--variant", "with scale", "--plot", str(tmp_path / "command.svg")]
+    assert main(arguments) == 0
+    figure = planar.plot(tmp_path / "method.svg")
+    assert (tmp_path / "method.svg").read_bytes() == (tmp_path / "command.svg").read_bytes()
+    assert "magnified" in str(figure.get_label())
+
+
+def test_vectors_begin_where_balls_were_read(planar: Fit) -> None:
+    """Of the drawn markers each is at the place of a reading, in millimetres."""
+    axes = planar.plot().axes[0]
+    markers = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
+    drawn = np.array(sorted(np.concatenate(markers).tolist()))
+    np.testing.assert_allclose(drawn, sorted((1e3 * planar.x).tolist()))
+
+
+def test_a_notebook_shows_a_figure(planar: Fit) -> None:
+    from matplotlib.image import imread
+
+    figure = planar.plot()
+    image = imread(io.BytesIO(figure._repr_png_()), format="png")
+    # Opaque and white at its corner, as dark letters need it, with something drawn on it.
+    assert image[0, 0].min() == 1.0 and image[..., :3].min() < 0.2
+
+
+def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
+    prediction = bp.check(bp.quickstart())
+    names = [text.get_text() for text in prediction.plot().axes[0].texts]
+    assert set(prediction.design.position_names) <= set(names)
+    pool = {"candidates": [PLACES | {"probes": ["down"]}]}
+    campaign = bp.plan(bp.quickstart().with_(pool=pool), positions=7)
+    assert repr(campaign).startswith("<Campaign of quickstart: 7 of ") and len(repr(campaign)) < 100
+    assert bp.run(campaign.chosen_experiment).quantities == campaign.plan.quantities
+    figure = campaign.plot(str(tmp_path / "plan.png"))
+    assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
+    drawn = {text.get_text() for axes in figure.axes for text in axes.texts}
+    assert {one.name for one in campaign.chosen} <= drawn
+
+
+def test_what_cannot_be_drawn_is_refused(planar: Fit, tmp_path: Path) -> None:
+    experiment = bp.quickstart()
+    with pytest.raises(ValueError, match="two dimensions.*has three"):
+        bp.fit(experiment, bp.simulate(experiment)).plot()
+    with pytest.raises(ValueError, match=r"should end in one of \.svg"):
+        planar.plot(tmp_path / "picture.jpg")
+
+
+def test_a_missing_matplotlib_is_named_with_the_command(planar: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [one for one in sys.modules if one.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError, match=r"python -m pip install 'ballplate\[report\]'"):
+        planar.plot()

@@ -1,0 +1,178 @@
+"""Whatever command lines, files and stores say, there is a result or what is wrong, soon and in bounded memory.
+
+`cases` says what is tried, and how to try one case alone.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from tests.robustness import cases
+from tests.robustness.cases import Case, case, lay_out, trial, warm_up
+from tests.robustness.command_lines import drawn, grammar
+from tests.robustness.kit import make_kit
+from tests.robustness.recipes import RECIPES
+from tests.robustness.worker import Worker
+
+# Where a test ends, as the next may fail for the same reason.
+ENOUGH = 10
+FEW, MANY = range(500), range(20_000)
+
+
+@pytest.fixture(scope="module")
+def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("kit")
+    make_kit(folder)
+    return folder
+
+
+def faults(kit: Path, folder: Path, numbers: Iterable[int]) -> list[str]:
+    """What goes wrong with cases; the folder of each of these is kept."""
+    folder.mkdir()
+    found = []
+    with Worker(trial, warm_up(kit, folder)) as worker:
+        for number in numbers:
+            one = case(kit, number)
+            place = folder / f"case-{number}"
+            lay_out(kit, one, place)
+            fault = worker((one.arguments, str(place)), one.seconds)
+            if fault is None:
+                shutil.rmtree(place)
+                continue
+            alone = f"{sys.executable} -m tests.robustness {number}"
+            found.append(f"{one}\nkept in {place}; alone: {alone}\n{fault}")
+            if len(found) == ENOUGH:
+                break
+    return found
+
+
+def test_every_command_and_option_comes_up(kit: Path) -> None:
+    """As the parser lists them; a new command needs a recipe, a new option nothing."""
+    assert {recipe.split()[0] for recipe in RECIPES} == set(grammar())
+    assert {case(kit, number).arguments[0] for number in range(len(RECIPES))} >= set(grammar())
+    tried = {name: set[str]() for name in grammar()}
+    for number in range(4000):
+        command, *rest = drawn(Random(number))
+        tried[command].update(text.partition("=")[0] for text in rest)
+    missing = [
+        f"{command} {action.option_strings[-1]}"
+        for command, actions in grammar().items()
+        for action in actions
+        if action.option_strings and not tried[command].intersection(action.option_strings)
+    ]
+    assert not missing
+
+
+def test_the_same_number_is_the_same_case(kit: Path, tmp_path: Path) -> None:
+    make_kit(tmp_path)
+    assert all(case(kit, number) == case(tmp_path, number) for number in range(0, FEW.stop, 3))
+
+
+def nothing(folder: Path) -> None:
+    """What a command does that does nothing."""
+
+
+def overwrite(folder: Path) -> None:
+    (folder / "small.yaml").write_text("title: another\n")
+
+
+def delete(folder: Path) -> None:
+    (folder / "points.csv").unlink()
+
+
+def leave_behind(folder: Path) -> None:
+    (folder / "folder" / "rest.tmp").touch()
+
+
+def write_outside(folder: Path) -> None:
+    (folder.parent / "intruder").touch()
+
+
+@pytest.mark.parametrize(
+    ("status", "out", "err", "done", "told"),
+    [
+        (70, "", "internal error: one is two\n", nothing, "status 70"),
+        (1, "", "Traceback (most recent call last):\n", nothing, "a traceback"),
+        (2, "", "no\n", nothing, "not what is wrong"),
+        (3, "", "small.yaml:1:1: is wrong\n", nothing, "not in the stated form"),
+        (3, "", "small.yaml:1:1: is \x1b[31mwrong; mend it\n", nothing, "control characters"),
+        (0, "", "", nothing, "nothing is said or done"),
+        (0, "well\n", "", overwrite, "small.yaml has been changed"),
+        (0, "well\n", "", delete, "points.csv has been deleted"),
+        (3, "", "small.yaml:1:1: is wrong; mend it\n", leave_behind, "rest.tmp has been left behind"),
+        (0, "well\n", "", write_outside, "intruder"),
+    ],
+)
+def test_what_is_wrong_is_noticed(
+    kit: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    status: int,
+    out: str,
+    err: str,
+    done: Callable[[Path], None],
+    told: str,
+) -> None:
+    def pretended(arguments: Sequence[str], folder: Path) -> tuple[int, str, str]:
+        done(folder)
+        return status, out, err
+
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(cases, "outcome", pretended)
+    lay_out(kit, Case(0, (), ()), tmp_path / "case")
+    found = trial((("check", "small.yaml"), str(tmp_path / "case")))
+    assert found is not None and told in found
+
+
+def spin(_: float) -> None:
+    while True:
+        pass
+
+
+def fill(count: int) -> None:
+    assert len(bytes(count)) == count
+
+
+def die(status: int) -> None:
+    os._exit(status)
+
+
+@pytest.mark.parametrize(
+    ("act", "value", "told"),
+    [
+        (spin, 0.0, "more than 0.5 s of processor time"),
+        (fill, 2**31, "MemoryError"),
+        (die, 1, "the process has died"),
+    ],
+)
+def test_bounds_of_time_and_memory_hold(act: Callable[..., None], value: float, told: str) -> None:
+    if act is fill and sys.platform != "linux":
+        pytest.skip("memory is bounded on Linux only")
+    with Worker(act, [], seconds=0.5) as worker:
+        found = worker(value)
+        assert found is not None and told in found
+        # The next is tried all the same.
+        assert told in (worker(value) or "")
+
+
+def test_some_cases(kit: Path, tmp_path: Path) -> None:
+    found = faults(kit, tmp_path / "cases", FEW)
+    assert not found, "\n\n".join(found)
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_many_cases(kit: Path, tmp_path: Path) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        parts = pool.map(lambda k: faults(kit, tmp_path / f"cases-{k}", MANY[k::2]), range(2))
+        found = [one for part in parts for one in part]
+    assert not found, "\n\n".join(found)

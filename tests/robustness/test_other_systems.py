@@ -1,0 +1,193 @@
+"""What differs on Windows and macOS, as far as it can be imitated."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
+
+import pytest
+from ballplate.cli import main
+from ballplate.simulator.experiment.load import load
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.sweeps.bundle import Bundle, names_of, unpack
+
+from tests import conftest
+
+ROOT = Path(__file__).parents[2]
+QUICKSTART = (ROOT / "designs/quickstart.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("top", ["C:/plan", "//server/share/plan", "D:/with blank/µ"])
+def test_names_in_a_bundle_are_those_of_posix(top: str) -> None:
+    names = ["Z.yaml", "a.yaml", "b-c/x.csv", "b/x.csv", "tables/µ 1.csv"]
+    posix = names_of([PurePosixPath("/plan") / name for name in names])
+    windows = names_of([PureWindowsPath(top) / name.replace("/", "\\") for name in reversed(names)])
+    assert list(windows.values()) == list(posix.values())
+    assert sorted(posix.values()) == sorted(names)
+
+
+def test_case_of_drives_and_folders_makes_no_difference() -> None:
+    paths = [PureWindowsPath("C:\\Plan\\sweep.yaml"), PureWindowsPath("c:\\plan\\Tables\\x.csv")]
+    assert list(names_of(paths).values()) == ["Tables/x.csv", "sweep.yaml"]
+
+
+def test_files_on_two_drives_have_no_names() -> None:
+    paths: list[PurePath] = [PureWindowsPath("C:/plan/sweep.yaml"), PureWindowsPath("D:/plan/base.yaml")]
+    with pytest.raises(ValueError, match="several drives"):
+        names_of(paths)
+
+
+def test_names_that_differ_in_case_only_are_not_mixed_up(tmp_path: Path) -> None:
+    """Here the same name stands for it twice, as a file system that does not tell case has it."""
+    bundle = Bundle("s.yaml", "b.yaml", (("s.yaml", b"1"), ("b.yaml", b"2"), ("x.csv", b"3"), ("x.csv", b"4")))
+    with pytest.raises(ValueError, match="differs in case only"):
+        unpack(bundle, tmp_path)
+    assert (tmp_path / "x.csv").read_bytes() == b"3"
+
+
+def test_a_plan_on_another_drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.planning.small_pool import TEXT
+
+    def relpath(path: object, start: object) -> str:
+        raise ValueError(f"path is on mount 'C:', start on mount 'D:' ({path}, {start})")
+
+    (tmp_path / "balls.csv").write_text(
+        "ball,x_mm,y_mm\n" + "".join(f"{c}{r},{100 * c},{100 * r}\n" for r in range(4) for c in range(4)), "utf-8"
+    )
+    text, count = re.subn(r"(?m)^  plate: .*$", "  plate: {kind: balls, file: balls.csv}", TEXT)
+    assert count == 1
+    text = text.replace("pairs: corner sides", "pairs: all")
+    (tmp_path / "pool.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "other").mkdir()
+    monkeypatch.setattr(os.path, "relpath", relpath)
+    chosen = tmp_path / "other/chosen.yaml"
+    plan = ["plan", str(tmp_path / "pool.yaml"), "--positions", "3", "--workers", "1", "-o", str(chosen)]
+    assert main(plan) in (0, 1)
+    assert (tmp_path / "balls.csv").resolve().as_posix() in chosen.read_text(encoding="utf-8")
+    load(chosen)
+
+
+MISTAKES = [
+    (QUICKSTART, "probes: [down]", "probes: [dwn]"),
+    (QUICKSTART, "repeatability: 0.2 um", "repeatability: 0.2"),
+    (QUICKSTART, "kind: random", "kind: random\n  positoin: 3 um"),
+    (QUICKSTART, "title: ", "title: a: "),
+    (QUICKSTART, "calibration:", "calibration: ["),
+    (QUICKSTART, "artefacts:", "artefacts:\n\tplate: 1"),
+]
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize(("text", "old", "new"), MISTAKES)
+def test_messages_name_the_same_places_in_files_of_windows(
+    text: str, old: str, new: str, mark: str, tmp_path: Path
+) -> None:
+    assert old in text
+    told = []
+    for end in ("\n", "\r\n"):
+        path = tmp_path / "file.yaml"
+        path.write_bytes((mark + text.replace(old, new, 1)).replace("\n", end).encode("utf-8"))
+        with pytest.raises(ExperimentError) as caught:
+            load(path)
+        told.append([(one.line, one.column, one.path, one.text) for one in caught.value.messages])
+    assert told[0] == told[1] and all(line > 0 for line, *_ in told[0])
+
+
+def test_files_of_windows_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Line ends and byte order marks of experiments, readings, machines and error tables."""
+    assert main(["simulate", str(ROOT / "designs/quickstart.yaml"), "-o", str(tmp_path / "unix-readings.csv")]) == 0
+    shutil.copy(ROOT / "designs/quickstart.yaml", tmp_path / "unix.yaml")
+    points = "".join(f"{10 * k},{k % 3}\n" for k in range(30))
+    (tmp_path / "unix-errors.csv").write_text(f"# by hand\nposition_mm,error_um\n{points}", encoding="utf-8")
+    for name in (".yaml", "-readings.csv", "-errors.csv"):
+        content = (tmp_path / f"unix{name}").read_bytes()
+        assert b"\r" not in content
+        (tmp_path / f"dos{name}").write_bytes(b"\xef\xbb\xbf" + content.replace(b"\n", b"\r\n"))
+    capsys.readouterr()
+    for command in (
+        ["run", "--json", "NAME.yaml"],
+        ["fit", "NAME.yaml", "NAME-readings.csv"],
+        ["spline", "NAME-errors.csv", "--coefficients", "-"],
+    ):
+        told = []
+        for name in ("unix", "dos"):
+            assert main([str(tmp_path / one.replace("NAME", name)) if "NAME" in one else one for one in command]) == 0
+            told.append(capsys.readouterr().out.replace(name, ""))
+        assert told[0] == told[1] != ""
+
+
+def test_a_plan_from_a_file_of_windows_has_line_feeds(tmp_path: Path) -> None:
+    from tests.planning.small_pool import TEXT
+
+    written = []
+    for name, end in (("unix", "\n"), ("dos", "\r\n")):
+        folder = tmp_path / name
+        folder.mkdir()
+        schema = "# yaml-language-server: $schema=schema.json\n"
+        (folder / "pool.yaml").write_bytes((schema + TEXT).replace("\n", end).encode("utf-8"))
+        chosen = folder / "chosen.yaml"
+        assert main(["plan", str(folder / "pool.yaml"), "--positions", "3", "--workers", "1", "-o", str(chosen)]) in (
+            0,
+            1,
+        )
+        written.append(chosen.read_bytes())
+    assert written[0] == written[1] and b"\r" not in written[0]
+
+
+def test_processes_may_be_started_anyhow(tmp_path: Path) -> None:
+    """Windows and macOS know `spawn` alone or by default, Python 3.14 `forkserver` by default."""
+    import multiprocessing
+
+    methods = [one for one in multiprocessing.get_all_start_methods() if one != "fork"]
+    assert methods
+    script = tmp_path / "command.py"
+    script.write_text(
+        "import multiprocessing, sys\nfrom ballplate.cli import main\n"
+        'if __name__ == "__main__":\n    multiprocessing.set_start_method(sys.argv.pop(1))\n    sys.exit(main())\n',
+        encoding="utf-8",
+    )
+    command = ["run", ROOT / "designs/quickstart.yaml", "--trials", "512", "--json", "--workers"]
+    found = []
+    for start, workers in ((["-m", "ballplate"], "1"), *(([script, method], "2") for method in methods)):
+        ended = subprocess.run(
+            [sys.executable, *start, *command, workers],
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+        )
+        assert ended.returncode == 0, ended.stderr
+        found.append(json.loads(ended.stdout)["monte_carlo"])
+    for one in found:
+        for name in ("seconds", "workers"):
+            one.pop(name, None)
+    assert all(one == found[0] for one in found)
+
+
+def test_nothing_is_loaded_that_windows_lacks() -> None:
+    """Every module of the packages, in a Python without those of POSIX."""
+    missing = "".join(f"sys.modules[{name!r}] = None\n" for name in conftest.MODULES)
+    modules = []
+    for folder, package in (("analysis", ("ballplate",)), ("simulator", ("ballplate", "simulator"))):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            if path.name != "__main__.py":
+                modules.append(".".join((*package, *path.relative_to(ROOT / folder).with_suffix("").parts)))
+    assert len(modules) > 200
+    code = f"import importlib, sys\n{missing}for name in {modules!r}:\n    importlib.import_module(name)\n"
+    found = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert found.returncode == 0, found.stderr
+
+
+def test_tests_that_need_posix_are_known() -> None:
+    left_out = conftest.left_out()
+    assert left_out["tests/robustness/worker.py"] == "resource"
+    assert left_out["tests/robustness/test_mutants.py"] == "resource"
+    assert "tests/robustness/test_other_systems.py" not in left_out
+    assert conftest.word_needed("os.killpg(process.pid, signal.SIGINT)") == "killpg"
+    assert conftest.word_needed('path = Path("/dev/full")') == "/dev/"
+    assert conftest.word_needed("assert shell_length == 3") == ""

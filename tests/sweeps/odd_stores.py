@@ -1,0 +1,272 @@
+"""Stores with something wrong in them, each made of a good one, and files that are none."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Damage = Callable[[Path], object]
+
+
+def by_sql(*statements: str) -> Damage:
+    """Change a store as another program would, without any constraint in the way."""
+
+    def change(path: Path) -> None:
+        connection = sqlite3.connect(path, isolation_level=None)
+        connection.execute("PRAGMA journal_mode = DELETE")
+        connection.execute("PRAGMA ignore_check_constraints = ON")
+        connection.execute("PRAGMA writable_schema = ON")
+        for statement in statements:
+            connection.execute(statement)
+        connection.close()
+
+    return change
+
+
+def by_definition(change: Callable[[dict[str, Any]], object]) -> Damage:
+    """Change the definition of a store's sweep."""
+
+    def apply(path: Path) -> None:
+        connection = sqlite3.connect(path, isolation_level=None)
+        connection.execute("PRAGMA journal_mode = DELETE")
+        (text,) = connection.execute("SELECT definition FROM sweep").fetchone()
+        definition = json.loads(text)
+        change(definition)
+        connection.execute("UPDATE sweep SET definition = ?", [json.dumps(definition)])
+        connection.close()
+
+    return apply
+
+
+# The tables of the first format.
+FIRST = """
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE sweep (id INTEGER PRIMARY KEY, definition TEXT NOT NULL);
+CREATE TABLE bundle (sweep INTEGER, path TEXT, content BLOB NOT NULL, PRIMARY KEY (sweep, path)) WITHOUT ROWID;
+CREATE TABLE cell (sweep INTEGER, number INTEGER, key TEXT NOT NULL, PRIMARY KEY (sweep, number)) WITHOUT ROWID;
+CREATE TABLE text (id INTEGER PRIMARY KEY, value TEXT NOT NULL UNIQUE);
+CREATE TABLE result (
+    key TEXT, block INTEGER, status TEXT NOT NULL, reason TEXT NOT NULL, seed INTEGER NOT NULL,
+    names INTEGER NOT NULL REFERENCES text, figures BLOB NOT NULL, details TEXT NOT NULL,
+    versions INTEGER NOT NULL REFERENCES text, seconds REAL NOT NULL, tally BLOB,
+    PRIMARY KEY (key, block)
+);
+"""
+
+
+def of_the_first_format(path: Path) -> None:
+    """Make of a store the same as the first format had it, without digests."""
+    newer = path.with_name("newer")
+    settled(path)
+    path.rename(newer)
+    connection = sqlite3.connect(path, isolation_level=None)
+    connection.executescript(FIRST)
+    connection.execute("ATTACH ? AS newer", [str(newer)])
+    for table in ("sweep", "bundle", "cell", "text", "result"):
+        names = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA main.table_info({table})"))
+        connection.execute(f"INSERT INTO {table} ({names}) SELECT {names} FROM newer.{table}")
+    connection.execute("INSERT INTO about VALUES ('format', 'ballplate sweep store 1')")
+    connection.close()
+    newer.unlink()
+
+
+def settled(path: Path) -> None:
+    """Everything in the one file."""
+    by_sql()(path)
+
+
+def cut(share: float) -> Damage:
+    def apply(path: Path) -> None:
+        settled(path)
+        os.truncate(path, int(path.stat().st_size * share))
+
+    return apply
+
+
+def length(size: int) -> Damage:
+    def apply(path: Path) -> None:
+        settled(path)
+        os.truncate(path, size)
+
+    return apply
+
+
+def overwritten(place: int, content: bytes) -> Damage:
+    def apply(path: Path) -> None:
+        settled(path)
+        with path.open("r+b") as stream:
+            stream.seek(place)
+            stream.write(content)
+
+    return apply
+
+
+def page_of(table: str) -> Damage:
+    """Overwrite the first page of a table."""
+
+    def apply(path: Path) -> None:
+        settled(path)
+        connection = sqlite3.connect(path)
+        (page,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", [table]).fetchone()
+        (size,) = connection.execute("PRAGMA page_size").fetchone()
+        connection.close()
+        overwritten((page - 1) * size, b"\xa5" * size)(path)
+
+    return apply
+
+
+def replaced(make: Damage) -> Damage:
+    def apply(path: Path) -> None:
+        path.unlink()
+        make(path)
+
+    return apply
+
+
+def foreign(path: Path) -> None:
+    connection = sqlite3.connect(path)
+    connection.execute("CREATE TABLE moz_places (id INTEGER PRIMARY KEY, url TEXT)")
+    connection.execute("INSERT INTO moz_places (url) VALUES ('https://example.org')")
+    connection.commit()
+    connection.close()
+
+
+def bound_socket(path: Path) -> None:
+    here = os.getcwd()
+    os.chdir(path.parent)
+    try:
+        with socket.socket(socket.AF_UNIX) as listening:
+            listening.bind(path.name)
+    finally:
+        os.chdir(here)
+
+
+def loop(path: Path) -> None:
+    other = path.with_name("other.sqlite")
+    other.symlink_to(path.name)
+    path.symlink_to(other.name)
+
+
+# What is no store, whatever a command wants of it.
+NO_STORES: dict[str, Damage] = {
+    "text": replaced(lambda path: path.write_text("nonsense\n" * 1000, encoding="utf-8")),
+    "yaml": replaced(lambda path: path.write_text("title: t\nbase: e.yaml\naxes: {}\n", encoding="utf-8")),
+    "zeros": replaced(lambda path: path.write_bytes(b"SQLite format 3\0" + b"\0" * 5000)),
+    "foreign": replaced(foreign),
+    "folder": replaced(Path.mkdir),
+    "fifo": replaced(os.mkfifo),
+    "null": replaced(lambda path: path.symlink_to("/dev/null")),
+    "zero": replaced(lambda path: path.symlink_to("/dev/zero")),
+    "socket": replaced(bound_socket),
+    "loop": replaced(loop),
+    "newer format": by_sql("UPDATE about SET value = 'ballplate sweep store 99'"),
+    "odd format": by_sql("UPDATE about SET value = 'ballplate sweep store ' || char(178)"),
+    "format of bytes": by_sql("UPDATE about SET value = x'ff00'"),
+    "no format": by_sql("DELETE FROM about"),
+    "no about": by_sql("DROP TABLE about"),
+    "no results": by_sql("DROP TABLE result"),
+    "no cells": by_sql("DROP TABLE cell"),
+    "column missing": by_sql("ALTER TABLE result DROP COLUMN details"),
+    "view": by_sql(
+        "ALTER TABLE cell RENAME TO real_cell",
+        "CREATE VIEW cell AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT 1 AS sweep, "
+        "x AS number, 'key' AS key FROM n",
+    ),
+    "trigger": by_sql("CREATE TRIGGER odd AFTER INSERT ON cell BEGIN DELETE FROM result; END"),
+    "generated": by_sql("ALTER TABLE result ADD COLUMN more AS (hex(zeroblob(100000000)))"),
+    "cut to 50 bytes": length(50),
+    "cut to 100 bytes": length(100),
+    "schema lost": overwritten(100, b"\xff" * 3000),
+    "header lost": overwritten(0, b"\x00" * 100),
+    "page size": overwritten(16, b"\x12\x34"),
+    "versions of SQLite": overwritten(18, b"\x07\x07"),
+}
+
+# What is a store still, in parts.
+DAMAGED: dict[str, Damage] = {
+    **{f"cut to {share}": cut(share) for share in (0.3, 0.5, 0.7, 0.9, 0.99)},
+    **{f"first page of {table}": page_of(table) for table in ("sweep", "bundle", "cell", "text", "result")},
+    "no definition": by_sql("DELETE FROM sweep"),
+    "no keys": by_sql("DELETE FROM cell"),
+    "no texts": by_sql("DELETE FROM text"),
+    "no files": by_sql("DELETE FROM bundle"),
+    "definition no JSON": by_sql("UPDATE sweep SET definition = '{'"),
+    "definition of bytes": by_sql("UPDATE sweep SET definition = x'00ff'"),
+    "definition a list": by_sql("UPDATE sweep SET definition = '[]'"),
+    "definition nested": by_sql(f"UPDATE sweep SET definition = '{'[' * 100_000}'"),
+    "definition a number": by_sql(f"UPDATE sweep SET definition = '{'1' * 5000}'"),
+    "number of the sweep": by_sql("UPDATE sweep SET id = 9223372036854775807"),
+    "names no JSON": by_sql("UPDATE text SET value = 'x' WHERE id = 1"),
+    "names of bytes": by_sql("UPDATE text SET value = x'ff' WHERE id = 1"),
+    "names a number": by_sql("UPDATE text SET value = '3' WHERE id = 1"),
+    "names of numbers": by_sql("UPDATE text SET value = '[1, [2], null]' WHERE id = 1"),
+    "names too few": by_sql("UPDATE text SET value = '[\"U4_average_m\"]' WHERE id = 1"),
+    "versions a list": by_sql("UPDATE text SET value = '[[]]' WHERE id = 2"),
+    "versions no texts": by_sql("UPDATE text SET value = '{\"ballplate\": 3}' WHERE id = 2"),
+    "names unknown": by_sql("UPDATE result SET names = 99 WHERE rowid = 1"),
+    "versions unknown": by_sql("UPDATE result SET versions = 'x' WHERE rowid = 1"),
+    "figures too short": by_sql("UPDATE result SET figures = x'00' WHERE rowid = 1"),
+    "figures too few": by_sql("UPDATE result SET figures = zeroblob(16) WHERE rowid = 1"),
+    "figures none": by_sql("UPDATE result SET figures = x'' WHERE rowid = 1"),
+    "figures a text": by_sql("UPDATE result SET figures = 'text' WHERE rowid = 1"),
+    "figures a number": by_sql("UPDATE result SET figures = 3 WHERE rowid = 1"),
+    "figures others": by_sql("UPDATE result SET figures = zeroblob(length(figures)) WHERE rowid = 1"),
+    "status unknown": by_sql("UPDATE result SET status = 'DONE' WHERE rowid = 1"),
+    "status of bytes": by_sql("UPDATE result SET status = x'fffe' WHERE rowid = 1"),
+    "status a number": by_sql("UPDATE result SET status = 4 WHERE rowid = 1"),
+    "reason of bytes": by_sql("UPDATE result SET reason = x'1b5b33316dff' WHERE rowid = 1"),
+    "reason no text": by_sql("UPDATE result SET reason = CAST(x'1b5b33316dff' AS TEXT) WHERE rowid = 1"),
+    "reason long": by_sql("UPDATE result SET reason = hex(zeroblob(3000000)) WHERE rowid = 1"),
+    "seed a text": by_sql("UPDATE result SET seed = 'x' WHERE rowid = 1"),
+    "seed infinite": by_sql("UPDATE result SET seed = 9e999 WHERE rowid = 1"),
+    "seed negative": by_sql("UPDATE result SET seed = -1 WHERE rowid = 1"),
+    "seconds a text": by_sql("UPDATE result SET seconds = 'x' WHERE rowid = 1"),
+    "seconds infinite": by_sql("UPDATE result SET seconds = 9e999 WHERE rowid = 1"),
+    "details no JSON": by_sql("UPDATE result SET details = '{' WHERE rowid = 1"),
+    "details a list": by_sql("UPDATE result SET details = '[]' WHERE rowid = 1"),
+    "details nested": by_sql(f"UPDATE result SET details = '{'[' * 100_000}' WHERE rowid = 1"),
+    "details of numbers": by_sql('UPDATE result SET details = \'{"weak": 3, "flags": [1]}\' WHERE rowid = 1'),
+    "details of bytes": by_sql("UPDATE result SET details = x'ff' WHERE rowid = 1"),
+    "block a text": by_sql("UPDATE result SET block = 'x' WHERE rowid = 1"),
+    "tally no tally": by_sql("UPDATE result SET tally = x'00' WHERE rowid = 1"),
+    "key of another method": by_sql("UPDATE cell SET key = char(178) || ' x' WHERE number = 0"),
+    "key of a late method": by_sql(f"UPDATE cell SET key = '{'9' * 5000} x' WHERE number = 0"),
+    "key of bytes": by_sql("UPDATE cell SET key = x'ff' WHERE number = 0"),
+    "key of a result of bytes": by_sql("UPDATE result SET key = x'ff' WHERE rowid = 1"),
+    "number a text": by_sql("UPDATE cell SET number = 'x' WHERE number = 0"),
+    "number of no cell": by_sql("UPDATE cell SET number = 99 WHERE number = 0"),
+    "number negative": by_sql("UPDATE cell SET number = -1 WHERE number = 0"),
+    "number huge": by_sql("UPDATE cell SET number = 9223372036854775807 WHERE number = 0"),
+    "numbers exchanged": by_sql(
+        "UPDATE cell SET number = 99 WHERE number = 0",
+        "UPDATE cell SET number = 0 WHERE number = 1",
+        "UPDATE cell SET number = 1 WHERE number = 99",
+    ),
+    "axes missing": by_definition(lambda found: found.pop("axes")),
+    "axes none": by_definition(lambda found: found.update(axes=[])),
+    "axis of numbers": by_definition(lambda found: found.update(axes=[3])),
+    "unit odd": by_definition(lambda found: found["axes"][0].update(unit="furlong")),
+    "values texts": by_definition(lambda found: found["axes"][0].update(values=["a", "b"])),
+    "values too few": by_definition(lambda found: found["axes"][0].update(values=[1.0])),
+    "values infinite": by_definition(lambda found: found["axes"][1].update(values=[float("inf")] * 2)),
+    "labels none": by_definition(lambda found: found["axes"][0].update(labels=[])),
+    "column taken": by_definition(lambda found: found["axes"][0].update(column="status")),
+    "columns equal": by_definition(lambda found: found["axes"][0].update(column=found["axes"][1]["column"])),
+    "cells beyond": by_definition(lambda found: found.update(cells=[[7, 7]] * 4)),
+    "cells negative": by_definition(lambda found: found.update(cells=[[-1, 0]] * 4)),
+    "cells ragged": by_definition(lambda found: found.update(cells=[[0], [0, 1]])),
+    "cells few": by_definition(lambda found: found.update(cells=[[0, 0]])),
+    "cells none": by_definition(lambda found: found.update(cells=[])),
+    "cells huge": by_definition(lambda found: found.update(cells=[[10**30, 0]] * 4)),
+    "record odd": by_definition(lambda found: found.update(record=[3, None])),
+    "trials odd": by_definition(lambda found: found.update(trials="many")),
+    "title a list": by_definition(lambda found: found.update(title=["a"])),
+    "source outside": by_definition(lambda found: found.update(source="../../outside.yaml")),
+    "source a number": by_definition(lambda found: found.update(source=4)),
+    "experiment a list": by_definition(lambda found: found.update(experiment=[1], sweep=3)),
+}

@@ -1,0 +1,26 @@
+"""Keys of cells that stores hold stay valid: the fingerprints of shipped designs are those of earlier versions.
+
+A fingerprint that has to change means that all stores are computed anew: then the number of the method rises with it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ballplate.simulator.experiment.load import load
+from ballplate.sweeps.fingerprint import METHOD, fingerprint
+
+KEPT = [
+    ("quickstart.yaml", "quickstart", "9cce15c3e7bebae2bfb31f6733a7fd4ae6c88151"),
+    ("npl/6.1.1.yaml", "6.1.1[B]", "a5208313a57c127131205ebe5cb1a564f817f9f2"),
+    ("npl/6.2.5.yaml", "6.2.5[n=5 NDEL=5]", "9df3395e9ad26ce79e60821532715427f59e7a47"),
+    ("hocken_borchardt/dummy.yaml", "dummy[with scale]", "18a645280019e629b2393eb21817db311fd1304e"),
+]
+
+
+@pytest.mark.parametrize(("file", "label", "kept"), KEPT)
+def test_fingerprints_are_those_of_earlier_versions(file: str, label: str, kept: str) -> None:
+    assert METHOD == 2
+    found = {one.label: fingerprint(one) for one in load(Path("designs", file))}
+    assert found[label] == kept
