@@ -22,7 +22,6 @@ if TYPE_CHECKING:
         reliability,
         run,
         simulate,
-        sweep,
     )
     from .simulator.experiment.model import Experiment
 
@@ -40,7 +39,6 @@ __all__ = [
     "reliability",
     "run",
     "simulate",
-    "sweep",
 ]
 
 _PLACES = {
