@@ -72,12 +72,17 @@ def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experimen
     """The experiment that a mapping describes as a file would, with paths relative to a folder.
 
     >>> sections = {
-    ...     "title": "three positions",
-    ...     "machine": {"volume": "400 mm", "repeatability": "0.5 um"},
+    ...     "title": "a plate in two positions",
+    ...     "machine": {"volume": ["600 mm", "600 mm"], "repeatability": "0.5 um"},
     ...     "error_model": {"kind": "metric"},
-    ...     "artefacts": {"plate": {"kind": "square", "count": 5, "size": "300 mm"}},
-    ...     "positions": [{"name": p, "plane": p, "level": "200 mm"} for p in ("xy", "yz", "xz")],
+    ...     "artefacts": {"plate": {"kind": "square", "balls": 5, "size": "300 mm"}},
+    ...     "positions": [
+    ...         {"name": "straight", "corner": {"x": "100 mm", "y": "100 mm"}},
+    ...         {"name": "turned", "corner": {"x": "100 mm", "y": "100 mm"}, "quarter_turns": 1},
+    ...     ],
     ... }
+    >>> check(experiment(sections))
+    <Prediction of experiment: full rank>
     """
     from .simulator.experiment.load import written_in_python
 
