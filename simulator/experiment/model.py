@@ -309,7 +309,8 @@ class Experiment:
 
         ``changes`` has new values by path, such as ``positions[P1].level`` or ``artefacts.plate.size``, as variants of
         a file have; ``sections`` replaces whole entries by their names. Values are what a file would hold: texts with
-        units, numbers, lists and mappings. None removes an entry.
+        units, numbers, lists and mappings. None removes an entry. A length computed in metres is given as a text with
+        its unit too, as in ``f"{length} m"``.
 
         :raises ExperimentError: a path that does not exist, or an experiment that is wrong so.
         """
