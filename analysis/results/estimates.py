@@ -224,7 +224,7 @@ def parameter_estimates(found: EstimatedFunctions, sigma: float) -> tuple[Parame
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CorrectedPoints:
     """Scale readings corrected for the estimated errors of the machine: `points` (n, d) in metres.
 
@@ -234,6 +234,11 @@ class CorrectedPoints:
 
     points: Array
     root: Array
+
+    def __repr__(self) -> str:
+        """One line: points and covariances are long."""
+        count = len(self.points)
+        return f"<{type(self).__name__} of {count} scale reading{'s' * (count != 1)}>"
 
     @property
     def standard_uncertainties(self) -> Array:

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
+from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.reading_files import far_outside
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
@@ -230,9 +232,11 @@ class Fit(Result):
         """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint covariance.
 
         `probe` is the name of one, or of one for each point; without any it is that of the evaluation points. Of
-        points outside the volume the correction is extrapolated.
+        points outside the volume the correction is extrapolated; those farther outside than the volume is large are
+        refused, since they are in another unit.
 
-        :raises ValueError: points of another shape, an unknown probe, or an estimate that has not converged.
+        :raises ValueError: points of another shape or far outside the volume, an unknown probe, or an estimate that
+            has not converged.
 
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
@@ -242,6 +246,9 @@ class Fit(Result):
         design, given = self.design, np.asarray(points, float)
         if given.ndim != 2 or given.shape[1] != design.dimension:
             raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
+        for i, axis in np.argwhere(far_outside(given, design)).tolist():
+            told = f"{AXIS_NAMES[axis]} = {given[i, axis]:.6g} m of points[{i}] is far outside the volume"
+            raise ValueError(f"{told}; give points in metres")
         names = design.probe_names
         given_probe = names[design.point_probe] if probe is None else probe
         asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)

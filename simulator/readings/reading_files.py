@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..design.arrays import Design
 from ..design.observations import Lengths, Readings
@@ -135,11 +136,16 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
     return np.array(index, np.int64).reshape(-1, 3), messages
 
 
-def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
-    """Refuse readings that lie outside the volume by more than its own size: their unit is not what it says."""
+def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
+    """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in another unit."""
     size = float((design.upper - design.lower).max())
+    return np.asarray((x < design.lower - size) | (x > design.upper + size))
+
+
+def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
+    """Refuse readings far outside the volume: their unit is not what it says."""
     messages: list[Message] = []
-    for i, axis in np.argwhere((x < design.lower - size) | (x > design.upper + size)).tolist():
+    for i, axis in np.argwhere(far_outside(x, design)).tolist():
         if len(messages) >= MOST_MESSAGES:
             messages.append(rows[i].mark.message("", ENOUGH))
             break

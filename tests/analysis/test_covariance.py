@@ -271,6 +271,10 @@ def test_corrected_points_have_the_errors_of_the_estimated_machine(fitted: Fit) 
     np.testing.assert_array_equal(fitted.correct(points, names).covariance, found.covariance)
     turned = fitted.correct(points, ["left", "right", "left", "left", "left"])
     assert not np.allclose(turned.points, found.points, atol=1e-12)
+    # A notebook shows one line, whatever the number of points.
+    assert repr(found) == "<CorrectedPoints of 5 scale readings>"
+    # The volume is a cube of one metre; up to its size beside it, points are extrapolated.
+    assert np.isfinite(fitted.correct([[-0.999, 0.2, 1.999]]).covariance).all()
 
 
 @pytest.mark.parametrize(
@@ -282,6 +286,11 @@ def test_corrected_points_have_the_errors_of_the_estimated_machine(fitted: Fit) 
         (lambda fit: fit.correct([[0.1, 0.2]]), r"points of shape \(1, 2\)"),
         (lambda fit: fit.correct([[0.1, 0.2, 0.3]], "dwon"), 'no probe "dwon"; did you mean "down"'),
         (lambda fit: fit.correct([[0.1, 0.2, 0.3]], ["down", "left"]), "2 probes for 1 points"),
+        (
+            lambda fit: fit.correct([[0.1, 0.2, 0.3], [0.1, 200.0, 300.0]]),
+            r"y = 200 m of points\[1\] is far outside the volume; give points in metres",
+        ),
+        (lambda fit: fit.correct([[-1.001, 0.2, 0.3]]), r"x = -1.001 m of points\[0\] is far outside the volume"),
     ],
 )
 def test_messages(fitted: Fit, call: Callable[[Fit], object], told: str) -> None:
