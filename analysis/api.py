@@ -1,7 +1,8 @@
 """ballplate from Python: what the commands do, with results in place of text.
 
 Wherever an experiment is taken, so is the path of a file with one. Values in results are in metres, radians and ratios.
-Every function raises `ballplate.ExperimentError` for a file or an experiment that is wrong.
+Every function raises `ballplate.ExperimentError` for a file or an experiment that is wrong, and ValueError for another
+argument that is.
 """
 
 from __future__ import annotations
@@ -131,6 +132,10 @@ def run(
 
     from .results import study
 
+    if trials is not None and trials < 2:
+        raise ValueError(f"trials={trials}; give 2 at least, since fewer have no scatter")
+    if until is not None and not 0.0 < until <= 1.0:
+        raise ValueError(f"until={until}; give a ratio above 0 and at most 1, such as 0.01")
     chosen = _experiment(experiment)
     predicted = study.predict(chosen, with_scale=True)
     if trials is None and until is None:
@@ -138,7 +143,7 @@ def run(
     from .montecarlo import experiments as replicates
     from .montecarlo.trials import MOST_TRIALS
 
-    found = replicates.trials(chosen, trials or MOST_TRIALS, seed, until, workers, report)
+    found = replicates.trials(chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report)
     return replace(predicted, monte_carlo=found)
 
 
@@ -183,6 +188,7 @@ def fit(
 
     from .results import study
 
+    _refuse_unknown_sigma(sigma)
     chosen = _experiment(experiment)
     observed = read_readings(_table(readings), lay_out(chosen))
     return study.fit(chosen, observed, sigma, monomials)
@@ -210,8 +216,10 @@ def plan(
     """
     from .planning.campaign import Request, campaign
     from .planning.constraints import HOUR, Budget
+    from .planning.criteria import NAMES
     from .simulator.experiment.load import with_pool
 
+    _refuse_unknown("criterion", criterion, NAMES)
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
@@ -232,18 +240,22 @@ def reliability(
     """
     from .gross_errors import redundancy
 
+    _refuse_unknown_sigma(sigma)
+    if not 0.0 < false_alarm < power < 1.0:
+        raise ValueError(f"false_alarm={false_alarm}, power={power}; give ratios between 0 and 1, the power the larger")
     return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma)
 
 
 def reach(
     experiment: Experiment | PathLike,
     goal: str = "lengths",
-    unknowns: Sequence[UnknownName] | None = None,
+    unknowns: UnknownName | Sequence[UnknownName] | None = None,
     target: str | None = None,
 ) -> Reach:
     """The repeatability, certificate, repeats, balls or size of the plate with which a goal is met.
 
-    `goal` is as `ballplate reach --goal` has it; `target` replaces the experiment's target, as a text with a unit.
+    `goal` is as `ballplate reach --goal` has it, `unknowns` one of repeatability, certificate, repeats, balls and size,
+    or several; without any it is all of them. `target` replaces the experiment's target, as a text with a unit.
 
     >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
     True
@@ -252,7 +264,10 @@ def reach(
     from .requirements.search import reach as search
     from .requirements.unknowns import NAMES
 
-    return search(_experiment(experiment), parse_goal(goal), tuple(unknowns or NAMES), target=target)
+    names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns or NAMES)
+    for name in names:
+        _refuse_unknown("unknowns", name, NAMES)
+    return search(_experiment(experiment), parse_goal(goal), names, target=target)
 
 
 def sweep(
@@ -290,6 +305,16 @@ def sweep(
         runner = nullcontext(local_runner(given, bundle, workers))
         summary = compute_sweep(opened, given, entered, runner, retry_failed, report=report)
         return result_of(opened, given, entered, summary)
+
+
+def _refuse_unknown(argument: str, given: str, known: Sequence[str]) -> None:
+    if given not in known:
+        raise ValueError(f'{argument}: "{given}" is unknown; {hint(given, known)}')
+
+
+def _refuse_unknown_sigma(sigma: str | None) -> None:
+    if sigma is not None:
+        _refuse_unknown("sigma", sigma, ("estimated", "given"))
 
 
 def _table(readings: PathLike | pandas.DataFrame) -> Path | GivenText:

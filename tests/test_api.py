@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,32 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
         bp.experiment({})
     with pytest.raises(bp.ExperimentError, match="variants: are for files"):
         bp.experiment({"variants": {}})
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: bp.run(QUICKSTART, trials=0), "trials=0; give 2 at least"),
+        (lambda: bp.run(QUICKSTART, trials=1), "trials=1; give 2 at least"),
+        (lambda: bp.run(QUICKSTART, until=0.0), r"until=0.0; give a ratio above 0"),
+        (lambda: bp.run(QUICKSTART, until=5), r"until=5; give a ratio above 0 and at most 1"),
+        (lambda: bp.fit(QUICKSTART, "none.csv", sigma="givn"), 'sigma: "givn" is unknown; did you mean "given"'),
+        (lambda: bp.reliability(QUICKSTART, sigma="Given"), 'sigma: "Given" is unknown; did you mean "given"'),
+        (lambda: bp.reliability(QUICKSTART, power=1.0), "power=1.0; give ratios between 0 and 1"),
+        (lambda: bp.reliability(QUICKSTART, false_alarm=0.9), "false_alarm=0.9, power=0.8; .* the power the larger"),
+        (lambda: bp.plan(QUICKSTART, "u6"), 'criterion: "u6" is unknown; did you mean "U6"'),
+        (lambda: bp.reach(QUICKSTART, unknowns=["repeatabilty"]), 'unknowns: "repeatabilty" is unknown; did you mean'),
+        (lambda: bp.reach(QUICKSTART, unknowns="rows"), 'unknowns: "rows" is unknown; known: repeatability'),
+    ],
+)
+def test_wrong_arguments_are_refused(call: Callable[[], object], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        call()
+
+
+def test_a_single_unknown_needs_no_list() -> None:
+    (answer,) = bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability").answers
+    assert answer.name == "repeatability"
 
 
 def test_variants_are_chosen_by_name() -> None:
