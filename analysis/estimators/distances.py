@@ -70,7 +70,7 @@ class Comparison:
     failed: tuple[int, ...]
 
 
-def ball_pairs(experiment: Experiment, design: Design, name: str | None = None) -> Integers:
+def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
     """Pairs (p, 2) of balls of all plates: of the named set or, without a name, `braced` where that is defined.
 
     :raises ExperimentError: an artefact has no such set.
@@ -167,7 +167,7 @@ def fit_rival(
     design = observed.design
     _refuse_unknown_lengths(experiment, design)
     _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
-    chosen = ball_pairs(experiment, design, pair_set)
+    chosen = ball_pairs(experiment, pair_set)
     solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
     names, units, matrix = [p.name for p in parameters], [p.unit for p in parameters], np.eye(len(parameters))
@@ -208,7 +208,7 @@ def compare_estimators(
     else:
         _refuse_unknown_lengths(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
-        chosen = ball_pairs(experiment, design, pair_set)
+        chosen = ball_pairs(experiment, pair_set)
     corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
     on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
     seed = experiment.seed if seed is None else seed

@@ -193,8 +193,8 @@ def _positions(result: Reliability) -> list[str]:
                 str(len(own) // design.dimension),
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
-                _shown(result.detectable[by_bias], "m"),
-                _shown(result.found_by_fit[by_bias], "m"),
+                _shown(result.detectable[by_bias]),
+                _shown(result.found_by_fit[by_bias]),
                 name(given, int(by_bias), with_position=False),
                 u if known else "-",
                 name(given, int(by_effect), with_position=False) if known else "",
@@ -222,7 +222,7 @@ def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundan
         cells = [name(result.patterns, k)]
         if with_redundancy:
             cells.append(number(result.left[k], 3))
-        cells += [_shown(result.detectable[k], unit), _shown(result.found_by_fit[k], unit), SHOWN[unit]]
+        cells += [_shown(result.detectable[k]), _shown(result.found_by_fit[k]), SHOWN[unit]]
         for symbol in SYMBOLS:
             effect, uncertainty = _effect(result, symbol)[k], result.effects[symbol].uncertainty[k]
             told = f"{_effect_number(result, symbol, k)} ({number(1e6 * uncertainty, 3)})"
@@ -312,7 +312,7 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(every[: 4 * MOST]) + more
 
 
-def _shown(value: float, unit: str) -> str:
+def _shown(value: float) -> str:
     return "never" if math.isinf(value) else number(1e6 * value, 3)
 
 

@@ -51,13 +51,9 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Bound:
-    """A `value` that the criterion of no selection falls below, and the weights (n,) of the relaxation that gave it.
-
-    `relaxed` is the criterion with these weights; the best bound of the relaxation lies between the two.
-    """
+    """A `value` that the criterion of no selection falls below, and the weights (n,) of the relaxation that gave it."""
 
     value: float
-    relaxed: float
     weights: Array
 
     def check(self, name: str, reached: float) -> None:
@@ -102,7 +98,7 @@ def bound(problem: Problem, start: Collection[int] | None = None, steps: int = M
         return None
     limits = problem.limits.linear()
     powers = list(POWERS if problem.criterion.is_sharp else POWERS[-1:])
-    best = Bound(0.0, np.inf, mixture.weights)
+    best = Bound(0.0, mixture.weights)
     for _ in range(steps):
         tangent = _tangent(problem, mixture.weights, powers[0])
         if tangent is None:
@@ -112,7 +108,7 @@ def bound(problem: Problem, start: Collection[int] | None = None, steps: int = M
             break
         reached = tangent.at(vertex)
         if reached > best.value:
-            best = Bound(reached, tangent.value, mixture.weights)
+            best = Bound(reached, mixture.weights)
         if reached > tangent.value * (1 - CLOSE):
             powers = powers[1:]
             if not powers:

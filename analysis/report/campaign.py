@@ -58,7 +58,7 @@ def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
         if found.curve:
             _curve(placed_axes(figure, LEFT, total - ABOVE - top, WIDTH - LEFT - RIGHT, CURVE), found, marks)
         else:
-            _strip(placed_axes(figure, LABELS, total - ABOVE - top, WIDTH - LABELS - VALUES, top), found, marks)
+            _strip(placed_axes(figure, LABELS, total - ABOVE - top, WIDTH - LABELS - VALUES, top), marks)
         bottom = SCENE + UNDER
         axes = placed_axes(figure, NUMBERS, bottom, WIDTH - NUMBERS - VALUES, bars)
         _title(figure, bottom + bars + 14.0, f"how much larger {found.criterion} is without each of the chosen ones")
@@ -143,7 +143,7 @@ def _marks(found: Selection) -> list[_Mark]:
     return [replace(mark, value=_factor(found) * mark.value) for mark in marks]
 
 
-def _strip(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
+def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
     """The marks one below the other, with what no choice can reach."""
     target = next((mark.value for mark in marks if mark.name == TARGET), None)
     low, high = _limits([mark.value for mark in marks if mark.name != TARGET], target)

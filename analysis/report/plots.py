@@ -54,7 +54,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     axes.set_ylabel(micro(plot.unit))
     axes.grid(True)
     for k, line in enumerate(panel.lines):
-        _line(axes, line, k, is_only=len(panel.lines) == 1)
+        _line(axes, line, k)
     values = [np.concatenate([line.y, line.low, line.high, line.actual]) for line in panel.lines]
     finite = np.concatenate(values)
     finite = finite[np.isfinite(finite)]
@@ -73,7 +73,7 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
         axes.set_xticks(numbers, [f"{value:.6g}" for value in numbers])
 
 
-def _line(axes: Axes, line: Line, k: int, is_only: bool) -> None:
+def _line(axes: Axes, line: Line, k: int) -> None:
     colour, marker = SERIES[k], MARKERS[k]
     if len(line.low):
         bars = np.stack([line.y - line.low, line.high - line.y])

@@ -62,7 +62,7 @@ class Factor:
     `ball_root` (e, d, d) and `ball_shared` (e, d, s) with `ball_side` (e, d) are the rows of the balls
     `eliminated`; `kept_root` (d k, d k), `kept_shared` (d k, s), `kept_side` (d k,) those of the balls
     `kept`; `root` (s, s) and `side` (s,) those of the shared parameters. `sum_of_squares` is S^2 at the point
-    of linearisation and `remainder` what no change of the parameters can take away.
+    of linearisation.
 
     Where the weights of rows differ so much that columns have to be taken in an order that depends on them, `orders`
     tells the columns of all roots, and `alike` is the factor of the same rows with about equal weights, which has the
@@ -81,7 +81,6 @@ class Factor:
     root: Array
     side: Array
     sum_of_squares: float
-    remainder: float
     orders: Orders | None = None
     alike: Factor | None = None
 
@@ -165,7 +164,6 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
         root=triangle[columns:-1, columns:-1],
         side=triangle[columns:-1, -1],
         sum_of_squares=total,
-        remainder=float(triangle[-1, -1] ** 2),
     )
 
 
@@ -272,7 +270,6 @@ def _eliminate_graded(design: Design, layout: SharedLayout, state: State, x: Arr
         root=of_shared.root / layout.scale[of_shared.order],
         side=of_shared.side[:, 0],
         sum_of_squares=total,
-        remainder=float((of_shared.rest**2).sum()),
         orders=Orders(np.concatenate([np.zeros((0, d), np.int64), *orders]), of_kept.order, of_shared.order),
         alike=_eliminate_alike(_weighted_alike(design, layout, state), layout, state, x),
     )

@@ -21,7 +21,7 @@ normal equations.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,6 @@ from .covariance import EXACT, MICROMETRE
 from .initial import initial_state
 
 LengthEstimator = Literal["length-equations", "sphere-then-metric"]
-LENGTH_ESTIMATORS: tuple[str, ...] = get_args(LengthEstimator)
 
 # Places of e1 to e6 in the metric tensor.
 PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))

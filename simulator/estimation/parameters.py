@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design.arrays import Design, pose_size
 from ..machines.protocol import Array, Integers, Parameter
@@ -52,10 +50,6 @@ class SharedLayout:
     @property
     def offsets(self) -> slice:
         return slice(self.model.stop, self.lengths.start)
-
-    @cached_property
-    def is_angle(self) -> NDArray[np.bool_]:
-        return np.array([p.unit == "rad" for p in self.parameters], bool)
 
 
 def shared_layout(design: Design) -> SharedLayout:

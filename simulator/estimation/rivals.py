@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -40,7 +40,6 @@ from .gauss_newton import GaussNewtonSettings, Iteration, Status
 from .observations import length_rows
 
 RivalName = Literal["distances", "cresto", "kruth"]
-RIVALS: tuple[str, ...] = get_args(RivalName)
 
 
 @dataclass(frozen=True)

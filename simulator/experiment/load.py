@@ -168,7 +168,7 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
             calibrations[i] = calibration
             check_calibration_read(calibration, ("calibration", i), readers, reader_count, references)
     check_radii(calibrations, problems)
-    pool = resolve_pool(sections, candidates, positions, calibrations, references)
+    pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, references)
     offset_uncertainties = resolve_offset_uncertainties(sections, references)
     check_size(sections, machine, positions, calibrations, offset_uncertainties, references)

@@ -161,7 +161,6 @@ def resolve_candidates(
 def resolve_pool(
     sections: Sections,
     candidates: Candidates,
-    positions: AnyMapping[int, Position],
     calibrations: AnyMapping[int, Calibration],
     references: References,
 ) -> Pool | None:

@@ -115,7 +115,7 @@ def test_more_terms_than_there_is_memory_for(
     """Refused is one term more than possible; what is counted are the terms that the estimators have."""
     (experiment,) = load(QUICKSTART)
     design = lay_out(experiment)
-    terms = _terms(experiment, ball_pairs(experiment, design, pair_set), estimator, across_probes)
+    terms = _terms(experiment, ball_pairs(experiment, pair_set), estimator, across_probes)
     assert count_terms(experiment, design, estimator, pair_set, across_probes) == terms
     parameters = len(design.model.parameters)
     monkeypatch.setattr("ballplate.estimators.distances.MOST_DERIVATIVES", terms * parameters)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_ste
 from ballplate.simulator.estimation.length_equations import length_estimate
 from ballplate.simulator.estimation.observations import expected_readings
 from ballplate.simulator.estimation.parameters import shared_layout
-from ballplate.simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -298,7 +298,7 @@ def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[st
 TRUE_METRIC = {"true_machine": {"kind": "coefficients", "values": {"scale x": "20 ppm", "C0Y": "30 urad"}}}
 
 
-@pytest.mark.parametrize("estimator", RIVALS)
+@pytest.mark.parametrize("estimator", get_args(RivalName))
 def test_estimators_of_distances_take_the_same_lengths(estimator: RivalName, tmp_path: Path) -> None:
     """Without a plate the lengths are all there is, and every estimator is the weighted one of the dense covariance."""
     made = experiment(tmp_path, flat(3), GROWING, **COARSE, **TRUE_METRIC)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations, product
+from typing import get_args
 
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.rivals import RIVALS, RivalName, rival_estimate
+from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
@@ -35,7 +36,7 @@ def observed(design: Design, exact: bool = False) -> tuple[Design, np.ndarray]:
 
 
 @pytest.mark.parametrize("across", [False, True])
-@pytest.mark.parametrize("estimator", RIVALS)
+@pytest.mark.parametrize("estimator", get_args(RivalName))
 def test_exact_readings_give_the_truth_back(estimator: RivalName, across: bool) -> None:
     design, x = observed(small(), exact=True)
     truth = truth_of(small(), errors=3e-6)
@@ -100,7 +101,7 @@ def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chos
 
 
 @pytest.mark.parametrize("across", [False, True])
-@pytest.mark.parametrize("estimator", RIVALS)
+@pytest.mark.parametrize("estimator", get_args(RivalName))
 def test_the_objective_is_the_one_stated_and_at_its_minimum(estimator: RivalName, across: bool) -> None:
     design, x = observed(small())
     seen = design.readings.ball % 7 != design.readings.position
@@ -116,7 +117,7 @@ def test_the_objective_is_the_one_stated_and_at_its_minimum(estimator: RivalName
         assert above > 0 and below > 0 and above == pytest.approx(below, rel=0.02)
 
 
-@pytest.mark.parametrize("estimator", RIVALS)
+@pytest.mark.parametrize("estimator", get_args(RivalName))
 def test_without_a_calibrated_distance_the_scale_is_open(estimator: RivalName) -> None:
     design = small()
     design = replace(design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values())))

@@ -258,7 +258,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
 
 
 def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
-    one = Bound(1e-6, 1e-6, np.zeros(3))
+    one = Bound(1e-6, np.zeros(3))
     one.check("U6", 1e-6 * (1 - 5e-10))
     with pytest.raises(InternalError, match="U6 of the choice, 9.9.*e-07, is below 1e-06"):
         one.check("U6", 1e-6 * (1 - 5e-9))
