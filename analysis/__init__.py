@@ -24,10 +24,14 @@ if TYPE_CHECKING:
         simulate,
     )
     from .simulator.experiment.model import Experiment
+    from .sweeps.running import OtherSweepError
+    from .sweeps.store_file import StoreError
 
 __all__ = [
     "Experiment",
     "ExperimentError",
+    "OtherSweepError",
+    "StoreError",
     "check",
     "experiment",
     "fit",
@@ -44,6 +48,8 @@ __all__ = [
 _PLACES = {
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
+    "OtherSweepError": "ballplate.sweeps.running",
+    "StoreError": "ballplate.sweeps.store_file",
 }
 
 

@@ -1,7 +1,7 @@
 """ballplate from Python: what the commands do, with results in place of text.
 
 Wherever an experiment is taken, so is the path of a file with one. Values in results are in metres, radians and ratios.
-Every function raises `ballplate.ExperimentError` for a file or an experiment that is wrong, and ValueError for another
+Every function raises `ballplate.ExperimentError` for a file or an experiment that is wrong, and ValueError for an
 argument that is.
 """
 
@@ -35,6 +35,11 @@ if TYPE_CHECKING:
     from .sweeps.running import SweepResult
 
 PathLike = str | os.PathLike[str]
+
+SIGMAS = ("estimated", "given")
+
+# Chances that `ballplate reliability` takes too; beyond them there is no test that could be told.
+LEAST_CHANCE, MOST_CHANCE = 1e-12, 0.999999
 
 
 def load(path: PathLike, variant: str | None = None) -> Experiment:
@@ -132,9 +137,11 @@ def run(
 
     from .results import study
 
+    for name, count in {"trials": trials, "until": until, "workers": workers}.items():
+        _positive(name, count)
     if trials is not None and trials < 2:
         raise ValueError(f"trials={trials}; give 2 at least, since fewer have no scatter")
-    if until is not None and not 0.0 < until <= 1.0:
+    if until is not None and until > 1.0:
         raise ValueError(f"until={until}; give a ratio above 0 and at most 1, such as 0.01")
     chosen = _experiment(experiment)
     predicted = study.predict(chosen, with_scale=True)
@@ -188,7 +195,7 @@ def fit(
 
     from .results import study
 
-    _refuse_unknown_sigma(sigma)
+    _one_of("sigma", sigma, SIGMAS)
     chosen = _experiment(experiment)
     observed = read_readings(_table(readings), lay_out(chosen))
     return study.fit(chosen, observed, sigma, monomials)
@@ -219,7 +226,9 @@ def plan(
     from .planning.criteria import NAMES
     from .simulator.experiment.load import with_pool
 
-    _refuse_unknown("criterion", criterion, NAMES)
+    _one_of("criterion", criterion, NAMES)
+    for name, most in {"hours": hours, "positions": positions, "readings": readings, "workers": workers}.items():
+        _positive(name, most)
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
@@ -240,9 +249,12 @@ def reliability(
     """
     from .gross_errors import redundancy
 
-    _refuse_unknown_sigma(sigma)
-    if not 0.0 < false_alarm < power < 1.0:
-        raise ValueError(f"false_alarm={false_alarm}, power={power}; give ratios between 0 and 1, the power the larger")
+    _one_of("sigma", sigma, SIGMAS)
+    for name, chance in {"false_alarm": false_alarm, "power": power}.items():
+        if not LEAST_CHANCE <= chance <= MOST_CHANCE:
+            raise ValueError(f"{name}: {chance!r} is no chance from {LEAST_CHANCE:g} to {MOST_CHANCE:g}")
+    if not false_alarm < power:
+        raise ValueError(f"false_alarm={false_alarm}, power={power}; the power has to be the larger")
     return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma)
 
 
@@ -266,7 +278,7 @@ def reach(
 
     names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns or NAMES)
     for name in names:
-        _refuse_unknown("unknowns", name, NAMES)
+        _one_of("unknowns", name, NAMES)
     return search(_experiment(experiment), parse_goal(goal), names, target=target)
 
 
@@ -298,6 +310,7 @@ def sweep(
     from .sweeps.local import local_runner
     from .sweeps.running import compute_sweep, enter, result_of, writable_store
 
+    _positive("workers", workers)
     given = load_sweep(path)
     bundle = bundle_of(given)
     with writable_store(Path(path).with_suffix(".sqlite") if store is None else Path(store)) as opened:
@@ -307,14 +320,14 @@ def sweep(
         return result_of(opened, given, entered, summary)
 
 
-def _refuse_unknown(argument: str, given: str, known: Sequence[str]) -> None:
-    if given not in known:
-        raise ValueError(f'{argument}: "{given}" is unknown; {hint(given, known)}')
+def _one_of(name: str, given: str | None, known: Sequence[str]) -> None:
+    if given is not None and given not in known:
+        raise ValueError(f'{name}: "{given}" is not possible; {hint(given, known)}')
 
 
-def _refuse_unknown_sigma(sigma: str | None) -> None:
-    if sigma is not None:
-        _refuse_unknown("sigma", sigma, ("estimated", "given"))
+def _positive(name: str, given: float | None) -> None:
+    if given is not None and not given > 0:
+        raise ValueError(f"{name}: {given!r} is not above 0")
 
 
 def _table(readings: PathLike | pandas.DataFrame) -> Path | GivenText:

@@ -12,7 +12,6 @@ import pandas
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.sweeps.running import OtherSweepError
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -150,6 +149,31 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     exported = pandas.read_csv(tmp_path / "table.csv")
     assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()
     file.write_text(text.replace("0.2 um", "0.3 um"), "utf-8")
-    with pytest.raises(OtherSweepError, match="holds another sweep; what has changed"):
+    with pytest.raises(bp.OtherSweepError, match="holds another sweep; what has changed"):
         bp.sweep(file)
     assert bp.sweep(file, beside=True).summary.before == 1
+    store.write_text("no store", "utf-8")
+    with pytest.raises(bp.StoreError, match="is no store of ballplate sweep"):
+        bp.sweep(file)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: bp.plan("designs/planning/plate-pool.yaml", "U8"), 'criterion: "U8" is not possible; '),
+        (lambda: bp.plan("designs/planning/plate-pool.yaml", hours=-1.0), "hours: -1.0 is not above 0"),
+        (lambda: bp.plan("designs/planning/plate-pool.yaml", positions=0), "positions: 0 is not above 0"),
+        (lambda: bp.run(QUICKSTART, trials=0), "trials: 0 is not above 0"),
+        (lambda: bp.run(QUICKSTART, until=float("nan")), "until: nan is not above 0"),
+        (lambda: bp.fit(QUICKSTART, bp.simulate(QUICKSTART), sigma="givn"), 'did you mean "given"'),
+        (lambda: bp.reliability(QUICKSTART, power=80.0), "power: 80.0 is no chance"),
+        (lambda: bp.reliability(QUICKSTART, false_alarm=0.0), "false_alarm: 0.0 is no chance"),
+        (lambda: bp.reliability(QUICKSTART, sigma="no"), "sigma: "),
+        (lambda: bp.reach(QUICKSTART, unknowns=["ball"]), 'did you mean "balls"'),
+        (lambda: bp.sweep("designs/sweeps/plate-size.yaml", workers=0), "workers: 0 is not above 0"),
+    ],
+)
+def test_arguments_that_mean_nothing_are_refused(call: Callable[[], object], told: str) -> None:
+    """None gives a result, as if something else had been asked for."""
+    with pytest.raises(ValueError, match=told):
+        call()
