@@ -15,7 +15,7 @@ from ballplate.simulator.inputs.yamltree import Mark
 
 from ..requirements.goals import Goal, GoalError, check_goal, judge
 from ..results.prediction import Prediction
-from ..results.study import check, worth
+from ..results.study import check, planned_uncertainty
 
 if TYPE_CHECKING:
     from ..planning.repair.scale import ScaleCertificate
@@ -128,7 +128,7 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
 
 def _goals(experiment: Experiment, goals: Sequence[Goal]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """How goals are met, in words, and those of them that are not."""
-    found = worth(experiment) if goals else None
+    found = planned_uncertainty(experiment) if goals else None
     told, missed = [], []
     for goal in goals:
         assert found is not None

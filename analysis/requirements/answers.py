@@ -18,7 +18,7 @@ class Answer:
     `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that was looked at
     does; `none` does; nothing of this kind repairs what is `undetermined`; or the unknown cannot be `varied`. `words`
     and `value`, in metres or a number, are the value needed, or without one that comes nearest, or the last looked at;
-    `outcome` is what the plan with it gives. `remarks` tell of the range.
+    `outcome` is what the prediction with it gives. `remarks` tell of the range.
     """
 
     name: UnknownName

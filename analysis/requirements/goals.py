@@ -1,4 +1,4 @@
-"""What a design is to reach, and whether a plan does."""
+"""What a design is to reach, and whether it does."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ballplate.simulator.numerics.rounding import comparable
 
 from ..results.formatting import number, percent, shown_unit, uncertainty_words
 from ..results.prediction import Prediction
-from ..results.study import Worth
+from ..results.study import PlannedUncertainty
 from ..uncertainty.quantities import DESCRIPTIONS, QUANTITIES
 from ..uncertainty.summaries import Quantity
 
@@ -56,7 +56,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Whether a plan meets a goal, how far it is from it (smaller is better), and in words.
+    """Whether a design meets a goal, how far it is from it (smaller is better), and in words.
 
     `undetermined` counts what the goal asks about and the observations leave open.
     """
@@ -97,31 +97,33 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     return Goal("quantity", 1.0, symbol, statistic, value)  # type: ignore[arg-type]
 
 
-def check_goal(goal: Goal, plan: Prediction | Worth) -> None:
-    """Refuse a goal about what a plan does not have.
+def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
+    """Refuse a goal about what a design does not have.
 
     :raises GoalError: no target, no tasks, or no such quantity.
     """
-    if goal.kind == "lengths" and ("U6" not in plan.quantities or plan.quantities["U6"].within_target is None):
+    if goal.kind == "lengths" and (
+        "U6" not in prediction.quantities or prediction.quantities["U6"].within_target is None
+    ):
         raise GoalError(
             'the file states no target_accuracy; add it, such as "0.5 um + L/1000000", or give --target or --goal'
         )
     if goal.kind == "tasks":
-        if not plan.tasks:
+        if not prediction.tasks:
             raise GoalError("the file has no tasks; add evaluation.tasks, or give another goal")
-        without = [task.name for task in plan.tasks if task.target is None]
+        without = [task.name for task in prediction.tasks if task.target is None]
         if without:
             raise GoalError(f"no target for {listing(without)}; give target_accuracy to tasks, or to the file")
-    if goal.kind == "quantity" and goal.symbol not in plan.quantities:
-        raise GoalError(f"the design has no {goal.symbol}; it has {listing(plan.quantities, 20)}")
+    if goal.kind == "quantity" and goal.symbol not in prediction.quantities:
+        raise GoalError(f"the design has no {goal.symbol}; it has {listing(prediction.quantities, 20)}")
 
 
-def judge(goal: Goal, plan: Prediction | Worth) -> Judgement:
-    """Whether a plan meets a goal that `check_goal` lets pass."""
+def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
+    """Whether a design meets a goal that `check_goal` lets pass."""
     if goal.kind == "tasks":
-        return _judge_tasks(plan)
+        return _judge_tasks(prediction)
     if goal.kind == "quantity":
-        found = plan.quantities[goal.symbol]
+        found = prediction.quantities[goal.symbol]
         value = getattr(found, goal.statistic)
         is_met = not found.undetermined and value <= goal.limit
         words = f"{goal.statistic} {goal.symbol} {number(1e6 * value)} {shown_unit(found.unit)}"
@@ -129,7 +131,7 @@ def judge(goal: Goal, plan: Prediction | Worth) -> Judgement:
         words += "" if found.coverage_factor == 1.0 else " (standard uncertainty)"
         distance = math.inf if math.isnan(value) else value / goal.limit
         return Judgement(is_met, distance + found.undetermined, words + _open(found), found.undetermined)
-    found = plan.quantities["U6"]
+    found = prediction.quantities["U6"]
     share = found.within_target or 0.0
     average = "" if math.isnan(found.average) else f", average U6 {number(1e6 * found.average)} um"
     # An exact count: the share is a ratio of two whole numbers.
@@ -141,19 +143,21 @@ def judge(goal: Goal, plan: Prediction | Worth) -> Judgement:
     return Judgement(is_met, 1.0 - share, words, found.undetermined)
 
 
-def _judge_tasks(plan: Prediction | Worth) -> Judgement:
+def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:
     ratios = [
-        task.coverage_factor * task.standard_uncertainty / task.target for task in plan.tasks if task.target is not None
+        task.coverage_factor * task.standard_uncertainty / task.target
+        for task in prediction.tasks
+        if task.target is not None
     ]
     undetermined = sum(map(math.isnan, ratios))
     within = sum(ratio <= 1.0 for ratio in ratios)
     words = f"{within} of {len(ratios)} tasks within their targets by the "
-    words += uncertainty_words(plan.tasks[0].coverage_factor)
+    words += uncertainty_words(prediction.tasks[0].coverage_factor)
     if undetermined:
         words += f", {undetermined} undetermined"
         return Judgement(False, math.inf, words, undetermined)
     worst = int(comparable(ratios).argmax())
-    words += f"; most of its target needs {plan.tasks[worst].name}, {number(100 * ratios[worst])} %"
+    words += f"; most of its target needs {prediction.tasks[worst].name}, {number(100 * ratios[worst])} %"
     return Judgement(within == len(ratios), ratios[worst], words, 0)
 
 

@@ -1,4 +1,4 @@
-"""Searches for the value of an unknown that just meets a goal; the value found is judged by a plan of its own."""
+"""Searches for the value of an unknown that just meets a goal; the value found is judged by a prediction of its own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar
 from ballplate.simulator.numerics.rounding import comparable
 from ballplate.simulator.numerics.threads import single_threaded
 
-from ..results.study import Worth, predict, worth
+from ..results.study import PlannedUncertainty, planned_uncertainty, predict
 from ..running.steps import Report, counted, unreported
 from .answers import Answer, Reach
 from .goals import Goal, Judgement, check_goal, judge
@@ -78,7 +78,7 @@ def reach(
     if target is not None:
         root = override(root, "target_accuracy", Scalar(root.mark, target), root.mark)
     searched = _Searched(root, experiment.source, experiment.name, goal)
-    present = searched.worth(root)
+    present = searched.uncertainty(root)
     check_goal(goal, present)
     judged = judge(goal, present)
     answers = []
@@ -113,12 +113,12 @@ class _Searched:
             raise ExperimentError(sorted(messages))
         return experiment
 
-    def worth(self, tree: Node) -> Worth:
-        """What a tree is worth.
+    def uncertainty(self, tree: Node) -> PlannedUncertainty:
+        """Uncertainties of a tree's design.
 
         :raises ExperimentError: the file is wrong so.
         """
-        return worth(self.built(tree))
+        return planned_uncertainty(self.built(tree))
 
 
 class _Trials:
@@ -136,7 +136,7 @@ class _Trials:
     def _tried(self, step: int) -> Tried:
         words = self.one.words(step)
         try:
-            found = self.searched.worth(self.one.tree(step))
+            found = self.searched.uncertainty(self.one.tree(step))
         except ExperimentError as error:
             first = error.messages[0]
             return Tried(words, None, 0, f"{first.path}: {first.text}")
@@ -155,7 +155,7 @@ class _Trials:
         return found.undetermined
 
     def verified(self, step: int) -> Judgement:
-        """A value judged by a plan of its own."""
+        """A value judged by a prediction of its own."""
         return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
 
     def is_right(self, step: int) -> bool:

@@ -1,4 +1,4 @@
-"""What the commands do, without a terminal: check a design, plan with it, fit readings to it."""
+"""What the commands do, without a terminal: check a design, predict its uncertainties, fit readings to it."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from .residuals import largest_residuals
 
 
 @dataclass(frozen=True)
-class Worth:
-    """Uncertainties alone, for searches that judge many designs: rank deficiency, U1 to U6 and tasks as in a plan."""
+class PlannedUncertainty:
+    """Uncertainties alone, for searches that judge many designs: rank deficiency, quantities and tasks."""
 
     deficiency: int
     quantities: dict[str, Quantity]
@@ -50,10 +50,11 @@ def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
 
 
 @single_threaded
-def worth(experiment: Experiment) -> Worth:
-    """What `plan` finds, less the explanation of the rank, which takes most of its time."""
+def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
+    """What `predict` finds, less the explanation of the rank, which takes most of its time."""
     at = linearise(lay_out(experiment))
-    return Worth(at.deficiency, uncertainties(at, target=experiment.target_accuracy), task_uncertainties(at))
+    found = uncertainties(at, target=experiment.target_accuracy)
+    return PlannedUncertainty(at.deficiency, found, task_uncertainties(at))
 
 
 @single_threaded

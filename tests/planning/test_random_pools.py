@@ -16,7 +16,7 @@ from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import RunSheet, run_sheet
 from ballplate.planning.selection import Campaign
-from ballplate.results.study import predict, worth
+from ballplate.results.study import planned_uncertainty, predict
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.load import load
@@ -94,7 +94,7 @@ def best_of_all(pool: RandomPool) -> float:
         ):
             continue
         whole = with_chosen(experiment, chosen)
-        if not worth(whole).deficiency:
+        if not planned_uncertainty(whole).deficiency:
             best = min(best, by_run(whole, pool.criterion))
     return best
 
