@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import subprocess
 import sys
 import tomllib
@@ -49,6 +50,15 @@ def test_every_name_of_the_face_is_there_and_told() -> None:
         assert name in dir(ballplate)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = ballplate.nothing
+
+
+def test_every_function_of_the_face_has_an_example_that_calls_it() -> None:
+    """The examples run in tests/test_docstring_examples.py; one that only prepares a call shows nothing."""
+    functions = [name for name in ballplate.__all__ if name[0].islower()]
+    for name in functions:
+        examples = doctest.DocTestFinder(recurse=False).find(getattr(ballplate, name), name)[0].examples
+        assert any(f"{name}(" in one.source and one.want for one in examples), name
+    assert len(functions) > 10
 
 
 def test_no_module_hides_a_function_of_the_face() -> None:
