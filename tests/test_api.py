@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -144,7 +146,13 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     found = bp.sweep(file)
     assert found.summary.done == 2 and found.summary.before == 0 and repr(found).endswith("2 cells, 2 done, 0 failed>")
     assert len(found.to_frame()) == 2 and found.to_dict()["store"] == str(store)
-    assert bp.sweep(file).summary.before == 2
+    again = bp.sweep(file)
+    assert again.summary.before == 2 and again.remarks == ()
+    with closing(sqlite3.connect(store)) as connection, connection:
+        connection.execute("UPDATE result SET figures = '{}' WHERE rowid = 1")
+    mended = bp.sweep(file)
+    assert mended.summary.before == 1 and mended.summary.done == 2
+    assert "computed anew" in mended.remarks[0] and mended.remarks[0] in str(mended)
     assert main(["export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
     exported = pandas.read_csv(tmp_path / "table.csv")
     assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()

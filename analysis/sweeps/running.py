@@ -52,13 +52,17 @@ class Entered:
 
 @dataclass(frozen=True, repr=False)
 class SweepResult(Result):
-    """A sweep as far as it is computed: a row of the store for each cell."""
+    """A sweep as far as it is computed: a row of the store for each cell.
+
+    `remarks` say what the store held that could not be used, and is computed anew.
+    """
 
     label: str
     title: str
     store: Path
     summary: Summary
     table: pandas.DataFrame
+    remarks: tuple[str, ...] = ()
 
     def headline(self) -> str:
         one = self.summary
@@ -66,7 +70,8 @@ class SweepResult(Result):
         return f"{one.cells} cells, {one.done} done, {one.failed} failed{left}"
 
     def lines(self) -> list[str]:
-        return [f"{self.label}: {self.title}", self.headline(), "", *self.table.to_string(index=False).splitlines()]
+        table = self.table.to_string(index=False).splitlines()
+        return [f"{self.label}: {self.title}", self.headline(), *self.remarks, "", *table]
 
     def to_dict(self) -> dict[str, Any]:
         one = self.summary
@@ -152,4 +157,5 @@ def compute_sweep(
 
 def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) -> SweepResult:
     """The rows of a sweep in its store."""
-    return SweepResult(sweep.source.stem, sweep.title, Path(store.path), summary, frame(store, entered.number))
+    table = frame(store, entered.number)
+    return SweepResult(sweep.source.stem, sweep.title, Path(store.path), summary, table, entered.remarks)
