@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         reliability,
         run,
         simulate,
+        sweep,
     )
     from .simulator.experiment.model import Experiment
     from .sweeps.running import OtherSweepError
@@ -43,6 +44,7 @@ __all__ = [
     "reliability",
     "run",
     "simulate",
+    "sweep",
 ]
 
 _PLACES = {

@@ -137,11 +137,10 @@ def run(
 
     from .results import study
 
-    for name, count in {"trials": trials, "until": until, "workers": workers}.items():
-        _positive(name, count)
+    _positive("workers", workers)
     if trials is not None and trials < 2:
         raise ValueError(f"trials={trials}; give 2 at least, since fewer have no scatter")
-    if until is not None and until > 1.0:
+    if until is not None and not 0.0 < until <= 1.0:
         raise ValueError(f"until={until}; give a ratio above 0 and at most 1, such as 0.01")
     chosen = _experiment(experiment)
     predicted = study.predict(chosen, with_scale=True)
@@ -250,11 +249,11 @@ def reliability(
     from .gross_errors import redundancy
 
     _one_of("sigma", sigma, SIGMAS)
-    for name, chance in {"false_alarm": false_alarm, "power": power}.items():
-        if not LEAST_CHANCE <= chance <= MOST_CHANCE:
-            raise ValueError(f"{name}: {chance!r} is no chance from {LEAST_CHANCE:g} to {MOST_CHANCE:g}")
-    if not false_alarm < power:
-        raise ValueError(f"false_alarm={false_alarm}, power={power}; the power has to be the larger")
+    if not LEAST_CHANCE <= false_alarm < power <= MOST_CHANCE:
+        limits = f"{LEAST_CHANCE:g} and {MOST_CHANCE:g}"
+        raise ValueError(
+            f"false_alarm={false_alarm}, power={power}; give ratios between {limits}, the power the larger"
+        )
     return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma)
 
 
@@ -322,7 +321,7 @@ def sweep(
 
 def _one_of(name: str, given: str | None, known: Sequence[str]) -> None:
     if given is not None and given not in known:
-        raise ValueError(f'{name}: "{given}" is not possible; {hint(given, known)}')
+        raise ValueError(f'{name}: "{given}" is unknown; {hint(given, known)}')
 
 
 def _positive(name: str, given: float | None) -> None:
