@@ -19,6 +19,8 @@ MODULES = ("fcntl", "pty", "resource", "termios")
 WORDS = re.compile(
     r"\b(?:mkfifo|symlink_to|killpg|preexec_fn|start_new_session|SIGKILL|chmod|shell)\b|\bos\.kill\b|\"bash\"|/dev/|/proc/"
 )
+# Folders whose tests take longest.
+LONGEST = ("sweeps", "docs")
 IS_POSIX = all(importlib.util.find_spec(name) is not None for name in MODULES)
 
 
@@ -63,6 +65,8 @@ def pytest_report_header() -> list[str]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # The longest first, so that several processes end together.
+    items.sort(key=lambda item: item.path.parent.name not in LONGEST)
     if IS_POSIX:
         return
     for item in items:
