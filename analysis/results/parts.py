@@ -147,6 +147,9 @@ def scale_lines(found: Scale | None) -> list[str]:
     """What carries scale as lines of text, and a warning where it rests on offsets that are held exact."""
     if found is None:
         return []
+    if all(one.without is None for one in found.carriers):
+        # How well the other parameters are known says nothing of how right the scales are.
+        return [f"scale is that of {' and '.join(one.words for one in found.carriers)}"]
     told = []
     for one in found.carriers:
         if one.without is None:

@@ -185,6 +185,9 @@ def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) 
         assert found.scale is not None
         assert (OWN_SCALES in [one.words for one in found.scale.carriers]) is not is_free
         assert ("the machine's own scales" in "\n".join(found.lines())) is not is_free
+        # A figure would be that of squareness, and say nothing of the scales.
+        uncertain = any(line.startswith("scale known to") for line in found.lines())
+        assert uncertain is any(one.without is not None for one in found.scale.carriers)
         known.append(found.scale.uncertainty)
     # Without scales in the model only its squareness is left to be uncertain of.
     assert known[1] < 0.5 * known[0]
