@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import ballplate as bp
-import pandas
 import pytest
 import yaml
 from ballplate.cli import main
+
+from tests.reference.tables import read_table
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -158,7 +159,7 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     assert mended.summary.before == 1 and mended.summary.done == 2
     assert "computed anew" in mended.remarks[0] and mended.remarks[0] in str(mended)
     assert main(["export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
-    exported = pandas.read_csv(tmp_path / "table.csv")
+    exported = read_table(tmp_path / "table.csv")
     assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()
     file.write_text(text.replace("0.2 um", "0.3 um"), "utf-8")
     with pytest.raises(bp.OtherSweepError, match="holds another sweep; what has changed"):

@@ -9,10 +9,11 @@ from typing import Any
 
 import ballplate as bp
 import numpy as np
-import pandas
 import pytest
 from ballplate.results.prediction import Prediction
 from ballplate.results.result import Result
+
+from tests.reference.tables import read_table
 
 PLACES = {"planes": ["z"], "levels": ["100 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}, "probes": ["down"]}
 
@@ -88,7 +89,7 @@ def test_every_form_has_every_row(results: list[Result]) -> None:
 
 def test_csv_has_all_digits(results: list[Result]) -> None:
     for result in results:
-        frame, found = result.to_frame(), pandas.read_csv(io.StringIO(result.to_csv()))
+        frame, found = result.to_frame(), read_table(io.StringIO(result.to_csv()))
         for name in frame.select_dtypes("number"):
             np.testing.assert_array_equal(found[name].to_numpy(float), frame[name].to_numpy(float))
 
