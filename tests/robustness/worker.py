@@ -78,6 +78,9 @@ def _serve(connection: Connection, trial: Trial, memory: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGPROF, _out_of_time)
     warnings.simplefilter("error")
+    # As in pyproject.toml: older releases of matplotlib use names that newer ones of pyparsing are giving up.
+    deprecated = r"'\w+' (argument is )?deprecated(,| -) use '\w+'"
+    warnings.filterwarnings("ignore", deprecated, DeprecationWarning, "matplotlib")
     for request in connection.recv():
         trial(request)
     if sys.platform == "linux":
