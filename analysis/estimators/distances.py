@@ -16,7 +16,7 @@ from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.readings.generate import NoReadingError, noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
 from ..results.estimates import ParameterEstimate
@@ -215,7 +215,10 @@ def compare_estimators(
     rms, maximum, failed = [], [], []
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
-        both = _both_estimates(design, on_truth, truth, chosen, estimator, across_probes, generator)
+        try:
+            both = _both_estimates(design, on_truth, truth, chosen, estimator, across_probes, generator)
+        except NoReadingError as error:
+            raise ExperimentError([experiment.message(("true_machine",), f"{error}; state smaller ones")]) from None
         if both is None:
             failed.append(trial)
         else:
