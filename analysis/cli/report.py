@@ -48,6 +48,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Write the report."""
+    from ballplate.simulator.inputs.messages import in_one_line
+
     from ..report.results import read_results
     from ..sweeps.store import StoreError, open_store
 
@@ -79,6 +81,9 @@ def run(options: Namespace) -> int:
                 from ..results.formats import FORMATS
 
                 text = FORMATS[form](results.title, report_tables(results))
+            if not results.count("done") and not is_damaged:
+                told = f"none of its {len(results.cells)} cells is done; ballplate sweep goes on"
+                print(in_one_line(f"{store.path}: {told}"), file=sys.stderr)
     except StoreError as error:
         print(error, file=sys.stderr)
         return BAD_FILE

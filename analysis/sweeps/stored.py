@@ -239,7 +239,7 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
         kept = (key, block, status, reason, seed, texts.raw[names], figures, details, texts.raw[versions], tally)
         if digest != digest_of(*kept):
             raise UnreadableError(OTHER_CONTENT)
-    if not isinstance(block, int) or status not in ("done", "failed") or not isinstance(reason, str):
+    if not isinstance(block, int) or block < 0 or status not in ("done", "failed") or not isinstance(reason, str):
         raise UnreadableError("its block, status or reason is none")
     if not isinstance(seed, int) or not isinstance(seconds, float) or not math.isfinite(seconds):
         raise UnreadableError("its seed or duration is no number")
@@ -320,9 +320,12 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
                 rows.append(checked_row(number, key, tuple(raw), texts))
         except UnreadableError as error:
             unreadable[number] = str(error)
-    if has_digests and len(rows) + len(unreadable) < count:
-        # The rows of cells that seem not to be done may be there, under keys that are no longer theirs.
-        query = f"SELECT key, {OF_RESULT}, digest FROM result WHERE block = 0 AND key NOT IN (SELECT key FROM cell)"
+    if len(rows) + len(unreadable) < count:
+        # The rows of cells that seem not to be done may be there, under keys or blocks that are no longer theirs.
+        query = (
+            f"SELECT key, {OF_RESULT}, {of_result} FROM result "
+            "WHERE block = 0 AND key NOT IN (SELECT key FROM cell) OR typeof(block) <> 'integer' OR block < 0"
+        )
         for key, *raw in connection.execute(query):
             try:
                 checked_row(0, key, tuple(raw), texts)

@@ -207,6 +207,34 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
     assert "unreadable" in (tmp_path / "t.txt").read_text() or len(table) > 200
 
 
+@pytest.mark.parametrize("first", [False, True], ids=["digests", "first format"])
+@pytest.mark.parametrize("block", ["'a\nb'", "x'00'", "0.5", "-1", "NULL"])
+def test_rows_whose_block_is_none_are_told(
+    block: str, first: bool, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if first:
+        of_the_first_format(store)
+    with sqlite3.connect(store) as connection:
+        changed = connection.execute(f"UPDATE result SET block = {block}").rowcount
+    connection.close()
+    for arguments in commands(store, "csv", "text", "html"):
+        assert main(arguments) == 3
+        out, err = capsys.readouterr()
+        assert out == "" and f"{changed} entries belong to no cell" in err
+        assert_told_in_lines(err, store)
+
+
+def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with sqlite3.connect(store) as connection:
+        connection.execute("DELETE FROM result")
+    connection.close()
+    for arguments in commands(store, "text", "html"):
+        assert main(arguments) == 0
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1 and "none of its 4 cells is done" in err
+        assert_told_in_lines(err, store)
+
+
 def test_names_of_figures_are_found_in_the_index(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
     right = rows(store)
     page_of("text")(store)
