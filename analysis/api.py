@@ -1,8 +1,8 @@
 """ballplate from Python: what the commands do, with results in place of text.
 
-Wherever an experiment is taken, so is the path of a file with one. Values in results are in metres, radians and ratios.
-Every function raises `ballplate.ExperimentError` for a file or an experiment that is wrong, and ValueError for an
-argument that is.
+Wherever an experiment is taken, so is the path of a file with one. Values in results are in metres,
+radians and ratios. Every function raises `ballplate.ExperimentError` for a file or an experiment
+that is wrong, and ValueError for an argument that is.
 """
 
 from __future__ import annotations
@@ -58,9 +58,14 @@ def load(path: PathLike, variant: str | None = None) -> Experiment:
         if variant in names:
             return found[names.index(variant)]
         told = hint(variant, names) if found[0].name is not None else "the file has no variants"
-        raise ExperimentError([Message(str(path), 0, 0, "variants", f'no variant "{variant}"; {told}')])
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "variants", f'no variant "{variant}"; {told}')]
+        )
     if len(found) > 1:
-        text = f"the file has several variants; choose one with variant=, or load_all: {', '.join(names)}"
+        text = (
+            "the file has several variants; choose one with variant=, or load_all:"
+            f" {', '.join(names)}"
+        )
         raise ExperimentError([Message(str(path), 0, 0, "variants", text)])
     return found[0]
 
@@ -125,10 +130,11 @@ def run(
     workers: int = 1,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Prediction:
-    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials` are asked for.
+    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials`
+    are asked for.
 
-    At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty as accurate as
-    `until`.
+    At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty
+    as accurate as `until`.
 
     >>> run(quickstart())
     <Prediction of quickstart: full rank, U6 0.143 um on average, 0.325 um at most>
@@ -149,12 +155,17 @@ def run(
     from .montecarlo import experiments as replicates
     from .montecarlo.trials import MOST_TRIALS
 
-    found = replicates.trials(chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report)
+    found = replicates.trials(
+        chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report
+    )
     return replace(predicted, monte_carlo=found)
 
 
-def simulate(experiment: Experiment | PathLike, seed: int | None = None, exact: bool = False) -> pandas.DataFrame:
-    """Readings of the experiment's true machine, with noise from a seed, as a table that `fit` takes.
+def simulate(
+    experiment: Experiment | PathLike, seed: int | None = None, exact: bool = False
+) -> pandas.DataFrame:
+    """Readings of the experiment's true machine, with noise from a seed, as a table that `fit`
+    takes.
 
     >>> list(simulate(quickstart()).columns)
     ['position', 'ball', 'probe', 'x_mm', 'y_mm', 'z_mm']
@@ -183,8 +194,8 @@ def fit(
 ) -> Fit:
     """The estimate from readings, of a CSV file or a data frame with the same columns.
 
-    `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the coefficients of t,
-    t^2, ... on [0, 1].
+    `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
+    coefficients of t, t^2, ... on [0, 1].
 
     >>> fit(quickstart(), simulate(quickstart())).converged
     True
@@ -211,11 +222,13 @@ def plan(
     workers: int = 1,
     report: Report = unreported,
 ) -> Campaign:
-    """Positions and certificates chosen from the experiment's pool for a budget, with the bound of any choice.
+    """Positions and certificates chosen from the experiment's pool for a budget, with the bound of
+    any choice.
 
     Without a budget the choice may cost what the positions of the experiment itself do.
 
-    >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
+    >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
+    >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
     >>> pool = {"candidates": [places | {"probes": ["down"]}]}
     >>> plan(quickstart().with_(pool=pool), positions=7)
     <Campaign of quickstart: 7 of 8 candidates, U6 0.137 um>
@@ -226,7 +239,12 @@ def plan(
     from .simulator.experiment.load import with_pool
 
     _one_of("criterion", criterion, NAMES)
-    for name, most in {"hours": hours, "positions": positions, "readings": readings, "workers": workers}.items():
+    for name, most in {
+        "hours": hours,
+        "positions": positions,
+        "readings": readings,
+        "workers": workers,
+    }.items():
         _positive(name, most)
     budget = None
     if (hours, positions, readings) != (None, None, None):
@@ -241,7 +259,8 @@ def reliability(
     power: float = 0.8,
     sigma: Literal["estimated", "given"] | None = None,
 ) -> Reliability:
-    """Which mistakes in readings and certificates residuals would show, and what those do that they would not.
+    """Which mistakes in readings and certificates residuals would show, and what those do that they
+    would not.
 
     >>> reliability(quickstart()).degrees_of_freedom
     580
@@ -252,7 +271,8 @@ def reliability(
     if not LEAST_CHANCE <= false_alarm < power <= MOST_CHANCE:
         limits = f"{LEAST_CHANCE:g} and {MOST_CHANCE:g}"
         raise ValueError(
-            f"false_alarm={false_alarm}, power={power}; give ratios between {limits}, the power the larger"
+            f"false_alarm={false_alarm}, power={power}; give ratios between {limits}, the power the"
+            " larger"
         )
     return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma)
 
@@ -265,8 +285,9 @@ def reach(
 ) -> Reach:
     """The repeatability, certificate, repeats, balls or size of the plate with which a goal is met.
 
-    `goal` is as `ballplate reach --goal` has it, `unknowns` one of repeatability, certificate, repeats, balls and size,
-    or several; without any it is all of them. `target` replaces the experiment's target, as a text with a unit.
+    `goal` is as `ballplate reach --goal` has it, `unknowns` one of repeatability, certificate,
+    repeats, balls and size, or several; without any it is all of them. `target` replaces the
+    experiment's target, as a text with a unit.
 
     >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
     True
@@ -291,8 +312,8 @@ def sweep(
 ) -> SweepResult:
     """A family of experiments, computed into a store, from which it goes on where it ended.
 
-    The store is the sweep file's name with .sqlite, unless another is named. A sweep other than the one that it holds
-    is refused, or entered `beside` that.
+    The store is the sweep file's name with .sqlite, unless another is named. A sweep other than the
+    one that it holds is refused, or entered `beside` that.
 
     :raises StoreError: the store cannot be used.
     :raises OtherSweepError: it holds another sweep.
@@ -312,7 +333,9 @@ def sweep(
     _positive("workers", workers)
     given = load_sweep(path)
     bundle = bundle_of(given)
-    with writable_store(Path(path).with_suffix(".sqlite") if store is None else Path(store)) as opened:
+    with writable_store(
+        Path(path).with_suffix(".sqlite") if store is None else Path(store)
+    ) as opened:
         entered = enter(opened, given, bundle, beside)
         runner = nullcontext(local_runner(given, bundle, workers))
         summary = compute_sweep(opened, given, entered, runner, retry_failed, report=report)

@@ -1,4 +1,6 @@
-"""Experiment files that come with ballplate: those of published documents, a first one, and what they name."""
+"""Experiment files that come with ballplate: those of published documents, a first one, and what
+they name.
+"""
 
 from __future__ import annotations
 

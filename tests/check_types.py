@@ -1,7 +1,8 @@
 """Checks the types of the whole package: `python -m tests.check_types`.
 
-The folders `analysis`, `simulator` and `designs` are parts of one package, as pyproject.toml says. A type checker that
-reads no package mappings finds it below build/types, where its parts are linked together.
+The folders `analysis`, `simulator` and `designs` are parts of one package, as pyproject.toml says.
+A type checker that reads no package mappings finds it below build/types, where its parts are linked
+together.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""What the tests need of the system: those that need more than Windows has are left out there, and told."""
+"""What the tests need of the system: those that need more than Windows has are left out there, and
+told.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ ROOT = Path(__file__).parents[1]
 
 # Modules of Python that only POSIX has.
 MODULES = ("fcntl", "pty", "resource", "termios")
-# What only POSIX has: pipes with names, links that anybody may make, groups of processes, devices, a shell.
+# What only POSIX has: pipes with names, links that anybody may make, groups of processes, devices,
+# a shell.
 WORDS = re.compile(
     r"\b(?:mkfifo|symlink_to|killpg|preexec_fn|start_new_session|SIGKILL|chmod|shell)\b|\bos\.kill\b|\"bash\"|/dev/|/proc/"
 )
@@ -26,7 +29,9 @@ IS_POSIX = all(importlib.util.find_spec(name) is not None for name in MODULES)
 
 @cache
 def module_needed(path: Path) -> str:
-    """The module of POSIX that a file of the tests loads, by itself or through another one; empty where none."""
+    """The module of POSIX that a file of the tests loads, by itself or through another one; empty
+    where none.
+    """
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -49,7 +54,10 @@ def word_needed(source: str) -> str:
 
 def left_out() -> dict[str, str]:
     """Files of tests that cannot be loaded without POSIX, with the module that they need."""
-    found = {path.relative_to(ROOT).as_posix(): module_needed(path) for path in (ROOT / "tests").rglob("*.py")}
+    found = {
+        path.relative_to(ROOT).as_posix(): module_needed(path)
+        for path in (ROOT / "tests").rglob("*.py")
+    }
     return {name: module for name, module in sorted(found.items()) if module}
 
 
@@ -61,7 +69,10 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 def pytest_report_header() -> list[str]:
     if IS_POSIX:
         return []
-    return [f"left out, for want of POSIX: {name} (module {module})" for name, module in left_out().items()]
+    return [
+        f"left out, for want of POSIX: {name} (module {module})"
+        for name, module in left_out().items()
+    ]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -70,6 +81,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if IS_POSIX:
         return
     for item in items:
-        word = word_needed(inspect.getsource(item.function)) if isinstance(item, pytest.Function) else ""
+        word = (
+            word_needed(inspect.getsource(item.function))
+            if isinstance(item, pytest.Function)
+            else ""
+        )
         if word:
             item.add_marker(pytest.mark.skip(reason=f"needs {word}, which only POSIX has"))

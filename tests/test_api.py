@@ -25,24 +25,38 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
-def test_results_are_those_of_the_commands(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_results_are_those_of_the_commands(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     file = tmp_path / "readings.csv"
     readings = bp.simulate(QUICKSTART)
     readings.to_csv(file, index=False)
     assert main(["simulate", QUICKSTART, "-o", str(tmp_path / "other.csv")]) == 0
     assert file.read_bytes() == (tmp_path / "other.csv").read_bytes()
-    assert bp.check(QUICKSTART).to_dict() | {"goals": [], "missed": []} == printed(capsys, "check", QUICKSTART)
-    assert bp.run(QUICKSTART, trials=20).to_dict() == printed(capsys, "run", QUICKSTART, "--trials", "20")
+    assert bp.check(QUICKSTART).to_dict() | {"goals": [], "missed": []} == printed(
+        capsys, "check", QUICKSTART
+    )
+    assert bp.run(QUICKSTART, trials=20).to_dict() == printed(
+        capsys, "run", QUICKSTART, "--trials", "20"
+    )
     assert bp.fit(QUICKSTART, file).to_dict() == printed(capsys, "fit", QUICKSTART, str(file))
     assert bp.reliability(QUICKSTART).to_dict() == printed(capsys, "reliability", QUICKSTART)
     assert bp.reach(QUICKSTART).to_dict() == printed(capsys, "reach", QUICKSTART)
 
 
 def test_a_changed_experiment_is_one_with_the_text_changed(tmp_path: Path) -> None:
-    text = Path(QUICKSTART).read_text("utf-8").replace("repeatability: 0.2 um", "repeatability: 0.4 um")
+    text = (
+        Path(QUICKSTART)
+        .read_text("utf-8")
+        .replace("repeatability: 0.2 um", "repeatability: 0.4 um")
+    )
     file = tmp_path / "changed.yaml"
     file.write_text(text.replace("balls: [5, 5]", "balls: [7, 7]"), "utf-8")
-    changed = bp.quickstart().with_({"machine.repeatability": "0.4 um"}).with_({"artefacts.plate.balls": [7, 7]})
+    changed = (
+        bp.quickstart()
+        .with_({"machine.repeatability": "0.4 um"})
+        .with_({"artefacts.plate.balls": [7, 7]})
+    )
     assert bp.run(changed).quantities == bp.run(file).quantities
     assert bp.run(bp.quickstart()).quantities == bp.run(QUICKSTART).quantities
 
@@ -101,17 +115,41 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
         (lambda: bp.run(QUICKSTART, trials=1), "trials=1; give 2 at least"),
         (lambda: bp.run(QUICKSTART, until=0.0), r"until=0.0; give a ratio above 0"),
         (lambda: bp.run(QUICKSTART, until=5), r"until=5; give a ratio above 0 and at most 1"),
-        (lambda: bp.fit(QUICKSTART, "none.csv", sigma="givn"), 'sigma: "givn" is unknown; did you mean "given"'),
-        (lambda: bp.reliability(QUICKSTART, sigma="Given"), 'sigma: "Given" is unknown; did you mean "given"'),
+        (
+            lambda: bp.fit(QUICKSTART, "none.csv", sigma="givn"),
+            'sigma: "givn" is unknown; did you mean "given"',
+        ),
+        (
+            lambda: bp.reliability(QUICKSTART, sigma="Given"),
+            'sigma: "Given" is unknown; did you mean "given"',
+        ),
         (lambda: bp.reliability(QUICKSTART, power=1.0), "power=1.0; give ratios between"),
-        (lambda: bp.reliability(QUICKSTART, false_alarm=0.9), "false_alarm=0.9, power=0.8; .* the power the larger"),
+        (
+            lambda: bp.reliability(QUICKSTART, false_alarm=0.9),
+            "false_alarm=0.9, power=0.8; .* the power the larger",
+        ),
         (lambda: bp.plan(QUICKSTART, "u6"), 'criterion: "u6" is unknown; did you mean "U6"'),
-        (lambda: bp.reach(QUICKSTART, unknowns=["repeatabilty"]), 'unknowns: "repeatabilty" is unknown; did you mean'),
-        (lambda: bp.plan("designs/planning/plate-pool.yaml", hours=-1.0), "hours: -1.0 is not above 0"),
-        (lambda: bp.plan("designs/planning/plate-pool.yaml", positions=0), "positions: 0 is not above 0"),
+        (
+            lambda: bp.reach(QUICKSTART, unknowns=["repeatabilty"]),
+            'unknowns: "repeatabilty" is unknown; did you mean',
+        ),
+        (
+            lambda: bp.plan("designs/planning/plate-pool.yaml", hours=-1.0),
+            "hours: -1.0 is not above 0",
+        ),
+        (
+            lambda: bp.plan("designs/planning/plate-pool.yaml", positions=0),
+            "positions: 0 is not above 0",
+        ),
         (lambda: bp.run(QUICKSTART, until=float("nan")), "until=nan; give a ratio above 0"),
-        (lambda: bp.sweep("designs/sweeps/plate-size.yaml", workers=0), "workers: 0 is not above 0"),
-        (lambda: bp.reach(QUICKSTART, unknowns="rows"), 'unknowns: "rows" is unknown; known: repeatability'),
+        (
+            lambda: bp.sweep("designs/sweeps/plate-size.yaml", workers=0),
+            "workers: 0 is not above 0",
+        ),
+        (
+            lambda: bp.reach(QUICKSTART, unknowns="rows"),
+            'unknowns: "rows" is unknown; known: repeatability',
+        ),
     ],
 )
 def test_wrong_arguments_are_refused(call: Callable[[], object], told: str) -> None:
@@ -134,22 +172,36 @@ def test_variants_are_chosen_by_name() -> None:
 
 
 def test_results_show_themselves() -> None:
-    for result in (bp.check(QUICKSTART), bp.run(QUICKSTART, trials=5), bp.fit(QUICKSTART, bp.simulate(QUICKSTART))):
+    for result in (
+        bp.check(QUICKSTART),
+        bp.run(QUICKSTART, trials=5),
+        bp.fit(QUICKSTART, bp.simulate(QUICKSTART)),
+    ):
         assert len(repr(result)) < 200 and "quickstart" in repr(result)
         assert str(result).startswith("quickstart: 5 x 5 ball plate in six positions\n")
         assert len(result.to_frame()) == len(result.rows())
         html = result._repr_html_()
-        assert html.count("<table") == html.count("</table>") == bool(result.rows()) and "quickstart" in html
+        assert (
+            html.count("<table") == html.count("</table>") == bool(result.rows())
+            and "quickstart" in html
+        )
         json.dumps(result.to_dict(), allow_nan=False)
 
 
 def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "base.yaml").write_text(Path(QUICKSTART).read_text("utf-8"), "utf-8")
-    text = "title: repeatability\nbase: base.yaml\naxes: {u: {path: machine.repeatability, values: [0.1 um, 0.2 um]}}\n"
+    text = (
+        "title: repeatability\nbase: base.yaml\naxes: {u: {path: machine.repeatability, values:"
+        " [0.1 um, 0.2 um]}}\n"
+    )
     file, store = tmp_path / "small.yaml", tmp_path / "small.sqlite"
     file.write_text(text, "utf-8")
     found = bp.sweep(file)
-    assert found.summary.done == 2 and found.summary.before == 0 and repr(found).endswith("2 cells, 2 done, 0 failed>")
+    assert (
+        found.summary.done == 2
+        and found.summary.before == 0
+        and repr(found).endswith("2 cells, 2 done, 0 failed>")
+    )
     assert len(found.to_frame()) == 2 and found.to_dict()["store"] == str(store)
     again = bp.sweep(file)
     assert again.summary.before == 2 and again.remarks == ()

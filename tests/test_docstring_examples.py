@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 
 TOP = Path(__file__).parents[1]
-FOLDERS = {"analysis": "ballplate", "simulator": "ballplate.simulator", "designs": "ballplate.designs"}
+FOLDERS = {
+    "analysis": "ballplate",
+    "simulator": "ballplate.simulator",
+    "designs": "ballplate.designs",
+}
 
 
 def with_examples() -> list[str]:

@@ -17,7 +17,9 @@ TOP = Path(__file__).parents[1]
 
 def python(code: str, folder: Path) -> str:
     """What code prints in a new process."""
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -53,10 +55,14 @@ def test_every_name_of_the_face_is_there_and_told() -> None:
 
 
 def test_every_function_of_the_face_has_an_example_that_calls_it() -> None:
-    """The examples run in tests/test_docstring_examples.py; one that only prepares a call shows nothing."""
+    """The examples run in tests/test_docstring_examples.py; one that only prepares a call shows
+    nothing.
+    """
     functions = [name for name in ballplate.__all__ if name[0].islower()]
     for name in functions:
-        examples = doctest.DocTestFinder(recurse=False).find(getattr(ballplate, name), name)[0].examples
+        examples = (
+            doctest.DocTestFinder(recurse=False).find(getattr(ballplate, name), name)[0].examples
+        )
         assert any(f"{name}(" in one.source and one.want for one in examples), name
     assert len(functions) > 10
 
@@ -80,7 +86,9 @@ def test_all_packages_are_listed() -> None:
 def test_a_wheel_holds_one_package(tmp_path: Path) -> None:
     build = f"from setuptools.build_meta import build_wheel; print(build_wheel({str(tmp_path)!r}))"
     copied = tmp_path / "source"
-    files = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True, check=True).stdout
+    files = subprocess.run(
+        ["git", "ls-files"], cwd=TOP, capture_output=True, text=True, check=True
+    ).stdout
     for name in files.splitlines():
         if (TOP / name).is_file():
             (copied / name).parent.mkdir(parents=True, exist_ok=True)
@@ -89,6 +97,9 @@ def test_a_wheel_holds_one_package(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     assert {name.partition("/")[0].partition("-")[0] for name in names} == {"ballplate"}
-    shipped = {f"ballplate/{path.relative_to(TOP).as_posix()}" for path in (TOP / "designs").rglob("*.yaml")}
+    shipped = {
+        f"ballplate/{path.relative_to(TOP).as_posix()}"
+        for path in (TOP / "designs").rglob("*.yaml")
+    }
     assert shipped <= set(names)
     assert "ballplate/py.typed" in names

@@ -19,9 +19,11 @@ SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 
 
 def answers(problem: CertifiedProblem) -> dict[str, Any]:
-    """The design's rank and uncertainties and, of a problem with readings, the estimate, in SI units.
+    """The design's rank and uncertainties and, of a problem with readings, the estimate, in SI
+    units.
 
-    :raises ExperimentError: the experiment file or the readings beside the problem's file cannot be used.
+    :raises ExperimentError: the experiment file or the readings beside the problem's file cannot be
+        used.
     """
     experiment = load(problem.experiment_file)[0]
     drawn = predict(experiment)
@@ -53,7 +55,11 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
 def _geometry(design: Design, state: State) -> dict[str, Any]:
     """Balls by plate, origins of the positions that are estimated, and probe offsets that are."""
     plates = [np.flatnonzero(design.ball_artefact == k) for k in np.flatnonzero(design.is_plate)]
-    free = np.zeros(len(design.probe_names), bool) if design.free_offsets is None else design.free_offsets.any(axis=1)
+    free = (
+        np.zeros(len(design.probe_names), bool)
+        if design.free_offsets is None
+        else design.free_offsets.any(axis=1)
+    )
     estimated = [k for k in design.posed_positions if not design.held[k].all()]
     return {
         "balls": [state.balls[balls].tolist() for balls in plates],

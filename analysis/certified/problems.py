@@ -1,4 +1,6 @@
-"""Certified problems as they stand in files: a design, readings, and answers computed in many digits."""
+"""Certified problems as they stand in files: a design, readings, and answers computed in many
+digits.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,11 @@ LARGE = 1e150
 
 @dataclass(frozen=True)
 class CertifiedProblem:
-    """A problem and what is certified of it: `answers` as they stand under `certified` in its file, SI units.
+    """A problem and what is certified of it: `answers` as they stand under `certified` in its file,
+    SI units.
 
-    `path` is the problem's file; the same design as an experiment file and its readings lie beside it.
+    `path` is the problem's file; the same design as an experiment file and its readings lie beside
+    it.
     """
 
     name: str
@@ -44,11 +48,17 @@ def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]
     """
     found = {path.stem: path for path in sorted(folder.glob("*.json"))}
     if not found:
-        text = "no certified problems here; name their folder, designs/certified in a checkout, with --designs"
+        text = (
+            "no certified problems here; name their folder, designs/certified in a checkout, with"
+            " --designs"
+        )
         raise ExperimentError([Message(str(folder), 0, 0, "", text)])
     unknown = [name for name in names if name not in found]
     if unknown:
-        messages = [Message(str(folder), 0, 0, "", f'no problem "{name}"; {hint(name, found)}') for name in unknown]
+        messages = [
+            Message(str(folder), 0, 0, "", f'no problem "{name}"; {hint(name, found)}')
+            for name in unknown
+        ]
         raise ExperimentError(messages)
     return [_problem(found[name]) for name in names or found]
 
@@ -56,13 +66,17 @@ def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]
 def _problem(path: Path) -> CertifiedProblem:
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("certified"), dict):
-        raise ExperimentError([Message(str(path), 0, 0, "", 'no certified problem: it has no key "certified"')])
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "", 'no certified problem: it has no key "certified"')]
+        )
     for part in data["certified"].keys() & {"as_drawn", "estimate"}:
         complaint = _complaint(data["certified"][part])
         if complaint:
             text = f"{complaint}; make the file anew, or take the shipped one"
             raise ExperimentError([Message(str(path), 0, 0, f"certified.{part}", text)])
-    return CertifiedProblem(str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"])
+    return CertifiedProblem(
+        str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"]
+    )
 
 
 def _complaint(answers: Any) -> str | None:
@@ -93,7 +107,9 @@ def _is_number(value: Any) -> bool:
 
 def _are_numbers(value: Any) -> bool:
     """A number, or a list or mapping of such."""
-    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    parts = (
+        value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    )
     return _is_number(value) if parts is None else all(map(_are_numbers, parts))
 
 
@@ -104,11 +120,20 @@ def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, 
     """
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("problems"), dict):
-        text = 'expected {"problems": {NAME: {"as_drawn": …, "estimate": …}}} as in docs/documents/certified.md'
+        text = (
+            'expected {"problems": {NAME: {"as_drawn": …, "estimate": …}}} as in'
+            " docs/documents/certified.md"
+        )
         raise ExperimentError([Message(str(path), 0, 0, "", text)])
     known = {path.stem for one in problems for path in one.path.parent.glob("*.json")}
     messages = [
-        Message(str(path), 0, 0, "problems", f'no problem "{shorten(name)}"; {hint(name, sorted(known))}')
+        Message(
+            str(path),
+            0,
+            0,
+            "problems",
+            f'no problem "{shorten(name)}"; {hint(name, sorted(known))}',
+        )
         for name in data["problems"]
         if name not in known
     ]
@@ -130,4 +155,6 @@ def read_json(path: Path) -> Any:
         ) from None
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
-        raise ExperimentError([Message(str(path), line, column, "", f"is not JSON ({error}); write it anew")]) from None
+        raise ExperimentError(
+            [Message(str(path), line, column, "", f"is not JSON ({error}); write it anew")]
+        ) from None

@@ -1,9 +1,9 @@
 """How many digits of certified answers a program finds.
 
-An uncertainty or a sum of squares v with the certified value c has -log10(|v - c| / |c|) digits. Estimates are judged
-against their own uncertainty, which is what matters of them: the largest error of balls counts in units of the
-average U1, that of origins of U2, that of the machine's parameters of U3, and digits are its negative decadic
-logarithm. At most 15 are counted.
+An uncertainty or a sum of squares v with the certified value c has -log10(|v - c| / |c|) digits.
+Estimates are judged against their own uncertainty, which is what matters of them: the largest error
+of balls counts in units of the average U1, that of origins of U2, that of the machine's parameters
+of U3, and digits are its negative decadic logarithm. At most 15 are counted.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ WORDS = {"count": "values", "undetermined": "undetermined"}
 
 @dataclass(frozen=True)
 class Score:
-    """Digits of one quantity of a problem; NaN where the program gives no answer, `note` then says so.
+    """Digits of one quantity of a problem; NaN where the program gives no answer, `note` then says
+    so.
 
     `part` is "as drawn" or "estimate". Counts have all digits or none.
     """
@@ -55,13 +56,22 @@ def all_right(found: Sequence[Score]) -> bool:
     return all(score.digits > 0.0 for score in found)
 
 
-def _part(certified: Mapping[str, Any], found: Mapping[str, Any]) -> Iterator[tuple[str, float, str]]:
+def _part(
+    certified: Mapping[str, Any], found: Mapping[str, Any]
+) -> Iterator[tuple[str, float, str]]:
     if "rank_deficiency" in certified:
         right = found.get("rank_deficiency") == certified["rank_deficiency"]
-        note = "" if right else f"{found.get('rank_deficiency')!r} instead of {certified['rank_deficiency']}"
+        note = (
+            ""
+            if right
+            else f"{found.get('rank_deficiency')!r} instead of {certified['rank_deficiency']}"
+        )
         yield "rank deficiency", MOST_DIGITS if right else 0.0, note
     if "sum_of_squares" in certified:
-        yield _judged("sum of squares", relative_digits(found.get("sum_of_squares"), certified["sum_of_squares"]))
+        yield _judged(
+            "sum of squares",
+            relative_digits(found.get("sum_of_squares"), certified["sum_of_squares"]),
+        )
     uncertainties = certified["uncertainties"]
     for group, symbol in MEASURES.items():
         if symbol in uncertainties and certified.get(group):
@@ -74,9 +84,14 @@ def _part(certified: Mapping[str, Any], found: Mapping[str, Any]) -> Iterator[tu
 
 
 def _group(group: str, found: Any, certified: Any, unit: float) -> tuple[str, float, str]:
-    """Estimates of one kind; parameters of the machine that the program does not tell, or that are none, are named."""
+    """Estimates of one kind; parameters of the machine that the program does not tell, or that are
+    none, are named.
+    """
     if isinstance(found, Mapping) and isinstance(certified, Mapping):
-        for words, names in (("no", set(certified) - set(found)), ("unknown", set(found) - set(certified))):
+        for words, names in (
+            ("no", set(certified) - set(found)),
+            ("unknown", set(found) - set(certified)),
+        ):
             if names:
                 return group, math.nan, f"{words} {listing(sorted(names))}"
     return _judged(group, absolute_digits(found, certified, unit))
@@ -98,7 +113,10 @@ def _uncertainty(symbol: str, certified: Mapping[str, Any], found: Any) -> tuple
             return symbol, 0.0, f"{found[key]!r} {WORDS[key]} instead of {certified[key]}"
     if certified["maximum"] is None:
         return symbol, MOST_DIGITS, "all undetermined"
-    return _judged(symbol, _least([relative_digits(found.get(k), certified[k]) for k in ("maximum", "average")]))
+    return _judged(
+        symbol,
+        _least([relative_digits(found.get(k), certified[k]) for k in ("maximum", "average")]),
+    )
 
 
 def relative_digits(found: Any, certified: float) -> float:
@@ -111,7 +129,8 @@ def relative_digits(found: Any, certified: float) -> float:
 
 
 def absolute_digits(found: Any, certified: Any, unit: float) -> float:
-    """Digits of numbers in lists or mappings of one form, of which the worst counts, in units of `unit`.
+    """Digits of numbers in lists or mappings of one form, of which the worst counts, in units of
+    `unit`.
 
     >>> absolute_digits({"a": [1.0, 2.01]}, {"a": [1.0, 2.0]}, 10.0)
     3.0
@@ -121,9 +140,15 @@ def absolute_digits(found: Any, certified: Any, unit: float) -> float:
     if isinstance(certified, Mapping):
         if not isinstance(found, Mapping) or set(found) != set(certified):
             return math.nan
-        return _least([absolute_digits(found[key], value, unit) for key, value in certified.items()])
+        return _least(
+            [absolute_digits(found[key], value, unit) for key, value in certified.items()]
+        )
     if isinstance(certified, Sequence):
-        if not isinstance(found, Sequence) or isinstance(found, str) or len(found) != len(certified):
+        if (
+            not isinstance(found, Sequence)
+            or isinstance(found, str)
+            or len(found) != len(certified)
+        ):
             return math.nan
         return _least([absolute_digits(a, b, unit) for a, b in zip(found, certified, strict=True)])
     return _digits(_difference(found, certified) / unit)

@@ -11,17 +11,33 @@ from .problems import CertifiedProblem
 from .score import Score
 
 QUANTITIES = (
-    "rank deficiency", "sum of squares", "machine", "balls", "origins", "U1", "U2", "U3", "U4", "U5", "U6",
-)  # fmt: skip
+    "rank deficiency",
+    "sum of squares",
+    "machine",
+    "balls",
+    "origins",
+    "U1",
+    "U2",
+    "U3",
+    "U4",
+    "U5",
+    "U6",
+)
 HEADS = ("rank", "S^2", *QUANTITIES[2:])
 
 
 def score_lines(problems: Sequence[CertifiedProblem], found: Sequence[Score]) -> list[str]:
-    """A line for each problem and part of it, with the digits of every quantity, and notes on what is amiss."""
+    """A line for each problem and part of it, with the digits of every quantity, and notes on what
+    is amiss.
+    """
     rows = [["problem", "", *HEADS]]
     for problem in problems:
         for part in ("as drawn", "estimate"):
-            own = {score.quantity: score for score in found if (score.problem, score.part) == (problem.name, part)}
+            own = {
+                score.quantity: score
+                for score in found
+                if (score.problem, score.part) == (problem.name, part)
+            }
             if own:
                 cells = [_cell(own.get(quantity)) for quantity in QUANTITIES]
                 rows.append([problem.name, part, *cells])

@@ -1,4 +1,6 @@
-"""The rank of every design in some files; one that cannot be used does not keep the others from being checked."""
+"""The rank of every design in some files; one that cannot be used does not keep the others from
+being checked.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CheckedDesign:
-    """The verdict on one design; `place` is where its file should change, None where nothing is to be complained of.
+    """The verdict on one design; `place` is where its file should change, None where nothing is to
+    be complained of.
 
-    `repairs` are changes that would determine what is open, None where nothing is or none were asked for. `goals`
-    tell how each goal that was asked for is met, and `missed` what fails of these and of what is weak.
+    `repairs` are changes that would determine what is open, None where nothing is or none were
+    asked for. `goals` tell how each goal that was asked for is met, and `missed` what fails of
+    these and of what is weak.
     """
 
     plan: Prediction
@@ -48,8 +52,8 @@ class CheckedDesign:
 class Wanted:
     """What designs are checked for besides their rank: `goals`, and whether a weak direction fails.
 
-    With `repairs` changes are looked for that would determine the rest. Without `with_modules` no error model in Python
-    is run, and files that have one are refused.
+    With `repairs` changes are looked for that would determine the rest. Without `with_modules` no
+    error model in Python is run, and files that have one are refused.
     """
 
     goals: tuple[Goal, ...] = ()
@@ -60,7 +64,8 @@ class Wanted:
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """What came of a file: its designs, each variant one of its own, or the reasons why it cannot be used.
+    """What came of a file: its designs, each variant one of its own, or the reasons why it cannot
+    be used.
 
     `doubts` are about what is possible, and unlikely to be meant.
     """
@@ -120,13 +125,17 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
     design = CheckedDesign(plan, None, found, goals, missed, certificate)
     if not design.complaints:
         return design
-    steps: tuple[str, ...] = ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_accuracy",)
+    steps: tuple[str, ...] = (
+        ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_accuracy",)
+    )
     if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
     return replace(design, place=experiment.place(steps))
 
 
-def _goals(experiment: Experiment, goals: Sequence[Goal]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _goals(
+    experiment: Experiment, goals: Sequence[Goal]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """How goals are met, in words, and those of them that are not."""
     found = planned_uncertainty(experiment) if goals else None
     told, missed = [], []

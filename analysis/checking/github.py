@@ -13,7 +13,8 @@ from .check_files import CheckedDesign, CheckedFile
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:
-    """One line for each error of a file and for each design; those as expected are told without a mark.
+    """One line for each error of a file and for each design; those as expected are told without a
+    mark.
 
     Files are named from `workspace`, the top of the repository, where they lie in it.
     """
@@ -28,23 +29,42 @@ def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> lis
         )
         for message in checked.messages
     ]
-    return lines + [line for design in checked.designs for line in _design_lines(checked.file, design, workspace)]
+    return lines + [
+        line
+        for design in checked.designs
+        for line in _design_lines(checked.file, design, workspace)
+    ]
 
 
 def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> list[str]:
     plan = design.plan
-    told = [*verdict_lines(plan.verdict, lengths=plan.lengths), *target_lines(plan.lengths), *scale_lines(plan.scale)]
+    told = [
+        *verdict_lines(plan.verdict, lengths=plan.lengths),
+        *target_lines(plan.lengths),
+        *scale_lines(plan.scale),
+    ]
     suggested = advice_lines(design)
     if design.place is None:
-        # What stands before the name keeps it from being read as a command, and so does the space after a hash.
+        # What stands before the name keeps it from being read as a command, and so does the space
+        # after a hash.
         first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
         start = f"as expected: {file}: {design.plan.label}: "
-        return [in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)]
+        return [
+            in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)
+        ]
     place = design.place
     # The log of a run shows only the message, so that it names the place again.
-    text = "\n".join([f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}", *told[1:], *suggested])
+    text = "\n".join(
+        [
+            f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}",
+            *told[1:],
+            *suggested,
+        ]
+    )
     what = "rank" if plan.verdict.complaint else "goals"
-    return [_error(place.file, place.line, place.column, f"{what} of {plan.label}", text, workspace)]
+    return [
+        _error(place.file, place.line, place.column, f"{what} of {plan.label}", text, workspace)
+    ]
 
 
 def advice_lines(design: CheckedDesign) -> list[str]:
@@ -61,7 +81,8 @@ def _error(file: str, line: int, column: int, title: str, text: str, workspace: 
     if line:
         place |= {"line": str(line), "col": str(column)}
     place["title"] = title
-    return f"::error {','.join(f'{key}={in_property(value)}' for key, value in place.items())}::{in_message(text)}"
+    properties = ",".join(f"{key}={in_property(value)}" for key, value in place.items())
+    return f"::error {properties}::{in_message(text)}"
 
 
 def _named_from(workspace: Path | None, file: str) -> str:

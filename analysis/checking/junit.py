@@ -19,7 +19,8 @@ NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 def junit_report(files: Sequence[CheckedFile]) -> str:
     """One XML document in ASCII: a suite for each file, a case for each design.
 
-    A rank that is not as expected is a failure, and so is a goal that is missed; a file that cannot be used an error.
+    A rank that is not as expected is a failure, and so is a goal that is missed; a file that cannot
+    be used an error.
     """
     suites = [_suite(checked) for checked in files]
     top = ElementTree.Element("testsuites", {"name": "ballplate check", **_totals(suites)})
@@ -34,7 +35,9 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
     if checked.messages:
         case = ElementTree.Element("testcase", {"classname": file, "name": "experiment file"})
         texts = [_clean(str(message)) for message in checked.messages]
-        error = ElementTree.SubElement(case, "error", {"type": "unusable file", "message": texts[0]})
+        error = ElementTree.SubElement(
+            case, "error", {"type": "unusable file", "message": texts[0]}
+        )
         error.text = "\n".join(texts)
         cases.append(case)
     suite = ElementTree.Element("testsuite", {"name": file, **_counts(cases)})
@@ -44,7 +47,8 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
     case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
-    # Outside attributes a line's end is one, and the log of a build server may take what follows for a command.
+    # Outside attributes a line's end is one, and the log of a build server may take what follows
+    # for a command.
     told = [_clean(in_one_line(line)) for line in (*design.plan.lines(), *advice_lines(design))]
     if design.place is None:
         ElementTree.SubElement(case, "system-out").text = "\n".join(told)
@@ -62,11 +66,19 @@ def _counts(cases: Sequence[ElementTree.Element]) -> dict[str, str]:
     def having(tag: str) -> str:
         return str(sum(case.find(tag) is not None for case in cases))
 
-    return {"tests": str(len(cases)), "failures": having("failure"), "errors": having("error"), "skipped": "0"}
+    return {
+        "tests": str(len(cases)),
+        "failures": having("failure"),
+        "errors": having("error"),
+        "skipped": "0",
+    }
 
 
 def _totals(suites: Sequence[ElementTree.Element]) -> dict[str, str]:
-    return {key: str(sum(int(suite.get(key, "0")) for suite in suites)) for key in ("tests", "failures", "errors")}
+    return {
+        key: str(sum(int(suite.get(key, "0")) for suite in suites))
+        for key in ("tests", "failures", "errors")
+    }
 
 
 def _clean(text: str) -> str:

@@ -46,18 +46,38 @@ def parser() -> argparse.ArgumentParser:
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
-        epilog="Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be used, 70 an "
-        "error of the program itself, 130 and 143 interrupted.",
+        epilog=(
+            "Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot be"
+            " used, 70 an error of the program itself, 130 and 143 interrupted."
+        ),
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     top.add_argument(
         "--print-completion",
         action=PrintCompletion,
         choices=SHELLS,
-        help="print a script with which a shell completes commands, options, choices and names of files, and leave",
+        help=(
+            "print a script with which a shell completes commands, options, choices and names of"
+            " files, and leave"
+        ),
     )
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
-    experiments = (check, run, plan, reach, lengths, reliability, simulate, fit, compare, sweep, export, report)
+    commands = top.add_subparsers(
+        title="commands", metavar="COMMAND", dest="command", required=True
+    )
+    experiments = (
+        check,
+        run,
+        plan,
+        reach,
+        lengths,
+        reliability,
+        simulate,
+        fit,
+        compare,
+        sweep,
+        export,
+        report,
+    )
     for module in (*experiments, map, spline, reproduce, schema, init):
         module.add_parser(commands)
     for command in commands.choices.values():
@@ -134,7 +154,10 @@ def _run(options: argparse.Namespace) -> int:
         print_errors(error.messages, options)
         return BAD_FILE
     except InternalError as error:
-        print(f"internal error: {error}. Please report it with the file and the command.", file=sys.stderr)
+        print(
+            f"internal error: {error}. Please report it with the file and the command.",
+            file=sys.stderr,
+        )
         return INTERNAL
     except Exception as error:
         from .memory import no_memory
@@ -154,9 +177,15 @@ def _told(error: OSError, options: argparse.Namespace) -> str:
     try:
         os.getcwd()
     except FileNotFoundError:
-        return f"ballplate {options.command}: the current folder is not there any more; change to another"
+        return (
+            f"ballplate {options.command}: the current folder is not there any more; change to"
+            " another"
+        )
     where = error.filename or f"ballplate {options.command}"
-    return f"{where}: cannot be used ({error.strerror or error}); check the name, the permissions and the room there"
+    return (
+        f"{where}: cannot be used ({error.strerror or error}); check the name, the permissions and"
+        " the room there"
+    )
 
 
 class _Parser(argparse.ArgumentParser):
@@ -175,13 +204,22 @@ class _Parser(argparse.ArgumentParser):
     @property
     def commands(self) -> dict[str, _Parser]:
         """The parsers of the commands, by name."""
-        return next(dict(one.choices) for one in self._actions if isinstance(one, argparse._SubParsersAction))
+        return next(
+            dict(one.choices)
+            for one in self._actions
+            if isinstance(one, argparse._SubParsersAction)
+        )
 
     def meant_by(self, unknown: Sequence[str]) -> str:
         """Tell which of the command's options the unknown ones are probably meant for."""
         from ballplate.simulator.inputs.settings import nearest
 
-        known = [option for action in self._actions for option in action.option_strings if option.startswith("--")]
+        known = [
+            option
+            for action in self._actions
+            for option in action.option_strings
+            if option.startswith("--")
+        ]
         meant = [nearest(one.partition("=")[0], known) for one in unknown if one.startswith("--")]
         told = ", ".join(f'"{one}"' for one in dict.fromkeys(meant) if one is not None)
         return f"; did you mean {told}?" if told else ""
@@ -192,7 +230,9 @@ class _Parser(argparse.ArgumentParser):
         if action.choices is not None and value not in action.choices:
             meant = nearest(str(value), [str(one) for one in action.choices])
             if meant is not None:
-                raise argparse.ArgumentError(action, f'invalid choice: {value!r}; did you mean "{meant}"?')
+                raise argparse.ArgumentError(
+                    action, f'invalid choice: {value!r}; did you mean "{meant}"?'
+                )
         super()._check_value(action, value)
 
     def error(self, message: str) -> NoReturn:

@@ -12,7 +12,9 @@ FORM = "{n_fmt}/{total_fmt} {desc}, {elapsed} so far, {remaining} left{postfix}"
 
 
 class Bar(tqdm):
-    """A bar that neither starts a thread nor makes a lock for other processes, which a command would have to end."""
+    """A bar that neither starts a thread nor makes a lock for other processes, which a command
+    would have to end.
+    """
 
     monitor_interval = 0
     _lock = RLock()
@@ -21,7 +23,14 @@ class Bar(tqdm):
         form = "|{bar}| " + FORM
         # Sizes are given, as tqdm draws nothing on a terminal that does not know its own.
         super().__init__(
-            desc=what, total=total, initial=before, miniters=1, leave=False, ncols=width(), nrows=2, bar_format=form
+            desc=what,
+            total=total,
+            initial=before,
+            miniters=1,
+            leave=False,
+            ncols=width(),
+            nrows=2,
+            bar_format=form,
         )
 
 

@@ -21,42 +21,63 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "check",
         help="judge whether designs determine all their parameters",
-        description="Judge the rank of each design, and tell which share of lengths is within its target and what "
-        "carries its scale. The exit status is 0 if every deficiency is the one that the file expects (none, where it "
-        "says nothing), every --goal is met and, with --fail-weak, nothing is weakly determined, otherwise 1; it is 3 "
-        "if a file cannot be used, and the others are then checked nevertheless.",
+        description=(
+            "Judge the rank of each design, and tell which share of lengths is within its target"
+            " and what carries its scale. The exit status is 0 if every deficiency is the one that"
+            " the file expects (none, where it says nothing), every --goal is met and, with"
+            " --fail-weak, nothing is weakly determined, otherwise 1; it is 3 if a file cannot be"
+            " used, and the others are then checked nevertheless."
+        ),
     )
     add_file(parser, several=True)
     parser.epilog = (
-        "FILE may be a pattern such as designs/**/*.yaml, in which ** stands for any folders; files in folders named "
-        "sweeps or machines are then left out."
+        "FILE may be a pattern such as designs/**/*.yaml, in which ** stands for any folders; files"
+        " in folders named sweeps or machines are then left out."
     )
     parser.add_argument(
         "--format",
         choices=FORMATS,
         default="text",
-        help="text (default); github: workflow commands of GitHub Actions, which mark lines of a pull request; junit: "
-        "an XML report for build servers; json: an object, or an array of them for several experiments, in metres and "
-        "radians",
+        help=(
+            "text (default); github: workflow commands of GitHub Actions, which mark lines of a"
+            " pull request; junit: an XML report for build servers; json: an object, or an array of"
+            " them for several experiments, in metres and radians"
+        ),
     )
-    parser.add_argument("--json", action="store_const", dest="format", const="json", help="the same as --format json")
+    parser.add_argument(
+        "--json",
+        action="store_const",
+        dest="format",
+        const="json",
+        help="the same as --format json",
+    )
     parser.add_argument(
         "--suggest",
         action="store_true",
-        help="tell the cheapest changes after which nothing is undetermined or weakly determined, each verified",
+        help=(
+            "tell the cheapest changes after which nothing is undetermined or weakly determined,"
+            " each verified"
+        ),
     )
     parser.add_argument(
         "--goal",
         action="append",
         default=[],
-        help="what a design must reach, too, as in ballplate reach: lengths (U6 within target_accuracy), tasks, or a "
-        'quantity such as "U6 average 0.5 um"; may be repeated',
+        help=(
+            "what a design must reach, too, as in ballplate reach: lengths (U6 within"
+            ' target_accuracy), tasks, or a quantity such as "U6 average 0.5 um"; may be repeated'
+        ),
     )
     parser.add_argument(
-        "--share", metavar="95%", type=percentage, help="of the lengths that are to be within, with --goal lengths"
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="of the lengths that are to be within, with --goal lengths",
     )
     parser.add_argument(
-        "--fail-weak", action="store_true", help="let a design with a weakly determined direction fail, too"
+        "--fail-weak",
+        action="store_true",
+        help="let a design with a weakly determined direction fail, too",
     )
     parser.add_argument(
         "--no-modules",

@@ -19,9 +19,19 @@ if TYPE_CHECKING:
 
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
     """Add the experiment file, or several of them, and the choice of a variant."""
-    parser.add_argument("files", metavar="FILE", nargs="+" if several else 1, type=Path, help="experiment file (YAML)")
     parser.add_argument(
-        "--variant", metavar="NAME", action="append", default=[], help="only this variant; may be repeated"
+        "files",
+        metavar="FILE",
+        nargs="+" if several else 1,
+        type=Path,
+        help="experiment file (YAML)",
+    )
+    parser.add_argument(
+        "--variant",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="only this variant; may be repeated",
     )
 
 
@@ -30,7 +40,10 @@ def add_json(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print JSON in metres and radians: an object, or an array of them for several experiments",
+        help=(
+            "print JSON in metres and radians: an object, or an array of them for several"
+            " experiments"
+        ),
     )
 
 
@@ -47,7 +60,9 @@ def trial_count(text: str) -> int:
 
     found = count(text)
     if found > MOST_TRIALS:
-        raise ArgumentTypeError(f"{found} data sets are too many; at most {MOST_TRIALS} are possible")
+        raise ArgumentTypeError(
+            f"{found} data sets are too many; at most {MOST_TRIALS} are possible"
+        )
     return found
 
 
@@ -90,7 +105,8 @@ def _picture(text: str) -> Path:
 
 
 def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
-    """Experiments of all files, every variant one of its own, less those not chosen; with pools for `planning`.
+    """Experiments of all files, every variant one of its own, less those not chosen; with pools for
+    `planning`.
 
     :raises ExperimentError: the errors of all files together.
     """
@@ -108,7 +124,9 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
     if messages:
         raise ExperimentError(messages)
     if options.variant:
-        unknown = unknown_variants(options.files, options.variant, {experiment.name for experiment in found})
+        unknown = unknown_variants(
+            options.files, options.variant, {experiment.name for experiment in found}
+        )
         if unknown:
             raise ExperimentError(unknown)
         found = [experiment for experiment in found if experiment.name in options.variant]
@@ -139,12 +157,20 @@ def print_lines(lines: Sequence[str]) -> None:
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
     for line in map(in_one_line, lines):
         is_sentence = "  " not in line.strip()
-        wrapped = textwrap.wrap(line, width, subsequent_indent="  ") if width and is_sentence else [line]
+        wrapped = (
+            textwrap.wrap(line, width, subsequent_indent="  ") if width and is_sentence else [line]
+        )
         print("\n".join(wrapped or [""]))
     sys.stdout.flush()
 
 
 def print_json(results: list[dict[str, Any]]) -> None:
     """One object by itself, several as an array."""
-    json.dump(results[0] if len(results) == 1 else results, sys.stdout, indent=2, allow_nan=False, ensure_ascii=False)
+    json.dump(
+        results[0] if len(results) == 1 else results,
+        sys.stdout,
+        indent=2,
+        allow_nan=False,
+        ensure_ascii=False,
+    )
     print()

@@ -13,21 +13,35 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "compare",
         help="compare a rival estimator with the full one on synthetic data",
-        description="Estimate synthetic data sets of the file's true machine with the full estimator and with one that "
-        "uses distances or lengths alone, and tell how far the distances that both correct are apart (NPL Report "
-        "CISE 15/98, section 6.2.7). The exit status is 0 if all estimates converged, otherwise 1.",
+        description=(
+            "Estimate synthetic data sets of the file's true machine with the full estimator and"
+            " with one that uses distances or lengths alone, and tell how far the distances that"
+            " both correct are apart (NPL Report CISE 15/98, section 6.2.7). The exit status is 0"
+            " if all estimates converged, otherwise 1."
+        ),
     )
     add_file(parser, several=True)
-    parser.add_argument("--trials", metavar="N", type=trial_count, default=100, help="number of data sets; default 100")
+    parser.add_argument(
+        "--trials",
+        metavar="N",
+        type=trial_count,
+        default=100,
+        help="number of data sets; default 100",
+    )
     parser.add_argument(
         "--estimator",
         choices=("distances", "cresto", "kruth", "length-equations", "sphere-then-metric"),
         default="distances",
-        help="default: distances; of ball bars and Bryan gauges length-equations or sphere-then-metric",
+        help=(
+            "default: distances; of ball bars and Bryan gauges length-equations or"
+            " sphere-then-metric"
+        ),
     )
     add_pairs(parser)
     parser.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
-    parser.add_argument("--points", metavar="N", type=_points, default=200, help="pairs of points; default 200")
+    parser.add_argument(
+        "--points", metavar="N", type=_points, default=200, help="pairs of points; default 200"
+    )
     for key, words in (("rms", "root mean square"), ("maximum", "largest difference")):
         parser.add_argument(
             f"--published-{key}",
@@ -44,8 +58,10 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--pairs",
         choices=PAIR_SETS,
-        help="pairs of balls whose distances are used; default: braced for grids (neighbours along rows, columns and "
-        "one diagonal, and all corners), otherwise all",
+        help=(
+            "pairs of balls whose distances are used; default: braced for grids (neighbours along"
+            " rows, columns and one diagonal, and all corners), otherwise all"
+        ),
     )
     parser.add_argument(
         "--across-probes",
@@ -59,7 +75,9 @@ def _points(text: str) -> int:
 
     found = count(text)
     if found > MOST_POINTS:
-        raise ArgumentTypeError(f"{found} pairs of points are too many; at most {MOST_POINTS} are possible")
+        raise ArgumentTypeError(
+            f"{found} pairs of points are too many; at most {MOST_POINTS} are possible"
+        )
     return found
 
 
@@ -73,7 +91,9 @@ def _length(text: str) -> float:
 
 
 def run(options: Namespace) -> int:
-    """Compare the estimators for all experiments of the files; 1 if an estimate did not converge."""
+    """Compare the estimators for all experiments of the files; 1 if an estimate did not
+    converge.
+    """
     from ..estimators.distances import compare_estimators, comparison_data, comparison_lines
     from .common import experiments, print_json, print_lines
     from .progress import progress
@@ -94,7 +114,9 @@ def run(options: Namespace) -> int:
             )
         found.append(comparison)
         if not options.json:
-            print_lines([*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)])
+            print_lines(
+                [*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)]
+            )
     if options.json:
         print_json([comparison_data(comparison, published) for comparison in found])
     return 0 if not any(comparison.failed for comparison in found) else 1

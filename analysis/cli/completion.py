@@ -17,7 +17,9 @@ BAD_FILE = 3
 class PrintCompletion(argparse.Action):
     """Prints the script for a shell, and leaves."""
 
-    def __call__(self, parser: Any, namespace: object, values: object, option_string: object = None) -> None:
+    def __call__(
+        self, parser: Any, namespace: object, values: object, option_string: object = None
+    ) -> None:
         if COMPLETION.is_missing:
             print(f"ballplate: {COMPLETION.told}", file=sys.stderr)
             parser.exit(BAD_FILE)

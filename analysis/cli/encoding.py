@@ -1,4 +1,6 @@
-"""Text for terminals and pipes of any encoding, such as the code pages of Windows, which lack many characters."""
+"""Text for terminals and pipes of any encoding, such as the code pages of Windows, which lack many
+characters.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ DATA_FORMATS = (None, "csv", "github", "html", "json", "junit", "latex", "markdo
 
 
 def readable(error: UnicodeError) -> tuple[str, int]:
-    r"""Write plain characters for those that an encoding lacks, and numbers for those that have none.
+    r"""Write plain characters for those that an encoding lacks, and numbers for those that have
+    none.
 
     >>> "0.5 µm ± 2 µm, Prüfkörper".encode("ascii", HANDLER)
     b'0.5 um +/- 2 um, Pr\\xfcfk\\xf6rper'
@@ -57,14 +60,23 @@ codecs.register_error(HANDLER, readable)
 
 
 def write_readably(*streams: Any) -> None:
-    """Let streams write what their encoding lacks in other characters, rather than fail or print question marks."""
+    """Let streams write what their encoding lacks in other characters, rather than fail or print
+    question marks.
+    """
     for stream in streams:
-        if getattr(stream, "errors", None) in ("strict", "replace", "backslashreplace", "surrogateescape"):
+        if getattr(stream, "errors", None) in (
+            "strict",
+            "replace",
+            "backslashreplace",
+            "surrogateescape",
+        ):
             stream.reconfigure(errors=HANDLER)
 
 
 def write_data_in_utf8(options: Namespace) -> None:
-    """Let standard output be UTF-8 where a program is to read it: JSON, CSV, pages and reports, but on no terminal."""
+    """Let standard output be UTF-8 where a program is to read it: JSON, CSV, pages and reports, but
+    on no terminal.
+    """
     stream: Any = sys.stdout
     is_data = (
         getattr(options, "json", False)

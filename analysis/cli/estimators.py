@@ -1,7 +1,7 @@
 """Estimators beside the full one that `ballplate fit --estimator` offers.
 
-A further one is a function from the options, the experiment and its readings to an `Outcome`, and one line in
-`ESTIMATORS`.
+A further one is a function from the options, the experiment and its readings to an `Outcome`, and
+one line in `ESTIMATORS`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class Outcome:
     """What an estimator has found, as lines of text and as plain data in metres and radians.
 
-    `complaint` says why the exit status is 1 and is empty where all is well; `warnings` do not change the status.
-    `draw` writes the picture of its residuals, None where it has none.
+    `complaint` says why the exit status is 1 and is empty where all is well; `warnings` do not
+    change the status. `draw` writes the picture of its residuals, None where it has none.
     """
 
     lines: list[str]
@@ -35,10 +35,19 @@ class Outcome:
 Estimator = Callable[[Namespace, "Experiment", "ObservedReadings"], Outcome]
 
 
-def _of_distances(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
+def _of_distances(
+    options: Namespace, experiment: Experiment, observed: ObservedReadings
+) -> Outcome:
     from ..estimators.distances import fit_rival, rival_fit_data, rival_fit_lines
 
-    found = fit_rival(experiment, observed, options.estimator, options.pairs, options.across_probes, options.monomials)
+    found = fit_rival(
+        experiment,
+        observed,
+        options.estimator,
+        options.pairs,
+        options.across_probes,
+        options.monomials,
+    )
     complaint = ""
     if found.solution.status != "converged":
         complaint = f"the estimate has {found.solution.status}; see the record of iterations"
@@ -66,19 +75,33 @@ def _reversal(options: Namespace, experiment: Experiment, observed: ObservedRead
     return Outcome(reversal_lines(found), reversal_data(found), complaint, found.warnings, draw)
 
 
-def _of_length_equations(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> Outcome:
-    from ..estimators.length_fits import fit_lengths, has_all_errors, length_fit_data, length_fit_lines
+def _of_length_equations(
+    options: Namespace, experiment: Experiment, observed: ObservedReadings
+) -> Outcome:
+    from ..estimators.length_fits import (
+        fit_lengths,
+        has_all_errors,
+        length_fit_data,
+        length_fit_lines,
+    )
     from ..rank.verdict import rank_complaint
 
     found = fit_lengths(experiment, observed, options.estimator)
     complaint, deficiency = "", found.solution.deficiency
     if not found.solution.converged:
-        complaint = "the estimate has not converged; look for wrong units, balls or positions among the readings"
-    elif has_all_errors(observed.design) and deficiency != (experiment.expected_rank_deficiency or 0):
+        complaint = (
+            "the estimate has not converged; look for wrong units, balls or positions among the"
+            " readings"
+        )
+    elif has_all_errors(observed.design) and deficiency != (
+        experiment.expected_rank_deficiency or 0
+    ):
         complaint = rank_complaint(deficiency, experiment.expected_rank_deficiency)
     remarks = found.remarks
     if options.sigma is not None:
-        remarks += ("--sigma has no effect: uncertainties come from the scatter about the equations",)
+        remarks += (
+            "--sigma has no effect: uncertainties come from the scatter about the equations",
+        )
     return Outcome(length_fit_lines(found), length_fit_data(found), complaint, remarks)
 
 

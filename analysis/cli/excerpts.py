@@ -1,4 +1,6 @@
-"""Errors of files for people at a terminal: below each the line that it is about, with a mark at the place."""
+"""Errors of files for people at a terminal: below each the line that it is about, with a mark at
+the place.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ RED, PLAIN = "\x1b[31m", "\x1b[0m"
 
 
 def has_colour(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether colour is wanted: by NO_COLOR and FORCE_COLOR where one is not empty, else on a terminal that has it.
+    """Whether colour is wanted: by NO_COLOR and FORCE_COLOR where one is not empty, else on a
+    terminal that has it.
 
     Not every console of Windows knows the sequences, and there it has to be asked for.
     """
@@ -37,7 +40,9 @@ def has_colour(stream: TextIO, environment: Mapping[str, str] = os.environ) -> b
 
 
 def print_errors(messages: Iterable[Message], options: Namespace) -> None:
-    """Print errors on standard error, a line each; at a terminal, and with --verbose, with the lines of the files."""
+    """Print errors on standard error, a line each; at a terminal, and with --verbose, with the
+    lines of the files.
+    """
     with_lines = options.verbose or sys.stderr.isatty()
     colour = has_colour(sys.stderr) if with_lines else False
     files: dict[str, list[str]] = {}
@@ -49,7 +54,9 @@ def print_errors(messages: Iterable[Message], options: Namespace) -> None:
             files[message.file] = _lines(Path(message.file))
         lines = files[message.file]
         if message.line <= len(lines):
-            shown, mark = excerpt(lines[message.line - 1], message.column, shutil.get_terminal_size().columns)
+            shown, mark = excerpt(
+                lines[message.line - 1], message.column, shutil.get_terminal_size().columns
+            )
             print(shown, file=sys.stderr)
             print(f"{RED}{mark}{PLAIN}" if colour else mark, file=sys.stderr)
 
@@ -64,7 +71,8 @@ def _lines(path: Path) -> list[str]:
 
 
 def excerpt(line: str, column: int, width: int) -> tuple[str, str]:
-    """A line, or what of it has room in `width` around a column that counts from 1, and a line that marks the column.
+    """A line, or what of it has room in `width` around a column that counts from 1, and a line that
+    marks the column.
 
     >>> print(*excerpt("  repeatability: 1 parsec", 18, 80), sep="\\n")
           repeatability: 1 parsec
@@ -79,13 +87,17 @@ def excerpt(line: str, column: int, width: int) -> tuple[str, str]:
     shown = [" " if one == "\t" else in_one_line(one) for one in f"{line} "[far : at + room]]
     at -= far
     start = 0
-    while sum(map(_columns, shown[start : at + 1])) > max(room // 2, room - sum(map(_columns, shown[at + 1 :]))):
+    while sum(map(_columns, shown[start : at + 1])) > max(
+        room // 2, room - sum(map(_columns, shown[at + 1 :]))
+    ):
         start += 1
     end = len(shown)
     while end > at + 1 and sum(map(_columns, shown[start:end])) > room:
         end -= 1
     indent = " " * INDENT
-    return (indent + "".join(shown[start:end])).rstrip(), indent + " " * sum(map(_columns, shown[start:at])) + "^"
+    return (indent + "".join(shown[start:end])).rstrip(), indent + " " * sum(
+        map(_columns, shown[start:at])
+    ) + "^"
 
 
 def _columns(text: str) -> int:

@@ -23,9 +23,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "export",
         help="write a sweep's results as CSV or Parquet",
-        description="Write a row for each cell of a store and a column for each figure, in metres and radians, with "
-        "the unit in the column's name. Of a damaged store these are the cells that can be read; the exit status then "
-        "is 3.",
+        description=(
+            "Write a row for each cell of a store and a column for each figure, in metres and"
+            " radians, with the unit in the column's name. Of a damaged store these are the cells"
+            " that can be read; the exit status then is 3."
+        ),
     )
     add_store(parser)
     add_output(
@@ -44,8 +46,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def add_store(parser: ArgumentParser) -> None:
     """Add the store and the choice of a sweep in it."""
-    parser.add_argument("store", metavar="STORE", type=Path, help="store that ballplate sweep has made")
-    parser.add_argument("--sweep", metavar="N", type=int, help="which sweep of the store; default: the newest")
+    parser.add_argument(
+        "store", metavar="STORE", type=Path, help="store that ballplate sweep has made"
+    )
+    parser.add_argument(
+        "--sweep", metavar="N", type=int, help="which sweep of the store; default: the newest"
+    )
 
 
 def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
@@ -55,7 +61,10 @@ def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
     from ..sweeps.store import of_other_methods
 
     for text in of_other_methods(keys):
-        print(in_one_line(f"{path}: {text}; run ballplate sweep again to compute them anew"), file=sys.stderr)
+        print(
+            in_one_line(f"{path}: {text}; run ballplate sweep again to compute them anew"),
+            file=sys.stderr,
+        )
 
 
 def warn_of_damage(path: Path, found: Results, count: int) -> bool:
@@ -90,7 +99,11 @@ def run(options: Namespace) -> int:
                 print(error, file=sys.stderr)
                 defined = None
             found = results(store, number, None if defined is None else len(defined["cells"]))
-            count = len(found.cells) + len(found.unreadable) if defined is None else len(defined["cells"])
+            count = (
+                len(found.cells) + len(found.unreadable)
+                if defined is None
+                else len(defined["cells"])
+            )
             is_damaged = warn_of_damage(store.path, found, count) or defined is None
             table = frame_of(found, defined)
             warn_of_other_methods(store.path, found.keys)

@@ -21,9 +21,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "fit",
         help="estimate machine errors, balls and poses from readings",
-        description="Estimate all parameters of an experiment from a CSV file of readings with the columns position, "
-        "ball, probe, x_mm, y_mm, z_mm (or another unit). The exit status is 0 if the estimate converged and the rank "
-        "is as expected, otherwise 1.",
+        description=(
+            "Estimate all parameters of an experiment from a CSV file of readings with the columns"
+            " position, ball, probe, x_mm, y_mm, z_mm (or another unit). The exit status is 0 if"
+            " the estimate converged and the rank is as expected, otherwise 1."
+        ),
     )
     add_file(parser)
     parser.add_argument("readings", metavar="READINGS", type=Path, help="readings (CSV)")
@@ -31,24 +33,34 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--certificate",
         metavar="CSV",
         type=Path,
-        help="values of certificates, priors and probe offsets in place of the experiment file's, as simulate "
-        "--certificate writes them",
+        help=(
+            "values of certificates, priors and probe offsets in place of the experiment file's, as"
+            " simulate --certificate writes them"
+        ),
     )
     parser.add_argument(
         "--sigma",
         choices=("estimated", "given"),
-        help="scale the uncertainties by the residuals, or take them as stated; default: what the file says",
+        help=(
+            "scale the uncertainties by the residuals, or take them as stated; default: what the"
+            " file says"
+        ),
     )
     parser.add_argument(
-        "--monomials", action="store_true", help="report error functions by the coefficients of t, t^2, ... on [0, 1]"
+        "--monomials",
+        action="store_true",
+        help="report error functions by the coefficients of t, t^2, ... on [0, 1]",
     )
     parser.add_argument(
         "--estimator",
         choices=("full", *ESTIMATORS),
         default="full",
-        help="full (default); distances, cresto or kruth, which use distances alone and estimate the machine's "
-        "parameters only; reversal, of a plate in two dimensions and two positions a quarter turn apart; "
-        "length-equations or sphere-then-metric, of ball bars and Bryan gauges",
+        help=(
+            "full (default); distances, cresto or kruth, which use distances alone and estimate the"
+            " machine's parameters only; reversal, of a plate in two dimensions and two positions a"
+            " quarter turn apart; length-equations or sphere-then-metric, of ball bars and Bryan"
+            " gauges"
+        ),
     )
     add_pairs(parser)
     parser.add_argument(
@@ -59,12 +71,18 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--no-offsets",
         action="store_true",
-        help="with reversal: leave out the offsets between the positions, three parameters instead of five",
+        help=(
+            "with reversal: leave out the offsets between the positions, three parameters instead"
+            " of five"
+        ),
     )
     add_picture(
         parser,
         "--plot",
-        help="draw the residuals of a two-dimensional experiment as magnified vectors (.svg, .png or .pdf)",
+        help=(
+            "draw the residuals of a two-dimensional experiment as magnified vectors (.svg, .png or"
+            " .pdf)"
+        ),
     )
     add_force(parser)
     add_json(parser)
@@ -80,7 +98,10 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.inputs.messages import in_one_line
     from ballplate.simulator.inputs.settings import listing
     from ballplate.simulator.readings.certificate_files import read_certificate
-    from ballplate.simulator.readings.gross_error_messages import doubts_about_lengths, doubts_about_volume
+    from ballplate.simulator.readings.gross_error_messages import (
+        doubts_about_lengths,
+        doubts_about_volume,
+    )
     from ballplate.simulator.readings.reading_files import read_readings
 
     from ..results.study import fit
@@ -95,21 +116,38 @@ def run(options: Namespace) -> int:
     ):
         if given and options.estimator not in estimators:
             wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
-            print(f"ballplate fit: {option} goes with --estimator {wanted} only; leave it out", file=sys.stderr)
+            print(
+                f"ballplate fit: {option} goes with --estimator {wanted} only; leave it out",
+                file=sys.stderr,
+            )
             return 2
-    if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (".yaml", ".yml"):
-        told = f"the experiment file comes first, then the readings: fit {options.readings} {options.files[0]}"
+    if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (
+        ".yaml",
+        ".yml",
+    ):
+        told = (
+            f"the experiment file comes first, then the readings: fit {options.readings}"
+            f" {options.files[0]}"
+        )
         print(f"ballplate fit: {told}", file=sys.stderr)
         return 2
     experiment = single(options)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
-    if options.plot and (experiment.dimension != 2 or options.estimator not in ("full", "reversal")):
-        text = "--plot draws residuals of readings in two dimensions, by the full estimator or reversal; leave it out"
+    if options.plot and (
+        experiment.dimension != 2 or options.estimator not in ("full", "reversal")
+    ):
+        text = (
+            "--plot draws residuals of readings in two dimensions, by the full estimator or"
+            " reversal; leave it out"
+        )
         print(f"ballplate fit: {text}", file=sys.stderr)
         return 2
     observed = read_readings(options.readings, lay_out(experiment))
-    for what, names in (("planned but not read", observed.missing), ("read but not planned", observed.unplanned)):
+    for what, names in (
+        ("planned but not read", observed.missing),
+        ("read but not planned", observed.unplanned),
+    ):
         if names:
             told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
             print(in_one_line(told), file=sys.stderr)
@@ -120,23 +158,39 @@ def run(options: Namespace) -> int:
         return _run_other(options, experiment, observed)
     result = fit(experiment, observed, options.sigma, options.monomials)
     has_converged = result.solution.status == "converged"
-    is_drawn = not options.plot or not has_converged or write_outputs({options.plot: result.plot}, options.force)
+    is_drawn = (
+        not options.plot
+        or not has_converged
+        or write_outputs({options.plot: result.plot}, options.force)
+    )
     if options.json:
         print_json([result.to_dict()])
     else:
         print_lines(result.lines())
     if not has_converged:
-        text = "see the record of iterations, and look for wrong units, balls or probes among the readings"
-        print(f"the estimate has {result.solution.status} and nothing is made of it: {text}", file=sys.stderr)
+        text = (
+            "see the record of iterations, and look for wrong units, balls or probes among the"
+            " readings"
+        )
+        print(
+            f"the estimate has {result.solution.status} and nothing is made of it: {text}",
+            file=sys.stderr,
+        )
         return 1
     if not is_drawn:
         return 3
     if result.too_large:
         times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
-        cure = "no single mistake explains that: try a richer error model or larger uncertainties, and think of drifts"
+        cure = (
+            "no single mistake explains that: try a richer error model or larger uncertainties, and"
+            " think of drifts"
+        )
         if result.diagnosis.suspects or result.diagnosis.scatter:
             cure = "look at what is suspected"
-        print(f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {cure}", file=sys.stderr)
+        print(
+            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {cure}",
+            file=sys.stderr,
+        )
     for doubt in result.doubts:
         print(f"warning: {doubt}", file=sys.stderr)
     if not result.verdict.as_expected:
@@ -150,7 +204,11 @@ def _run_other(options: Namespace, experiment: Experiment, observed: ObservedRea
     from .common import print_json, print_lines
 
     found = ESTIMATORS[options.estimator](options, experiment, observed)
-    is_drawn = not options.plot or not found.draw or write_outputs({options.plot: found.draw}, options.force)
+    is_drawn = (
+        not options.plot
+        or not found.draw
+        or write_outputs({options.plot: found.draw}, options.force)
+    )
     if options.json:
         print_json([found.data])
     else:

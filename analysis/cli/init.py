@@ -14,11 +14,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "init",
         help="write a commented experiment or machine file to start from",
-        description="Write an experiment file with comments on what may be said, ready for check and run, or a machine "
-        "file, ready for map.",
+        description=(
+            "Write an experiment file with comments on what may be said, ready for check and run,"
+            " or a machine file, ready for map."
+        ),
     )
     add_output(parser, "file", metavar="NAME.yaml", help="file to write")
-    parser.add_argument("--machine", action="store_true", help="write a machine file, for map and kind: machine")
+    parser.add_argument(
+        "--machine", action="store_true", help="write a machine file, for map and kind: machine"
+    )
     add_force(parser)
     parser.set_defaults(run=run)
 
@@ -27,9 +31,13 @@ def run(options: Namespace) -> int:
     """Write the file."""
     from importlib.resources import files
 
-    name, command = ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
+    name, command = (
+        ("machine_template.yaml", "map") if options.machine else ("template.yaml", "run")
+    )
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
-    if not write_outputs({options.file: text_writer(lambda stream: stream.write(text))}, options.force):
+    if not write_outputs(
+        {options.file: text_writer(lambda stream: stream.write(text))}, options.force
+    ):
         return BAD_FILE
     note(options, f"{options.file} written; next: ballplate {command} {options.file}")
     return 0

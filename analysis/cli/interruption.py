@@ -1,4 +1,6 @@
-"""Signals that ask a command to end: SIGINT, as of Ctrl-C, and SIGTERM. They are answered wherever they come."""
+"""Signals that ask a command to end: SIGINT, as of Ctrl-C, and SIGTERM. They are answered wherever
+they come.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +23,15 @@ if TYPE_CHECKING:
     from socket import socket
 
 # Exit status and what is told, by signal; SIGBREAK is Ctrl-Break on Windows.
-ANSWERS = {"SIGINT": (130, "interrupted"), "SIGBREAK": (130, "interrupted"), "SIGTERM": (143, "terminated")}
+ANSWERS = {
+    "SIGINT": (130, "interrupted"),
+    "SIGBREAK": (130, "interrupted"),
+    "SIGTERM": (143, "terminated"),
+}
 # Seconds that a command has for an orderly end.
 ORDERLY_LIMIT = 0.5
-# Seconds within which signals count as one: programs in between, such as `timeout`, send what the terminal sends too.
+# Seconds within which signals count as one: programs in between, such as `timeout`, send what the
+# terminal sends too.
 SAME_SIGNAL_LIMIT = 0.1
 # Seconds that the last words may take, where nobody reads standard error.
 WORDS_LIMIT = 0.15
@@ -38,7 +45,11 @@ def files_named(options: Namespace) -> dict[Path, Signature | None]:
     """The files that the options of a command name, and whether they are there."""
     from pathlib import Path
 
-    values = [one for value in vars(options).values() for one in (value if isinstance(value, list) else [value])]
+    values = [
+        one
+        for value in vars(options).values()
+        for one in (value if isinstance(value, list) else [value])
+    ]
     return {path: _signature(path) for path in values if isinstance(path, Path)}
 
 
@@ -52,13 +63,17 @@ def _signature(path: Path) -> Signature | None:
 
 def written(before: Mapping[Path, Signature | None]) -> str:
     """Tell which of the files are new or others than before."""
-    names = [str(path) for path, signature in before.items() if _signature(path) not in (None, signature)]
+    names = [
+        str(path) for path, signature in before.items() if _signature(path) not in (None, signature)
+    ]
     return f"written: {', '.join(names)}" if names else "no file was written"
 
 
 @dataclass
 class Interruption:
-    """The first signal of those answered that has come, and what tells what the command keeps if it ends now."""
+    """The first signal of those answered that has come, and what tells what the command keeps if it
+    ends now.
+    """
 
     came: int | None = None
     kept: Callable[[], str] = partial(written, {})
@@ -67,7 +82,9 @@ class Interruption:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Let signals raise KeyboardInterrupt from now on, and those that have come already, until the end."""
+        """Let signals raise KeyboardInterrupt from now on, and those that have come already, until
+        the end.
+        """
         self.is_raising = True
         try:
             self.answer()
@@ -78,8 +95,8 @@ class Interruption:
     def answer(self) -> None:
         """Raise KeyboardInterrupt if there was a signal.
 
-        It is for long work to call now and then: an interruption that comes in a place that lets no exception out, such
-        as a finaliser or a library's callback, would go unanswered.
+        It is for long work to call now and then: an interruption that comes in a place that lets no
+        exception out, such as a finaliser or a library's callback, would go unanswered.
         """
         if self.came is not None:
             raise KeyboardInterrupt
@@ -99,13 +116,16 @@ class Interruption:
 
 @contextmanager
 def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
-    """Remember the first signal, which raises KeyboardInterrupt if it comes within `Interruption.raising`.
+    """Remember the first signal, which raises KeyboardInterrupt if it comes within
+    `Interruption.raising`.
 
-    In a process of its own the command has `ORDERLY_LIMIT` to end from then on; then, or at a second signal, another
-    thread ends the process. So it ends also in a long call of linear algebra, and where a library has caught the
-    exception. Signals that come after the command's end change nothing, unless the interpreter's takes too long.
+    In a process of its own the command has `ORDERLY_LIMIT` to end from then on; then, or at a
+    second signal, another thread ends the process. So it ends also in a long call of linear
+    algebra, and where a library has caught the exception. Signals that come after the command's end
+    change nothing, unless the interpreter's takes too long.
 
-    A process that was started with a signal ignored, as shells start those in the background, goes on ignoring it.
+    A process that was started with a signal ignored, as shells start those in the background, goes
+    on ignoring it.
     """
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
@@ -127,8 +147,8 @@ def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
     try:
         if is_own_process and before:
             _watch(interruption, frozenset(before))
-            # What is registered first comes last, when nothing is left to end but the interpreter, which would give
-            # signals back their usual effect.
+            # What is registered first comes last, when nothing is left to end but the interpreter,
+            # which would give signals back their usual effect.
             atexit.register(_ignore, tuple(before))
         yield interruption
     finally:
@@ -186,8 +206,8 @@ def _wait(reader: socket, numbers: frozenset[int]) -> int:
 def leave(status: int) -> NoReturn:
     """End the process and its workers at once.
 
-    The interpreter's own end would wait for what is under way, and may take an interruption that passed through
-    generated code for one that nobody has answered.
+    The interpreter's own end would wait for what is under way, and may take an interruption that
+    passed through generated code for one that nobody has answered.
     """
     try:
         # Not imported: the main thread may be about to, and would be waited for.

@@ -27,14 +27,22 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "lengths",
         help="map the uncertainty of lengths over the volume against a target",
-        description="Compute the standard uncertainty u of the length between every two points of a grid over the "
-        "volume, measured on the corrected machine, and compare it and the expanded uncertainty k u with the target by "
-        "length, direction and place. A target is meant for u, or for U = k u where the file states a coverage_factor. "
-        "The scatter of the readings that will measure a length is no part of u unless asked for. The exit status is "
-        "0 if the rank is as expected and, with --fail, all lengths are within the target, otherwise 1.",
+        description=(
+            "Compute the standard uncertainty u of the length between every two points of a grid"
+            " over the volume, measured on the corrected machine, and compare it and the expanded"
+            " uncertainty k u with the target by length, direction and place. A target is meant for"
+            " u, or for U = k u where the file states a coverage_factor. The scatter of the"
+            " readings that will measure a length is no part of u unless asked for. The exit status"
+            " is 0 if the rank is as expected and, with --fail, all lengths are within the target,"
+            " otherwise 1."
+        ),
     )
     add_file(parser)
-    parser.add_argument("--target", metavar="LENGTH", help='instead of target_accuracy, such as "0.5 um + L/1000000"')
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+    )
     parser.add_argument(
         "--grid",
         metavar="N",
@@ -42,7 +50,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         default=(6,),
         help="points along each axis, or such as 6,5,4; default 6",
     )
-    parser.add_argument("--probe", metavar="NAME", help="probe that measures them; default evaluation.probe")
+    parser.add_argument(
+        "--probe", metavar="NAME", help="probe that measures them; default evaluation.probe"
+    )
     parser.add_argument(
         "--coverage-factor",
         metavar="K",
@@ -50,10 +60,14 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="of the expanded uncertainty; default that of the file, or 2",
     )
     parser.add_argument(
-        "--fail", action="store_true", help="end with exit status 1 unless all lengths are within the target"
+        "--fail",
+        action="store_true",
+        help="end with exit status 1 unless all lengths are within the target",
     )
     parser.add_argument(
-        "--with-repeatability", action="store_true", help="count the scatter of the two readings of a length, too"
+        "--with-repeatability",
+        action="store_true",
+        help="count the scatter of the two readings of a length, too",
     )
     add_output(parser, "--csv", metavar="FILE", help="write a line for each point of the grid")
     add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")
@@ -65,11 +79,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def _grid(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
-    if len(parts) <= 3 and all(part.isascii() and part.isdigit() and len(part) < 6 for part in parts):
+    if len(parts) <= 3 and all(
+        part.isascii() and part.isdigit() and len(part) < 6 for part in parts
+    ):
         counts = tuple(map(int, parts))
         if min(counts) >= 2:
             return counts
-    raise ArgumentTypeError(f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"')
+    raise ArgumentTypeError(
+        f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
+    )
 
 
 def _factor(text: str) -> float:
@@ -95,7 +113,10 @@ def run(options: Namespace) -> int:
         return WRONG_USAGE
     count = math.comb(math.prod(settings.grid), 2)
     if options.pairs is not None and count > MOST_PAIRS:
-        told = f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make --grid coarser"
+        told = (
+            f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
+            " --grid coarser"
+        )
         print(f"ballplate lengths: {told}", file=sys.stderr)
         return WRONG_USAGE
     with progress(options) as shown:
@@ -135,11 +156,17 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
     except QuantityError as error:
         return f"--target: {error}"
     if target is None:
-        return 'the file states no target_accuracy; add it, or give --target, such as "0.5 um + L/1000000"'
+        return (
+            'the file states no target_accuracy; add it, or give --target, such as "0.5 um +'
+            ' L/1000000"'
+        )
     d = experiment.dimension
     grid = options.grid * d if len(options.grid) == 1 else options.grid
     if len(grid) != d:
-        return f"--grid has {len(grid)} numbers, but the experiment has {d} dimensions; give one, or {d}"
+        return (
+            f"--grid has {len(grid)} numbers, but the experiment has {d} dimensions; give one,"
+            f" or {d}"
+        )
     if math.prod(grid) > MOST_POINTS:
         return f"a grid of {math.prod(grid)} points is too fine; at most {MOST_POINTS} are possible"
     probe = options.probe or experiment.evaluation.probe

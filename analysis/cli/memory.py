@@ -27,15 +27,20 @@ SMALLER = {
 
 
 def no_memory(error: BaseException, options: Namespace) -> str | None:
-    """What to tell the user where an error comes of a want of memory, here or in a worker; None of any other error."""
+    """What to tell the user where an error comes of a want of memory, here or in a worker; None of
+    any other error.
+    """
     name = options.run.__module__.rpartition(".")[2]
-    named = [value for key in ("files", "file", "store") for value in _paths(getattr(options, key, None))]
+    named = [
+        value for key in ("files", "file", "store") for value in _paths(getattr(options, key, None))
+    ]
     place = ", ".join(map(str, named)) or f"ballplate {name}"
     smaller = SMALLER.get(name, "close other programs")
     # Worker processes that the system has ended; loading the class for it would take memory.
     if any(kind.__name__ == "BrokenProcessPool" for kind in type(error).__mro__):
         return (
-            f"{place}: a worker process of {name} was ended from outside, as a rule because memory ran short; {smaller}"
+            f"{place}: a worker process of {name} was ended from outside, as a rule because memory"
+            f" ran short; {smaller}"
         )
     want = want_of_memory(error)
     return None if want is None else f"{place}: {name} {want}; {smaller}"

@@ -1,7 +1,9 @@
-"""Files that a command writes: declared with its options, checked before any work, and put in place whole or not.
+"""Files that a command writes: declared with its options, checked before any work, and put in place
+whole or not.
 
-An option that names a file to be written is added by `add_output`. `check_outputs` then refuses, before the command
-runs, whatever cannot be written or would destroy something; `write_outputs` writes.
+An option that names a file to be written is added by `add_output`. `check_outputs` then refuses,
+before the command runs, whatever cannot be written or would destroy something; `write_outputs`
+writes.
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ FORCE = "overwrite files that there are already"
 NAMING = ("files", "file", "earlier")
 
 # Names of files that a process has open; the group is the number of one of this process.
-OPEN_FILE = re.compile(r"/dev/(?:stdout|stderr|fd/([0-9]+))|/proc/(?:self/fd/([0-9]+)|[^/]+/(?:task/[^/]+/)?fd/[0-9]+)")
+OPEN_FILE = re.compile(
+    r"/dev/(?:stdout|stderr|fd/([0-9]+))|/proc/(?:self/fd/([0-9]+)|[^/]+/(?:task/[^/]+/)?fd/[0-9]+)"
+)
 
 # What belongs to a store besides its file.
 BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
@@ -43,7 +47,9 @@ Writer = Callable[[Path], object]
 
 @dataclass(frozen=True)
 class Needed:
-    """Modules beside those that every installation has: for `what`, and the extra that installs them."""
+    """Modules beside those that every installation has: for `what`, and the extra that installs
+    them.
+    """
 
     what: str
     modules: tuple[str, ...]
@@ -54,7 +60,10 @@ class Needed:
         """What is missing, and how to get it."""
         them = "it" if len(self.modules) == 1 else "them"
         names = " and ".join(self.modules)
-        return f"{self.what} {names}; install {them} with: python -m pip install 'ballplate[{self.extra}]'"
+        return (
+            f"{self.what} {names}; install {them} with: python -m pip install"
+            f" 'ballplate[{self.extra}]'"
+        )
 
     @property
     def is_missing(self) -> bool:
@@ -88,7 +97,9 @@ class UsageError(ValueError):
 
 
 class OutputAction(Action):
-    """An option that names a file to be written; `options.outputs` has all of them that are given."""
+    """An option that names a file to be written; `options.outputs` has all of them that are
+    given.
+    """
 
     def __init__(
         self,
@@ -100,9 +111,17 @@ class OutputAction(Action):
         super().__init__(*arguments, **others)
         self.needed, self.takes_screen = needed, takes_screen
 
-    def __call__(self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: Any = None) -> None:
+    def __call__(
+        self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: Any = None
+    ) -> None:
         setattr(namespace, self.dest, values)
-        output = Output(self.dest, option_string or str(self.metavar), values, self.needed(values), self.takes_screen)
+        output = Output(
+            self.dest,
+            option_string or str(self.metavar),
+            values,
+            self.needed(values),
+            self.takes_screen,
+        )
         others = [one for one in getattr(namespace, "outputs", ()) if one.dest != self.dest]
         namespace.outputs = (*others, output)
 
@@ -110,10 +129,12 @@ class OutputAction(Action):
 def add_output(parser: Any, *names: str, metavar: str, help: str, **settings: Any) -> None:
     """Add an option that names a file to be written.
 
-    ``needed`` gives, by the file's name, what writing it needs beside what every installation has; with
-    ``takes_screen`` the name - means standard output.
+    ``needed`` gives, by the file's name, what writing it needs beside what every installation has;
+    with ``takes_screen`` the name - means standard output.
     """
-    parser.add_argument(*names, action=OutputAction, metavar=metavar, help=help, **{"type": Path, **settings})
+    parser.add_argument(
+        *names, action=OutputAction, metavar=metavar, help=help, **{"type": Path, **settings}
+    )
 
 
 def add_force(parser: Any) -> None:
@@ -122,12 +143,15 @@ def add_force(parser: Any) -> None:
 
 
 def check_outputs(options: Namespace) -> None:
-    """Refuse files that cannot be written, or in whose place something stands, before the work and not after it.
+    """Refuse files that cannot be written, or in whose place something stands, before the work and
+    not after it.
 
-    Devices and pipes are written as they are, and are not checked. Whatever else the options name is read.
+    Devices and pipes are written as they are, and are not checked. Whatever else the options name
+    is read.
 
     :raises UsageError: an output is an input, another output, or where standard output goes.
-    :raises ExperimentError: without `--force` there is one already; one cannot be written; an extra is missing.
+    :raises ExperimentError: without `--force` there is one already; one cannot be written; an extra
+        is missing.
     """
     from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -149,10 +173,14 @@ def check_outputs(options: Namespace) -> None:
 def _refuse_screen(outputs: list[Output]) -> None:
     for one in outputs:
         if str(one.path) == "-":
-            raise UsageError(f"{one.option} - would be standard output, which has the rest; name a file")
+            raise UsageError(
+                f"{one.option} - would be standard output, which has the rest; name a file"
+            )
         found = _status(one.path)
         if found is not None and not _is_in_place(one.path) and _is_standard_output(found):
-            raise UsageError(f"{one.option} {one.path} is where standard output goes; name another file")
+            raise UsageError(
+                f"{one.option} {one.path} is where standard output goes; name another file"
+            )
 
 
 def _refuse_same(outputs: list[Output]) -> None:
@@ -162,18 +190,28 @@ def _refuse_same(outputs: list[Output]) -> None:
         if first.parent == second.parent and first.name.casefold() == second.name.casefold():
             is_same |= _is_case_blind(first.parent)
         if is_same:
-            raise UsageError(f"{one.option} {one.path} and {other.option} {other.path} are the same file; name another")
+            raise UsageError(
+                f"{one.option} {one.path} and {other.option} {other.path} are the same file; name"
+                " another"
+            )
 
 
 def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
-    there = [(one, found) for one in outputs if (found := _status(one.path)) and stat.S_ISREG(found.st_mode)]
+    there = [
+        (one, found)
+        for one in outputs
+        if (found := _status(one.path)) and stat.S_ISREG(found.st_mode)
+    ]
     if not there:
         return
     for path in inputs(options, {one.dest for one in outputs}):
         status = _status(path)
         for one, found in there:
             if status is not None and os.path.samestat(status, found):
-                raise UsageError(f"{one.option} {one.path} would overwrite {path}, which is read; name another file")
+                raise UsageError(
+                    f"{one.option} {one.path} would overwrite {path}, which is read; name another"
+                    " file"
+                )
 
 
 def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
@@ -206,7 +244,8 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
             if found is not None and not force:
                 reasons.append(EXISTS)
             elif found is not None:
-                # Without writing anything; tells of permissions, and of other programs that hold it on Windows.
+                # Without writing anything; tells of permissions, and of other programs that hold it
+                # on Windows.
                 path.open("r+b").close()
             with _tried(_target(path)):
                 pass
@@ -216,11 +255,13 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
 
 
 def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
-    """Let each writer write its file, all of them or, as far as the system allows, none; False after saying why not.
+    """Let each writer write its file, all of them or, as far as the system allows, none; False
+    after saying why not.
 
-    Each is written beside its place under another name and put there only when all have been written to the disk, with
-    the permissions of the file that was there before. A link stays one: what it leads to is replaced. Devices and pipes
-    are written as they are. Without `force` no file is put in the place of another that has come meanwhile.
+    Each is written beside its place under another name and put there only when all have been
+    written to the disk, with the permissions of the file that was there before. A link stays one:
+    what it leads to is replaced. Devices and pipes are written as they are. Without `force` no file
+    is put in the place of another that has come meanwhile.
     """
     from ballplate.simulator.inputs.messages import Message
 
@@ -245,7 +286,9 @@ def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     except (OSError, UnicodeEncodeError, ImportError) as error:
         for one in placed:
             one.unlink(missing_ok=True)
-        kept = "" if _status(path) is None or _is_in_place(path) else "; the file there is as it was"
+        kept = (
+            "" if _status(path) is None or _is_in_place(path) else "; the file there is as it was"
+        )
         print(Message(str(path), 0, 0, "", _cannot(error) + kept), file=sys.stderr)
         return False
     finally:
@@ -281,13 +324,18 @@ def _cannot(error: Exception) -> str:
         errno.ENOTDIR: "check the folder",
         errno.ENOSPC: "make room, or name a file on another disk",
         errno.EDQUOT: "make room, or name a file on another disk",
-        errno.EFBIG: "files may not be so large here; raise the limit, or name a file on another disk",
+        errno.EFBIG: (
+            "files may not be so large here; raise the limit, or name a file on another disk"
+        ),
         errno.EROFS: "name a file on another disk",
         errno.ENAMETOOLONG: "name it shorter",
     }
     remedy = remedies.get(number or 0, "name another file")
     if isinstance(error, PermissionError):
-        remedy = "if another program has it open, close it there; check the permissions, or name another file"
+        remedy = (
+            "if another program has it open, close it there; check the permissions, or name another"
+            " file"
+        )
     return f"cannot be written ({getattr(error, 'strerror', None) or error}); {remedy}"
 
 
@@ -316,7 +364,9 @@ def _target(path: Path) -> Path:
 
 
 def _is_in_place(path: Path) -> bool:
-    """Whether it is a device, a pipe, or an open file of the process's, of which no other can take the place."""
+    """Whether it is a device, a pipe, or an open file of the process's, of which no other can take
+    the place.
+    """
     if OPEN_FILE.fullmatch(os.path.abspath(path)):
         return True
     found = _status(path)
@@ -331,7 +381,9 @@ def _is_standard_output(found: os.stat_result) -> bool:
 
 
 def _is_case_blind(folder: Path) -> bool:
-    """Whether names in a folder that differ in capitals alone mean the same file; False where nothing can be tried."""
+    """Whether names in a folder that differ in capitals alone mean the same file; False where
+    nothing can be tried.
+    """
     try:
         with _tried(folder / "a") as temporary:
             return temporary.with_name(temporary.name.upper()).exists()
@@ -341,7 +393,9 @@ def _is_case_blind(folder: Path) -> bool:
 
 @contextmanager
 def _tried(target: Path) -> Iterator[Path]:
-    """An empty file beside another one, for as long as it takes to see what the folder makes of it."""
+    """An empty file beside another one, for as long as it takes to see what the folder makes of
+    it.
+    """
     path = _beside(target)
     try:
         _make(path)
@@ -362,7 +416,9 @@ def _make(path: Path) -> None:
 
 
 def _settle(temporary: Path, target: Path) -> None:
-    """Give a finished file the permissions of the one whose place it takes, and have all of it on the disk."""
+    """Give a finished file the permissions of the one whose place it takes, and have all of it on
+    the disk.
+    """
     with temporary.open("r+b") as stream:
         os.fsync(stream.fileno())
     before = _status(target)
@@ -385,7 +441,9 @@ def _put(temporary: Path, target: Path, force: bool) -> None:
         except (OSError, NotImplementedError):
             # No hard links on this disk.
             if os.path.lexists(target):
-                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target)) from None
+                raise FileExistsError(
+                    errno.EEXIST, os.strerror(errno.EEXIST), str(target)
+                ) from None
         else:
             return
     os.replace(temporary, target)
@@ -408,7 +466,9 @@ def _write_in_place(path: Path, writer: Writer) -> None:
 
 
 def _in_place(path: Path, found: os.stat_result | None) -> BinaryIO:
-    """A device or pipe to be written, or an open file of the process's, which goes on where it is and loses nothing."""
+    """A device or pipe to be written, or an open file of the process's, which goes on where it is
+    and loses nothing.
+    """
     own = OPEN_FILE.fullmatch(os.path.abspath(path))
     if own is None or found is None or not stat.S_ISREG(found.st_mode):
         return path.open("wb")

@@ -25,10 +25,16 @@ SHEETS = (".html", ".md", ".csv", ".txt")
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "plan",
-        help="choose positions and certificates from a pool, and tell how far from the best possible they are",
-        description="Choose from the pool of an experiment file what makes a criterion smallest within a budget, and "
-        "bound what any choice could reach. Without a budget the choice may cost what the positions of the file "
-        "itself do. The exit status is 0 if the choice determines everything, otherwise 1.",
+        help=(
+            "choose positions and certificates from a pool, and tell how far from the best possible"
+            " they are"
+        ),
+        description=(
+            "Choose from the pool of an experiment file what makes a criterion smallest within a"
+            " budget, and bound what any choice could reach. Without a budget the choice may cost"
+            " what the positions of the file itself do. The exit status is 0 if the choice"
+            " determines everything, otherwise 1."
+        ),
     )
     add_file(parser)
     parser.add_argument(
@@ -39,7 +45,12 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action=_Criterion,
     )
     budget = parser.add_argument_group("budget")
-    budget.add_argument("--hours", metavar="H", type=_hours, help="of laboratory time, with changes between positions")
+    budget.add_argument(
+        "--hours",
+        metavar="H",
+        type=_hours,
+        help="of laboratory time, with changes between positions",
+    )
     budget.add_argument("--positions", metavar="N", type=count, help="at most so many positions")
     budget.add_argument("--readings", metavar="N", type=count, help="at most so many readings")
     again = parser.add_argument_group("a campaign that has begun")
@@ -52,18 +63,25 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     again.add_argument(
         "--moved",
         action="store_true",
-        help="the artefact does not stand any more where it was read last: a position interrupted there can only be "
-        "set up again",
+        help=(
+            "the artefact does not stand any more where it was read last: a position interrupted"
+            " there can only be set up again"
+        ),
     )
     again.add_argument(
         "--from",
         dest="earlier",
         metavar="FILE",
         type=Path,
-        help="a design chosen from this pool before, to compare with and go on from; default: the positions as drawn",
+        help=(
+            "a design chosen from this pool before, to compare with and go on from; default: the"
+            " positions as drawn"
+        ),
     )
     output = parser.add_argument_group("output")
-    add_output(output, "-o", "--output", metavar="YAML", help="write the choice as an experiment file")
+    add_output(
+        output, "-o", "--output", metavar="YAML", help="write the choice as an experiment file"
+    )
     add_output(
         output,
         "--sheet",
@@ -71,13 +89,20 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=_sheet,
         help="write the run sheet: .html to print, .md, .csv or .txt",
     )
-    output.add_argument("--curve", action="store_true", help="plan for smaller and larger budgets as well")
+    output.add_argument(
+        "--curve", action="store_true", help="plan for smaller and larger budgets as well"
+    )
     add_picture(output, "--plot", help="draw the choice, its bound, gains, and the curve")
     add_force(output)
     add_json(parser)
-    parser.add_argument("--seed", type=seed, default=1, help="of the random starts of the search; default 1")
     parser.add_argument(
-        "--workers", metavar="N", type=count, help="processes that share the work; default: one for each processor"
+        "--seed", type=seed, default=1, help="of the random starts of the search; default 1"
+    )
+    parser.add_argument(
+        "--workers",
+        metavar="N",
+        type=count,
+        help="processes that share the work; default: one for each processor",
     )
     parser.set_defaults(run=run)
 
@@ -85,7 +110,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 class _Criterion(Action):
     """Loads the names of all criteria only where help is printed."""
 
-    def __call__(self, parser: ArgumentParser, options: Namespace, value: Any, option: str | None = None) -> None:
+    def __call__(
+        self, parser: ArgumentParser, options: Namespace, value: Any, option: str | None = None
+    ) -> None:
         setattr(options, self.dest, value)
 
     @property
@@ -165,7 +192,9 @@ def run(options: Namespace) -> int:
         budget = Budget(seconds, options.readings, options.positions)
     request = Request(options.criterion, budget, options.curve, options.seed)
     with progress(options) as shown:
-        found = campaign(experiment, request, offered, earlier, options.workers or processors(), shown.show)
+        found = campaign(
+            experiment, request, offered, earlier, options.workers or processors(), shown.show
+        )
     sheet = found.sheet
     try:
         is_written = _written(found, sheet, options)
@@ -190,10 +219,13 @@ def _written(found: Campaign, sheet: RunSheet, options: Namespace) -> bool:
         from ..planning.experiment_file import experiment_text
 
         header = (
-            f"Chosen by ballplate plan from {options.files[0].name}: {found.criterion}, no more than {found.budget}."
+            f"Chosen by ballplate plan from {options.files[0].name}: {found.criterion}, no more"
+            f" than {found.budget}."
         )
         deficiency = found.left_open or None
-        text = experiment_text(found.experiment, sheet.chosen, header, options.output.parent, None, deficiency)
+        text = experiment_text(
+            found.experiment, sheet.chosen, header, options.output.parent, None, deficiency
+        )
         writers[options.output] = text_writer(lambda stream: stream.write(text))
     if options.sheet is not None:
         told = _sheet_text(options.sheet.suffix.lower())(found.experiment, sheet)
@@ -215,6 +247,8 @@ def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:
         ".html": lambda experiment, sheet: sheet_page(sheet, experiment, experiment.title),
         ".md": lambda experiment, sheet: sheet_markdown(sheet, experiment.title),
         ".csv": lambda experiment, sheet: sheet_csv(sheet),
-        ".txt": lambda experiment, sheet: "\n".join([experiment.title, "", *sheet_lines(sheet), ""]),
+        ".txt": lambda experiment, sheet: "\n".join(
+            [experiment.title, "", *sheet_lines(sheet), ""]
+        ),
     }
     return forms[suffix]

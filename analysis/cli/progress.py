@@ -1,4 +1,6 @@
-"""How far a long step has come, on standard error: a bar on a terminal, plain lines now and then elsewhere."""
+"""How far a long step has come, on standard error: a bar on a terminal, plain lines now and then
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,11 @@ class Progress:
             from .bar import line
 
             self.last = time.monotonic()
-            print(line(what, done, wanted, before, self.last - self.started, remark), file=sys.stderr, flush=True)
+            print(
+                line(what, done, wanted, before, self.last - self.started, remark),
+                file=sys.stderr,
+                flush=True,
+            )
 
     def _draw(self, done: int, wanted: int, remark: str, before: int) -> None:
         # Loaded only where it is seen.
@@ -57,7 +63,9 @@ class Progress:
         self.bar.update(done - self.bar.n)
 
     def close(self) -> None:
-        """Take the bar away, as the step has ended, and tell how long it took where that is asked for."""
+        """Take the bar away, as the step has ended, and tell how long it took where that is asked
+        for.
+        """
         if self.bar is not None:
             self.bar.close()
         if self.is_verbose and self.what:

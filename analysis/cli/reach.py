@@ -15,26 +15,43 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "reach",
         help="tell which repeatability, certificate, repeats, balls or size meets a target",
-        description="Solve for one unknown of a design at a time, the others as drawn: the largest repeatability or "
-        "certificate uncertainty, and the fewest repeats, fewest balls or smallest plate that meet a goal. What is "
-        "told is a value of three digits, or a whole number, with which the file was planned; the next one fails. "
-        "The exit status is 0 if every unknown asked for has such a value (without --by: one of them), otherwise 1; "
-        "with --fail it is 0 if the design as drawn meets the goal, otherwise 1.",
+        description=(
+            "Solve for one unknown of a design at a time, the others as drawn: the largest"
+            " repeatability or certificate uncertainty, and the fewest repeats, fewest balls or"
+            " smallest plate that meet a goal. What is told is a value of three digits, or a whole"
+            " number, with which the file was planned; the next one fails. The exit status is 0 if"
+            " every unknown asked for has such a value (without --by: one of them), otherwise 1;"
+            " with --fail it is 0 if the design as drawn meets the goal, otherwise 1."
+        ),
     )
     add_file(parser)
-    parser.add_argument("--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated")
+    parser.add_argument(
+        "--by", choices=UNKNOWNS, action="append", help="only this unknown; may be repeated"
+    )
     parser.add_argument(
         "--goal",
         default="lengths",
-        help="lengths (default: distances between corrected points, U6, within target_accuracy), tasks, or a quantity "
-        'such as "U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average 0.1 um"',
+        help=(
+            "lengths (default: distances between corrected points, U6, within target_accuracy),"
+            ' tasks, or a quantity such as "U6 average 0.3 um", "U6 maximum 0.4 um" or "U5 average'
+            ' 0.1 um"'
+        ),
     )
     parser.add_argument(
-        "--share", metavar="95%", type=percentage, help="of the lengths that are to be within; default all"
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="of the lengths that are to be within; default all",
     )
-    parser.add_argument("--target", metavar="LENGTH", help='instead of target_accuracy, such as "0.5 um + L/1000000"')
     parser.add_argument(
-        "--artefact", metavar="NAME", help="the one that varies: its balls, size, calibrations and repeats"
+        "--target",
+        metavar="LENGTH",
+        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+    )
+    parser.add_argument(
+        "--artefact",
+        metavar="NAME",
+        help="the one that varies: its balls, size, calibrations and repeats",
     )
     parser.add_argument(
         "--calibration",
@@ -43,7 +60,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="entry of the list that varies, the first is 0; default: all by the same factor",
     )
     parser.add_argument(
-        "--fail", action="store_true", help="end with exit status 1 unless the design as drawn meets the goal"
+        "--fail",
+        action="store_true",
+        help="end with exit status 1 unless the design as drawn meets the goal",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -65,7 +84,15 @@ def run(options: Namespace) -> int:
         names = tuple(dict.fromkeys(options.by or UNKNOWNS))
         experiment = single(options)
         with progress(options) as shown:
-            found = reach(experiment, goal, names, options.artefact, options.calibration, options.target, shown.show)
+            found = reach(
+                experiment,
+                goal,
+                names,
+                options.artefact,
+                options.calibration,
+                options.target,
+                shown.show,
+            )
     except (GoalError, NotVariableError, QuantityError) as error:
         print(f"ballplate reach: {error}", file=sys.stderr)
         return WRONG_USAGE

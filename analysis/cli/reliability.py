@@ -1,4 +1,6 @@
-"""`ballplate reliability`: which biases a design would notice, and what those do that it would not."""
+"""`ballplate reliability`: which biases a design would notice, and what those do that it would
+not.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +17,16 @@ WRONG_USAGE, BAD_FILE = 2, 3
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reliability",
-        help="tell which biases of readings and certificates would be noticed, and what the others do",
-        description="Compute the redundancy of every observation of a design, the smallest biases of readings, "
-        "certificates, probes and positions that a test of the residuals finds, and what a bias just too small for it "
-        "changes in the error function (U4), in distances between balls (U5) and between corrected points (U6).",
+        help=(
+            "tell which biases of readings and certificates would be noticed, and what the"
+            " others do"
+        ),
+        description=(
+            "Compute the redundancy of every observation of a design, the smallest biases of"
+            " readings, certificates, probes and positions that a test of the residuals finds, and"
+            " what a bias just too small for it changes in the error function (U4), in distances"
+            " between balls (U5) and between corrected points (U6)."
+        ),
     )
     add_file(parser, several=True)
     parser.add_argument(
@@ -29,14 +37,23 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="chance that the test of one bias finds one where there is none; default 0.1%%",
     )
     parser.add_argument(
-        "--power", metavar="80%", type=_share, default=0.8, help="chance that a detectable bias is found; default 80%%"
+        "--power",
+        metavar="80%",
+        type=_share,
+        default=0.8,
+        help="chance that a detectable bias is found; default 80%%",
     )
     parser.add_argument(
         "--sigma",
         choices=("estimated", "given"),
-        help="test against the scatter of the residuals, or the stated uncertainties; default: what the file says",
+        help=(
+            "test against the scatter of the residuals, or the stated uncertainties; default: what"
+            " the file says"
+        ),
     )
-    parser.add_argument("--all", action="store_true", help="list every event, not only the worst of a kind")
+    parser.add_argument(
+        "--all", action="store_true", help="list every event, not only the worst of a kind"
+    )
     add_output(parser, "--csv", metavar="FILE", help="write a row for every observation")
     add_force(parser)
     add_json(parser)
@@ -50,7 +67,9 @@ def _share(text: str) -> float:
     except ValueError:
         value = float("nan")
     if not text.endswith("%") or not 1e-10 <= value <= 99.9999:
-        raise ArgumentTypeError(f'expected a percentage between 0% and 100%, such as 0.1%, not "{text}"')
+        raise ArgumentTypeError(
+            f'expected a percentage between 0% and 100%, such as 0.1%, not "{text}"'
+        )
     return value / 100.0
 
 
@@ -62,7 +81,10 @@ def run(options: Namespace) -> int:
     from .progress import progress
 
     if options.power <= options.false_alarm:
-        print("ballplate reliability: --power must be above --false-alarm; any test has that much", file=sys.stderr)
+        print(
+            "ballplate reliability: --power must be above --false-alarm; any test has that much",
+            file=sys.stderr,
+        )
         return WRONG_USAGE
     chosen = experiments(options)
     if options.csv is not None and len(chosen) > 1:
@@ -73,7 +95,9 @@ def run(options: Namespace) -> int:
     found, is_written = [], True
     for number, experiment in enumerate(chosen):
         with progress(options) as shown:
-            result = reliability(experiment, options.false_alarm, options.power, options.sigma, shown.show)
+            result = reliability(
+                experiment, options.false_alarm, options.power, options.sigma, shown.show
+            )
         if options.csv is not None:
             writer = text_writer(partial(write_observations, result=result))
             is_written = write_outputs({options.csv: writer}, options.force)

@@ -12,16 +12,26 @@ from .outputs import PAGE, add_force, add_output, write_outputs
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
-SUFFIXES = {".html": "html", ".htm": "html", ".txt": "text", ".md": "markdown", ".csv": "csv", ".tex": "latex"}
+SUFFIXES = {
+    ".html": "html",
+    ".htm": "html",
+    ".txt": "text",
+    ".md": "markdown",
+    ".csv": "csv",
+    ".tex": "latex",
+}
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "report",
         help="write a sweep's results as an HTML page, or its tables",
-        description="Write what a sweep has found as one HTML page that needs no network: tables, plots, rank, the "
-        "best and the worst design. With --format text, markdown, csv or latex the tables alone. Of a damaged store it "
-        "tells of the cells that can be read; the exit status then is 3.",
+        description=(
+            "Write what a sweep has found as one HTML page that needs no network: tables, plots,"
+            " rank, the best and the worst design. With --format text, markdown, csv or latex the"
+            " tables alone. Of a damaged store it tells of the cells that can be read; the exit"
+            " status then is 3."
+        ),
     )
     add_store(parser)
     add_output(
@@ -41,7 +51,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--run-modules",
         action="store_true",
-        help="run error models in Python that the sweep uses, which the drawings of its designs need",
+        help=(
+            "run error models in Python that the sweep uses, which the drawings of its designs need"
+        ),
     )
     parser.set_defaults(run=run)
 
@@ -59,7 +71,10 @@ def run(options: Namespace) -> int:
     suffix = "" if output is None else output.suffix.lower()
     if options.format is None and suffix not in ("", *SUFFIXES):
         endings = ", ".join(SUFFIXES)
-        print(f"ballplate report: {output} should end in one of {endings}; or state --format", file=sys.stderr)
+        print(
+            f"ballplate report: {output} should end in one of {endings}; or state --format",
+            file=sys.stderr,
+        )
         return WRONG_USAGE
     form = options.format or SUFFIXES.get(suffix, "html")
     if form == "html" and PAGE.is_missing:

@@ -1,4 +1,6 @@
-"""`ballplate reproduce`: published experiments and certified problems, computed anew beside what is printed of them."""
+"""`ballplate reproduce`: published experiments and certified problems, computed anew beside what is
+printed of them.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,19 @@ WRONG_USAGE = 2
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reproduce",
-        help="compute a document's published experiments, or certified problems, and set their figures beside ours",
-        description="npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the shipped "
-        "designs. Every legible figure stands beside ours with the ratio and what the comparison rests on; statements "
-        "on rank, errata and open differences likewise. The exit status is 0 if all of it agrees within what is "
-        "stated, otherwise 1. certified: solve the problems with certified answers, and tell how many digits agree; "
-        "with --results those of another program. The exit status is 0 if every rank and every count is right and "
-        "every quantity has an answer, otherwise 1.",
+        help=(
+            "compute a document's published experiments, or certified problems, and set their"
+            " figures beside ours"
+        ),
+        description=(
+            "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
+            " shipped designs. Every legible figure stands beside ours with the ratio and what the"
+            " comparison rests on; statements on rank, errata and open differences likewise. The"
+            " exit status is 0 if all of it agrees within what is stated, otherwise 1. certified:"
+            " solve the problems with certified answers, and tell how many digits agree; with"
+            " --results those of another program. The exit status is 0 if every rank and every"
+            " count is right and every quantity has an answer, otherwise 1."
+        ),
     )
     parser.add_argument(
         "document",
@@ -32,7 +40,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         metavar="SECTION",
         action="append",
         default=[],
-        help="only the experiment of this section, such as 6.2.1, or the problem of this name; may be repeated",
+        help=(
+            "only the experiment of this section, such as 6.2.1, or the problem of this name; may"
+            " be repeated"
+        ),
     )
     parser.add_argument(
         "--designs",
@@ -47,12 +58,20 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=Path,
         help="with certified: score the answers in this JSON file instead of our own",
     )
-    parser.add_argument("--quick", action="store_true", help="leave out what needs synthetic data sets (6.2.7)")
     parser.add_argument(
-        "--trials", metavar="N", type=trial_count, default=100, help="number of data sets for 6.2.7; default 100"
+        "--quick", action="store_true", help="leave out what needs synthetic data sets (6.2.7)"
+    )
+    parser.add_argument(
+        "--trials",
+        metavar="N",
+        type=trial_count,
+        default=100,
+        help="number of data sets for 6.2.7; default 100",
     )
     form = parser.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_true", help="print a JSON object in metres and radians")
+    form.add_argument(
+        "--json", action="store_true", help="print a JSON object in metres and radians"
+    )
     form.add_argument("--markdown", action="store_true", help="print Markdown")
     parser.set_defaults(run=run)
 
@@ -64,7 +83,9 @@ def run(options: Namespace) -> int:
     if options.document == "certified":
         return _certified(options)
     if options.results:
-        print("ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr)
+        print(
+            "ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr
+        )
         return WRONG_USAGE
 
     from ballplate.designs import shipped
@@ -72,7 +93,11 @@ def run(options: Namespace) -> int:
 
     from ..reproduction.compare import reproduce
     from ..reproduction.published import npl
-    from ..reproduction.reproduction_tables import reproduction_data, reproduction_lines, reproduction_markdown
+    from ..reproduction.reproduction_tables import (
+        reproduction_data,
+        reproduction_lines,
+        reproduction_markdown,
+    )
     from ..reproduction.shipped import Shipped
     from .common import print_json, print_lines
     from .progress import progress
@@ -81,11 +106,19 @@ def run(options: Namespace) -> int:
     known = document.statements.sections
     for name in options.experiment:
         if name not in known:
-            print(f'ballplate reproduce: no experiment "{name}"; {hint(name, known)}', file=sys.stderr)
+            print(
+                f'ballplate reproduce: no experiment "{name}"; {hint(name, known)}', file=sys.stderr
+            )
             return WRONG_USAGE
     trials = None if options.quick else options.trials
     with progress(options) as shown:
-        found = reproduce(document, Shipped(options.designs or shipped("npl")), options.experiment, trials, shown.show)
+        found = reproduce(
+            document,
+            Shipped(options.designs or shipped("npl")),
+            options.experiment,
+            trials,
+            shown.show,
+        )
     if options.json:
         print_json([reproduction_data(found)])
     elif options.markdown:
@@ -96,7 +129,9 @@ def run(options: Namespace) -> int:
 
 
 def _certified(options: Namespace) -> int:
-    """Score answers to certified problems; 1 if a rank or count is wrong, or an answer is missing."""
+    """Score answers to certified problems; 1 if a rank or count is wrong, or an answer is
+    missing.
+    """
     import sys
 
     from ballplate.designs import shipped
@@ -109,7 +144,10 @@ def _certified(options: Namespace) -> int:
     from .progress import progress
 
     if options.quick or options.markdown:
-        print("ballplate reproduce: --quick and --markdown go with npl only; leave them out", file=sys.stderr)
+        print(
+            "ballplate reproduce: --quick and --markdown go with npl only; leave them out",
+            file=sys.stderr,
+        )
         return WRONG_USAGE
     problems = certified_problems(options.designs or shipped("certified"), options.experiment)
     if options.results:
@@ -120,7 +158,11 @@ def _certified(options: Namespace) -> int:
             for done, problem in enumerate(problems):
                 shown.show("problems", done, len(problems))
                 results[problem.name] = answers(problem)
-    found = [one for problem in problems for one in scores(problem.name, problem.answers, results.get(problem.name))]
+    found = [
+        one
+        for problem in problems
+        for one in scores(problem.name, problem.answers, results.get(problem.name))
+    ]
     if options.json:
         print_json([score_data(found, results)])
     else:

@@ -20,19 +20,30 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "run",
         help="tell the uncertainties U1 to U6 that a design will give",
-        description="Compute the rank and the standard uncertainties U1 to U6 of a design at zero machine error. With "
-        "--trials, synthetic data sets of the file's true machine are estimated too, and bias, spread and coverage "
-        "stand beside the linearised uncertainties. The exit status is 0 if the rank is as expected, otherwise 1.",
+        description=(
+            "Compute the rank and the standard uncertainties U1 to U6 of a design at zero machine"
+            " error. With --trials, synthetic data sets of the file's true machine are estimated"
+            " too, and bias, spread and coverage stand beside the linearised uncertainties. The"
+            " exit status is 0 if the rank is as expected, otherwise 1."
+        ),
     )
     add_file(parser, several=True)
     group = parser.add_argument_group("Monte Carlo")
-    group.add_argument("--trials", metavar="N", type=_trial_count, help="number of data sets, at most")
     group.add_argument(
-        "--until", metavar="1%", type=percentage, help="stop when the ratios of spread to U are as accurate as this"
+        "--trials", metavar="N", type=_trial_count, help="number of data sets, at most"
+    )
+    group.add_argument(
+        "--until",
+        metavar="1%",
+        type=percentage,
+        help="stop when the ratios of spread to U are as accurate as this",
     )
     group.add_argument("--seed", type=seed, help="seed of the data sets, instead of the file's")
     group.add_argument(
-        "--workers", metavar="N", type=count, help="processes that share the work; default: one for each processor"
+        "--workers",
+        metavar="N",
+        type=count,
+        help="processes that share the work; default: one for each processor",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -53,7 +64,10 @@ def run(options: Namespace) -> int:
     plans, found, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
-        print("ballplate run: --seed and --workers have a meaning with --trials or --until only", file=sys.stderr)
+        print(
+            "ballplate run: --seed and --workers have a meaning with --trials or --until only",
+            file=sys.stderr,
+        )
         return WRONG_USAGE
     kept = options.interruption.kept
     for experiment in experiments(options):
@@ -72,7 +86,10 @@ def run(options: Namespace) -> int:
             interrupted = done.outcome is not None and done.outcome.interrupted
         found.append(data)
         if interrupted:
-            print(f"{options.interruption.word}: the figures are those of the data sets done so far", file=sys.stderr)
+            print(
+                f"{options.interruption.word}: the figures are those of the data sets done so far",
+                file=sys.stderr,
+            )
             break
     if options.json:
         print_json(found)
@@ -91,7 +108,9 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
 
         def report(now: Progress) -> None:
             options.interruption.answer()
-            options.interruption.kept = lambda: f"the figures of the {now.done} data sets done are lost"
+            options.interruption.kept = lambda: (
+                f"the figures of the {now.done} data sets done are lost"
+            )
             remark = f"accurate to {100 * now.accuracy:.2g} %" if now.accuracy < 1.0 else ""
             shown.show("data sets", now.done, now.wanted, remark)
 

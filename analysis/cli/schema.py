@@ -11,10 +11,14 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "schema",
         help="print the JSON Schema of experiment, sweep or machine files",
-        description="Print the JSON Schema of experiment files, or of sweep or machine files, for editors that "
-        "complete and check as you type.",
+        description=(
+            "Print the JSON Schema of experiment files, or of sweep or machine files, for editors"
+            " that complete and check as you type."
+        ),
     )
-    parser.add_argument("files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files")
+    parser.add_argument(
+        "files", choices=tuple(SCHEMAS), nargs="?", default="experiment", help="which files"
+    )
     parser.set_defaults(run=run, prints_data=True)
 
 

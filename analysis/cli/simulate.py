@@ -19,9 +19,11 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "simulate",
         help="write synthetic readings of a design",
-        description="Write readings that the file's true machine would give of artefacts that differ from their "
-        "certificates by the stated uncertainties, with noise of the stated repeatability. The same seed gives the "
-        "same readings, with and without --certificate.",
+        description=(
+            "Write readings that the file's true machine would give of artefacts that differ from"
+            " their certificates by the stated uncertainties, with noise of the stated"
+            " repeatability. The same seed gives the same readings, with and without --certificate."
+        ),
     )
     add_file(parser)
     add_output(
@@ -38,11 +40,15 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--certificate",
         metavar="CSV",
         takes_screen=True,
-        help="also write values of certificates, priors and probe offsets, drawn about what is read, for "
-        "fit --certificate",
+        help=(
+            "also write values of certificates, priors and probe offsets, drawn about what is read,"
+            " for fit --certificate"
+        ),
     )
     parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
-    parser.add_argument("--exact", action="store_true", help="leave all noise out; artefacts are as drawn")
+    parser.add_argument(
+        "--exact", action="store_true", help="leave all noise out; artefacts are as drawn"
+    )
     add_force(parser)
     parser.set_defaults(run=run)
 
@@ -63,7 +69,10 @@ def run(options: Namespace) -> int:
 
     experiment = single(options)
     if options.certificate and not certified_values(experiment):
-        text = "there is no certificate, prior or probe offset with an uncertainty; leave --certificate out"
+        text = (
+            "there is no certificate, prior or probe offset with an uncertainty; leave"
+            " --certificate out"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)])
     found = simulated_readings(experiment, options.seed, options.exact)
     texts: dict[Path, Callable[[TextIO], None]] = {
@@ -74,7 +83,9 @@ def run(options: Namespace) -> int:
         values = drawn_values(experiment, found.design, found.truth, found.model, found.generator)
         how = "exact" if options.exact else f"drawn with seed {found.seed}"
         comment = f"certificate values of {experiment.label}, {how}, for fit --certificate"
-        texts[options.certificate] = lambda stream: write_certificate(stream, with_values(experiment, values), comment)
+        texts[options.certificate] = lambda stream: write_certificate(
+            stream, with_values(experiment, values), comment
+        )
         told.append(f"{len(values)} certificate values written to {options.certificate}")
     writers = {path: text_writer(write) for path, write in texts.items() if str(path) != "-"}
     if not write_outputs(writers, options.force):

@@ -32,34 +32,61 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "spline",
         help="fit a spline with prescribed values and slopes to measured errors",
-        description="Fit a spline to errors along an axis or along the profile of a turned part, by least squares, "
-        "with values and slopes prescribed at its ends or elsewhere, and write it as polynomials for a controller. The "
-        "file has columns such as position_mm and error_um, or nominal_x_mm and nominal_z_mm for a profile, whose arc "
-        "length is then the abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa such "
-        'as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084 mm, -37.084 mm".',
+        description=(
+            "Fit a spline to errors along an axis or along the profile of a turned part, by least"
+            " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
+            " polynomials for a controller. The file has columns such as position_mm and error_um,"
+            " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
+            " abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa"
+            ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
+            ' mm, -37.084 mm".'
+        ),
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="measured points (CSV)")
     data = parser.add_argument_group("points")
-    data.add_argument("--x", metavar="COLUMN", help="abscissa; default: arc_length if there is a profile, or the first")
-    data.add_argument("--y", metavar="COLUMN", help="error; default: the only other column")
-    data.add_argument("--points", metavar="NAMES", help="only these, such as 12-32 or 1,2,5-9; default: all")
     data.add_argument(
-        "--uncertainty", metavar="VALUE", help="standard uncertainty of each error, where no column u has it"
+        "--x",
+        metavar="COLUMN",
+        help="abscissa; default: arc_length if there is a profile, or the first",
+    )
+    data.add_argument("--y", metavar="COLUMN", help="error; default: the only other column")
+    data.add_argument(
+        "--points", metavar="NAMES", help="only these, such as 12-32 or 1,2,5-9; default: all"
+    )
+    data.add_argument(
+        "--uncertainty",
+        metavar="VALUE",
+        help="standard uncertainty of each error, where no column u has it",
     )
     data.add_argument(
         "--sigma",
         choices=("given", "estimated"),
-        help="believe the stated uncertainties, or estimate a factor; default: given if there are any",
+        help=(
+            "believe the stated uncertainties, or estimate a factor; default: given if there"
+            " are any"
+        ),
     )
     shape = parser.add_argument_group("curve")
     knots = shape.add_mutually_exclusive_group()
     knots.add_argument(
-        "--every", metavar="R", type=count, help="a knot at every R-th point of each feature; default: 5"
+        "--every",
+        metavar="R",
+        type=count,
+        help="a knot at every R-th point of each feature; default: 5",
     )
     knots.add_argument("--knots", metavar="PLACES", help='knots such as "10 mm, 20 mm", or none')
-    shape.add_argument("--order", metavar="N", type=count, default=4, help="degree plus one; default: 4, cubic")
-    shape.add_argument("--start", metavar="PLACE", default="start", help="where the curve starts; default: first point")
-    shape.add_argument("--end", metavar="PLACE", default="end", help="where the curve ends; default: last point")
+    shape.add_argument(
+        "--order", metavar="N", type=count, default=4, help="degree plus one; default: 4, cubic"
+    )
+    shape.add_argument(
+        "--start",
+        metavar="PLACE",
+        default="start",
+        help="where the curve starts; default: first point",
+    )
+    shape.add_argument(
+        "--end", metavar="PLACE", default="end", help="where the curve ends; default: last point"
+    )
     shape.add_argument(
         "--boundary",
         metavar="PLACE",
@@ -75,12 +102,20 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         default=[],
         help="the K-th feature is a straight line; may be repeated",
     )
-    shape.add_argument("--periodic", action="store_true", help="closed curve, of 360 deg if there is no --period")
-    shape.add_argument("--period", metavar="PERIOD", help='closed curve of another period, such as "10 mm"')
+    shape.add_argument(
+        "--periodic", action="store_true", help="closed curve, of 360 deg if there is no --period"
+    )
+    shape.add_argument(
+        "--period", metavar="PERIOD", help='closed curve of another period, such as "10 mm"'
+    )
     held = parser.add_argument_group("prescribed")
     for end in ("start", "end"):
-        held.add_argument(f"--{end}-value", metavar="VALUE", help=f'error at the {end}, such as "3 um"')
-        held.add_argument(f"--{end}-slope", metavar="SLOPE", help=f'slope at the {end}, such as 0 or "2 um/mm"')
+        held.add_argument(
+            f"--{end}-value", metavar="VALUE", help=f'error at the {end}, such as "3 um"'
+        )
+        held.add_argument(
+            f"--{end}-slope", metavar="SLOPE", help=f'slope at the {end}, such as 0 or "2 um/mm"'
+        )
     held.add_argument(
         "--at",
         nargs=3,
@@ -90,7 +125,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help='for example --at "30 mm" slope 0; may be repeated',
     )
     output = parser.add_argument_group("output")
-    output.add_argument("--evaluate", metavar="PLACES", help='values there too, such as "10 mm, 12.5 mm"')
+    output.add_argument(
+        "--evaluate", metavar="PLACES", help='values there too, such as "10 mm, 12.5 mm"'
+    )
     output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
     add_output(
         output,
@@ -100,17 +137,24 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         help="write the polynomials as CSV; - for the screen",
     )
     add_picture(output, "--plot", help="draw points and curve (.svg, .png or .pdf)")
-    add_picture(output, "--whiskers", help="draw errors as bars normal to the profile (.svg, .png or .pdf)")
+    add_picture(
+        output, "--whiskers", help="draw errors as bars normal to the profile (.svg, .png or .pdf)"
+    )
     add_force(output)
-    output.add_argument("--magnification", metavar="N", type=float, help="of the bars; default: one that suits")
+    output.add_argument(
+        "--magnification", metavar="N", type=float, help="of the bars; default: one that suits"
+    )
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
     parser.set_defaults(run=run)
 
 
-# A polynomial through so many points keeps seven digits; with each further order it loses nearly one.
+# A polynomial through so many points keeps seven digits; with each further order it loses nearly
+# one.
 MOST_ORDER = 16
 
-POWERS = "polynomials in the distance from the start of each piece (default), or in the abscissa itself"
+POWERS = (
+    "polynomials in the distance from the start of each piece (default), or in the abscissa itself"
+)
 
 
 def run(options: Namespace) -> int:
@@ -130,7 +174,9 @@ def run(options: Namespace) -> int:
         points = everything.chosen(choose_points(everything, options.points, str(options.file)))
     try:
         settings = _settings(options, points)
-        uncertainty = None if options.uncertainty is None else _positive(options.uncertainty, points.y_column)
+        uncertainty = (
+            None if options.uncertainty is None else _positive(options.uncertainty, points.y_column)
+        )
         at = _list("--evaluate", options.evaluate, points.x_column) if options.evaluate else []
         _check(options, points)
     except OptionError as error:
@@ -145,8 +191,12 @@ def run(options: Namespace) -> int:
         if options.plot is not None:
             writers[options.plot] = partial(plot, curve)
         if options.whiskers is not None:
-            writers[options.whiskers] = lambda path: whiskers(curve, everything, path, options.magnification)
-        polynomials = None if options.coefficients is None else coefficients_csv(curve, options.powers)
+            writers[options.whiskers] = lambda path: whiskers(
+                curve, everything, path, options.magnification
+            )
+        polynomials = (
+            None if options.coefficients is None else coefficients_csv(curve, options.powers)
+        )
         if polynomials is not None and str(options.coefficients) != "-":
             writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
         is_written = write_outputs(writers, options.force)
@@ -177,9 +227,13 @@ def _check(options: Namespace, points: Points) -> None:
     :raises OptionError: there are such.
     """
     if options.whiskers is not None and points.places is None:
-        raise OptionError("--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file")
+        raise OptionError(
+            "--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file"
+        )
     if options.whiskers is not None and points.y_column.kind != "length":
-        raise OptionError(f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle")
+        raise OptionError(
+            f"--whiskers draws errors normal to the surface, but {points.y_column.name} is an angle"
+        )
     if options.magnification is not None and not 0 < options.magnification < float("inf"):
         raise OptionError("--magnification should be above 0, such as 200")
     if options.magnification is not None and options.whiskers is None:
@@ -201,15 +255,25 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
         for derivative, what in enumerate(("value", "slope")):
             text = getattr(options, f"{end}_{what}")
             if text is not None:
-                holds.append(Hold(end, derivative, _value(f"--{end}-{what}", text, derivative, x, y)))
+                holds.append(
+                    Hold(end, derivative, _value(f"--{end}-{what}", text, derivative, x, y))
+                )
     for place, what, text in options.at:
         if what not in ("value", "slope"):
-            raise OptionError(f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0')
+            raise OptionError(
+                f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0'
+            )
         derivative = ("value", "slope").index(what)
-        holds.append(Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y)))
+        holds.append(
+            Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y))
+        )
     knots = None
     if options.knots is not None:
-        knots = () if options.knots.strip() == "none" else tuple(sorted(_list("--knots", options.knots, x)))
+        knots = (
+            ()
+            if options.knots.strip() == "none"
+            else tuple(sorted(_list("--knots", options.knots, x)))
+        )
     if not 2 <= options.order <= MOST_ORDER:
         raise OptionError(f"--order should be 2 to {MOST_ORDER}; 4 is a cubic spline")
     period = None
@@ -217,10 +281,14 @@ def _settings(options: Namespace, points: Points) -> CurveSettings:
         period = _positive(options.period, x, "--period")
     elif options.periodic:
         if x.kind == "length":
-            raise OptionError('--periodic: the abscissa is a length; state the period, as in --period "10 mm"')
+            raise OptionError(
+                '--periodic: the abscissa is a length; state the period, as in --period "10 mm"'
+            )
         period = _positive("360 deg", x)
     if options.start.strip() == "end" or options.end.strip() == "start":
-        raise OptionError("the curve starts at its start and ends at its end; give --start and --end other places")
+        raise OptionError(
+            "the curve starts at its start and ends at its end; give --start and --end other places"
+        )
     return CurveSettings(
         order=options.order,
         every=options.every or EVERY,
@@ -268,7 +336,9 @@ def _place(option: str, text: str, column: Column) -> Place:
         return "start" if plain == "start" else "end"
     parts = plain.split(",")
     if len(parts) > 2 or len(parts) == 2 and column.kind != "length":
-        raise OptionError(f'{option}: "{text}" should be one abscissa, or two nominal co-ordinates on a profile')
+        raise OptionError(
+            f'{option}: "{text}" should be one abscissa, or two nominal co-ordinates on a profile'
+        )
     if len(parts) == 2:
         return _quantity(option, parts[0], "length"), _quantity(option, parts[1], "length")
     return _quantity(option, plain, column.kind)
@@ -276,7 +346,12 @@ def _place(option: str, text: str, column: Column) -> Place:
 
 def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> float:
     """A value of the error, or a slope as a unit of the error over one of the abscissa."""
-    from ballplate.simulator.inputs.quantities import UNITS, QuantityError, metres_or_radians, parse_ratio
+    from ballplate.simulator.inputs.quantities import (
+        UNITS,
+        QuantityError,
+        metres_or_radians,
+        parse_ratio,
+    )
 
     if derivative == 0:
         return _quantity(option, text, y.kind)
@@ -284,7 +359,9 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
     if plain in ("0", "-0", "0.0"):
         return 0.0
     if re.match("[+-]?[0-9]+,[0-9]", plain):
-        raise OptionError(f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"')
+        raise OptionError(
+            f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
+        )
     found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
     units: Any = UNITS
     with suppress(QuantityError):
@@ -292,4 +369,6 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
             return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
         if x.kind == y.kind == "length":
             return parse_ratio(plain)
-    raise OptionError(f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0')
+    raise OptionError(
+        f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0'
+    )

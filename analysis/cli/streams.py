@@ -1,4 +1,6 @@
-"""Standard output and standard error of a command: readers that leave early, disks that are full, streams closed."""
+"""Standard output and standard error of a command: readers that leave early, disks that are full,
+streams closed.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from typing import Any
 class StandardOutputError(Exception):
     """Standard output cannot be written; the text is the system's reason.
 
-    No OSError, which would be taken for one of a file, and which some libraries pass over in silence.
+    No OSError, which would be taken for one of a file, and which some libraries pass over in
+    silence.
     """
 
 
@@ -24,12 +27,13 @@ _CONSOLE: Any = getattr(io, "_WindowsConsoleIO", io.FileIO)
 
 @contextmanager
 def lasting_streams() -> Iterator[None]:
-    """Let a command work to its end whoever reads what it prints, so that its files and its status are its own.
+    """Let a command work to its end whoever reads what it prints, so that its files and its status
+    are its own.
 
-    A reader of standard output that has left, such as ``head``, changes nothing: what follows is dropped. Any other
-    error of standard output is raised once as StandardOutputError, and what follows is dropped. One that was closed
-    beforehand is such an error as soon as something is printed. Errors of standard error are not told, as there is no
-    place for them.
+    A reader of standard output that has left, such as ``head``, changes nothing: what follows is
+    dropped. Any other error of standard output is raised once as StandardOutputError, and what
+    follows is dropped. One that was closed beforehand is such an error as soon as something is
+    printed. Errors of standard error are not told, as there is no place for them.
     """
     before = sys.stdout, sys.stderr
     sys.stdout = _lasting(sys.stdout, 1, is_told=True)
@@ -46,8 +50,8 @@ def lasting_streams() -> Iterator[None]:
 def keep_standard_numbers() -> None:
     """Open the null device in the place of standard streams that are closed.
 
-    Otherwise files that are opened later would take their numbers, here or in workers, and receive what libraries and
-    the interpreter write to these.
+    Otherwise files that are opened later would take their numbers, here or in workers, and receive
+    what libraries and the interpreter write to these.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(number, True)
@@ -55,7 +59,9 @@ def keep_standard_numbers() -> None:
 
 
 def _lasting(stream: Any, number: int, is_told: bool) -> Any:
-    """The stream with errors answered; as it is where somebody has put one of his own in its place."""
+    """The stream with errors answered; as it is where somebody has put one of his own in its
+    place.
+    """
     if stream is None:
         closed = io.BufferedWriter(_Lasting(None, number, is_told))
         return io.TextIOWrapper(closed, encoding="utf-8", errors="replace", line_buffering=True)
@@ -93,7 +99,11 @@ class _Lasting(io.RawIOBase):
         except OSError as error:
             self._has_failed = True
             # Windows tells by EINVAL that the other end of a pipe is closed.
-            has_left = isinstance(error, BrokenPipeError) or os.name == "nt" and error.errno == errno.EINVAL
+            has_left = (
+                isinstance(error, BrokenPipeError)
+                or os.name == "nt"
+                and error.errno == errno.EINVAL
+            )
             if self._is_told and not has_left:
                 raise StandardOutputError(error.strerror) from None
             return len(data)

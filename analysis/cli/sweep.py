@@ -24,21 +24,38 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "sweep",
         help="compute a family of experiments into a store",
-        description="Compute every cell of a sweep file: rank, U1 to U6, Monte Carlo if it asks for trials. Each "
-        "finished cell is stored on disk; started again, the command goes on where it ended. The exit status is 0 if "
-        "all cells are done, 1 if some have failed.",
+        description=(
+            "Compute every cell of a sweep file: rank, U1 to U6, Monte Carlo if it asks for trials."
+            " Each finished cell is stored on disk; started again, the command goes on where it"
+            " ended. The exit status is 0 if all cells are done, 1 if some have failed."
+        ),
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="sweep file (YAML)")
-    parser.add_argument("--store", metavar="FILE", type=Path, help="store; default: the sweep file's name with .sqlite")
-    parser.add_argument("--dry-run", action="store_true", help="list the cells and estimate the time; store nothing")
-    parser.add_argument("--workers", metavar="N", type=count, help="processes; default: one for each processor")
     parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="compute on the dask.distributed cluster of this scheduler instead"
+        "--store",
+        metavar="FILE",
+        type=Path,
+        help="store; default: the sweep file's name with .sqlite",
     )
-    parser.add_argument("--retry-failed", action="store_true", help="compute cells again that have failed")
+    parser.add_argument(
+        "--dry-run", action="store_true", help="list the cells and estimate the time; store nothing"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=count, help="processes; default: one for each processor"
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="compute on the dask.distributed cluster of this scheduler instead",
+    )
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="compute cells again that have failed"
+    )
     parser.add_argument("--fail-fast", action="store_true", help="end when a cell fails")
     parser.add_argument(
-        "--beside", action="store_true", help="enter a changed sweep beside the one that is in the store"
+        "--beside",
+        action="store_true",
+        help="enter a changed sweep beside the one that is in the store",
     )
     parser.add_argument(
         "--folder",
@@ -46,8 +63,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         type=Path,
         action="append",
         default=[],
-        help="a folder, besides those of the sweep file and of its base, whose files the sweep may name; the store "
-        "keeps a copy of them; may be repeated",
+        help=(
+            "a folder, besides those of the sweep file and of its base, whose files the sweep may"
+            " name; the store keeps a copy of them; may be repeated"
+        ),
     )
     parser.set_defaults(run=run)
 
@@ -62,20 +81,27 @@ def run(options: Namespace) -> int:
     from ..sweeps.running import OtherSweepError, writable_store
     from ..sweeps.store_file import StoreError, is_same_file
 
-    sweep = load_sweep(options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder))
+    sweep = load_sweep(
+        options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder)
+    )
     if options.dry_run:
         return _dry_run(sweep, options)
     bundle = bundle_of(sweep)
     path = options.store or options.file.with_suffix(".sqlite")
     if any(is_same_file(path, file) for file in (options.file, sweep.base)):
-        print(f"ballplate sweep: --store {path} is the sweep's own file; name another", file=sys.stderr)
+        print(
+            f"ballplate sweep: --store {path} is the sweep's own file; name another",
+            file=sys.stderr,
+        )
         return WRONG_USAGE
     try:
         with writable_store(path) as store:
             return _run(sweep, bundle, store, options)
     except OSError as error:
         where = error.filename or path
-        text = f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
+        text = (
+            f"{where}: cannot be written ({error.strerror}); check the folder and its permissions"
+        )
         print(in_one_line(text), file=sys.stderr)
     except (StoreError, ClusterError, OtherSweepError) as error:
         print(error, file=sys.stderr)
@@ -92,7 +118,9 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     entered = enter(store, sweep, bundle, options.beside)
     for remark in entered.remarks:
         print(remark, file=sys.stderr)
-    options.interruption.kept = lambda: f"what is done is in {store.path}, and the same command goes on from there"
+    options.interruption.kept = lambda: (
+        f"what is done is in {store.path}, and the same command goes on from there"
+    )
     try:
         with progress(options) as shown:
 
@@ -102,17 +130,26 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
                     ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
                     + ([f"{summary.failed} failed"] if summary.failed else [])
                 )
-                shown.show("cells", summary.done + summary.failed, summary.cells, remark, summary.before)
+                shown.show(
+                    "cells", summary.done + summary.failed, summary.cells, remark, summary.before
+                )
 
             runner = _runner(sweep, bundle, options)
-            summary = compute_sweep(store, sweep, entered, runner, options.retry_failed, options.fail_fast, report)
+            summary = compute_sweep(
+                store, sweep, entered, runner, options.retry_failed, options.fail_fast, report
+            )
         if summary.left:
             options.interruption.answer()
     except ChangedError:
-        text = "the files of the sweep have been changed while it ran; what is done is stored, start it again"
+        text = (
+            "the files of the sweep have been changed while it ran; what is done is stored, start"
+            " it again"
+        )
         print(in_one_line(f"{options.file}: {text}"), file=sys.stderr)
         return BAD_FILE
-    _tell(store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary)
+    _tell(
+        store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary
+    )
     return 1 if summary.failed or summary.left else 0
 
 
@@ -134,16 +171,23 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
     counted = f"{summary.cells} cell{'s' if summary.cells > 1 else ''}"
-    told = f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed} failed{before}{left}"
+    told = (
+        f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed}"
+        f" failed{before}{left}"
+    )
     print(in_one_line(told))
     found = results(store, number, summary.cells)
     versions = set(zip(*found.versions.values(), strict=True))
     if len(versions) > 1:
-        text = f"{store.path}: the rows were computed with {len(versions)} different sets of versions"
+        text = (
+            f"{store.path}: the rows were computed with {len(versions)} different sets of versions"
+        )
         print(in_one_line(text), file=sys.stderr)
     if summary.failed:
         reasons: dict[str, list[int]] = {}
-        for cell, status, reason in zip(found.cells.tolist(), found.statuses, found.reasons, strict=True):
+        for cell, status, reason in zip(
+            found.cells.tolist(), found.statuses, found.reasons, strict=True
+        ):
             if status == "failed":
                 reasons.setdefault(reason, []).append(cell)
         for reason, cells in list(reasons.items())[:10]:

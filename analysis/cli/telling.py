@@ -1,4 +1,6 @@
-"""How much a command tells on standard error beside errors and warnings: options that all commands have."""
+"""How much a command tells on standard error beside errors and warnings: options that all commands
+have.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,16 @@ def add_telling(parser: ArgumentParser) -> None:
     """Add the choice to be told less, or more."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
-        "-q", "--quiet", action="store_true", help="tell no progress and no notes, but errors and warnings"
+        "-q",
+        "--quiet",
+        action="store_true",
+        help="tell no progress and no notes, but errors and warnings",
     )
     group.add_argument(
-        "-v", "--verbose", action="store_true", help="tell versions, the files that are read, and how long steps take"
+        "-v",
+        "--verbose",
+        action="store_true",
+        help="tell versions, the files that are read, and how long steps take",
     )
 
 
@@ -30,7 +38,9 @@ def note(options: Namespace, text: str) -> None:
 
 @contextmanager
 def told(options: Namespace) -> Iterator[None]:
-    """Tell, where it is asked for, what a command works with before it does, and then how long it took."""
+    """Tell, where it is asked for, what a command works with before it does, and then how long it
+    took.
+    """
     if not options.verbose:
         yield
         return
@@ -48,4 +58,8 @@ def told(options: Namespace) -> Iterator[None]:
         yield
     finally:
         elapsed, processor = time.monotonic() - started[0], time.process_time() - started[1]
-        note(options, f"{options.command}: {elapsed:.3g} s, {processor:.3g} s of the processor in this process")
+        note(
+            options,
+            f"{options.command}: {elapsed:.3g} s, {processor:.3g} s of the processor in this"
+            " process",
+        )

@@ -17,7 +17,13 @@ from ballplate.simulator.splines.read import Column
 from ..results.formatting import aligned, number
 from .error_curve import Curve
 
-ORDERS = {2: "broken line", 3: "quadratic spline", 4: "cubic spline", 5: "quartic spline", 6: "quintic spline"}
+ORDERS = {
+    2: "broken line",
+    3: "quadratic spline",
+    4: "cubic spline",
+    5: "quartic spline",
+    6: "quintic spline",
+}
 MOST_LISTED = 12
 NOTHING = 1e-13
 
@@ -53,8 +59,8 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
     fitted, points = curve.fit, curve.points
     x, y, space = points.x_column, points.y_column, fitted.space
     lines = [
-        f"{file}: {y.words} against {x.words}, {len(fitted.x)} points, curve from {shown(space.lower, x)} to "
-        f"{shown(space.upper, x)}"
+        f"{file}: {y.words} against {x.words}, {len(fitted.x)} points, curve from"
+        f" {shown(space.lower, x)} to {shown(space.upper, x)}"
     ]
     knots = [knot for knot in space.knots if knot not in curve.boundaries]
     listed = ", ".join(f"{knot / x.factor:.6g}" for knot in knots[:MOST_LISTED])
@@ -72,7 +78,9 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
         lines.append(f"features share value and slope at {shown(boundary, x)}{both}")
     if len(set(points.features)) > 1 and not curve.boundaries:
         names = listing(dict.fromkeys(points.features))
-        lines.append(f"one curve over {names}: the column feature makes no boundaries; --boundary does")
+        lines.append(
+            f"one curve over {names}: the column feature makes no boundaries; --boundary does"
+        )
     for k in sorted(set(curve.settings.straight)):
         lines.append(f"feature {k} is a straight line")
     for hold in curve.holds:
@@ -81,8 +89,12 @@ def curve_lines(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> list
     if curve.settings.period is not None:
         lines.append(f"periodic: ends agree in value and {space.order - 2} derivatives")
     lines += _sigma_lines(curve)
-    worst = np.argsort(-comparable(np.abs(fitted.residuals / fitted.uncertainties)), kind="stable")[:3]
-    told = ", ".join(f"{shown(fitted.residuals[k], y, 3)} at point {points.names[k]}" for k in worst)
+    worst = np.argsort(-comparable(np.abs(fitted.residuals / fitted.uncertainties)), kind="stable")[
+        :3
+    ]
+    told = ", ".join(
+        f"{shown(fitted.residuals[k], y, 3)} at point {points.names[k]}" for k in worst
+    )
     lines += [f"largest residuals: {told}", "", *_piece_lines(curve, powers)]
     if len(at):
         lines += ["", *_value_lines(curve, at)]
@@ -98,7 +110,9 @@ def _sigma_lines(curve: Curve) -> list[str]:
     fitted, y = curve.fit, curve.points.y_column
     estimated = fitted.sigma
     if curve.sigma_is_estimated and math.isnan(estimated):
-        return ["no degrees of freedom are left to estimate sigma from; state the points' uncertainty"]
+        return [
+            "no degrees of freedom are left to estimate sigma from; state the points' uncertainty"
+        ]
     what = number(curve.sigma, 4) if curve.has_uncertainties else shown(curve.sigma, y, 4)
     source = "estimated from the residuals" if curve.sigma_is_estimated else "given"
     beside = ""
@@ -109,9 +123,12 @@ def _sigma_lines(curve: Curve) -> list[str]:
     worst = int(np.argmax(comparable(spread)))
     return [
         f"sigma {what}, {source}{beside}",
-        f"standard uncertainty of the curve: median {shown(float(np.median(spread)), y, 3)}, largest "
-        f"{shown(spread[worst], y, 3)} at {shown(places[worst], curve.points.x_column, 4)}; "
-        f"{curve.coverage_factor:.3g} times that for 95 %",
+        (
+            f"standard uncertainty of the curve: median {shown(float(np.median(spread)), y, 3)},"
+            f" largest {shown(spread[worst], y, 3)} at"
+            f" {shown(places[worst], curve.points.x_column, 4)}; {curve.coverage_factor:.3g} times"
+            " that for 95 %"
+        ),
     ]
 
 
@@ -136,14 +153,20 @@ def _piece_lines(curve: Curve, powers: Powers) -> list[str]:
     for start, end, row in zip(found.breaks, found.breaks[1:], coefficients, strict=False):
         # What adds less to the curve than rounding does is told as zero.
         size = NOTHING * float(np.abs(curve.fit.coefficients).max()) / curve.points.y_column.factor
-        lengths = ((end - start if powers == "local" else max(abs(start), abs(end))) / x.factor) ** np.arange(len(row))
+        lengths = (
+            (end - start if powers == "local" else max(abs(start), abs(end))) / x.factor
+        ) ** np.arange(len(row))
         told = [
-            "0" if abs(value) * length < size else f"{value:.7g}" for value, length in zip(row, lengths, strict=True)
+            "0" if abs(value) * length < size else f"{value:.7g}"
+            for value, length in zip(row, lengths, strict=True)
         ]
         rows.append([f"{start / x.factor:.6g}", f"{end / x.factor:.6g}", *told])
     note = []
     if powers == "global":
-        note = [f"terms are up to {found.cancellation():.2g} times the curve, and rounding as much larger"]
+        note = [
+            f"terms are up to {found.cancellation():.2g} times the curve, and rounding as much"
+            " larger"
+        ]
     return [
         f"polynomials of u, the {_variable(curve, powers)}, in {x.unit}; their coefficients of",
         *aligned(rows, [True] * len(head)),
@@ -154,9 +177,13 @@ def _piece_lines(curve: Curve, powers: Powers) -> list[str]:
 def _value_lines(curve: Curve, at: np.ndarray) -> list[str]:
     x, y = curve.points.x_column, curve.points.y_column
     values, slopes = curve.fit.values(at), curve.fit.values(at, 1)
-    slopes[np.abs(slopes) * curve.fit.space.length < NOTHING * np.abs(curve.fit.coefficients).max()] = 0.0
+    slopes[
+        np.abs(slopes) * curve.fit.space.length < NOTHING * np.abs(curve.fit.coefficients).max()
+    ] = 0.0
     spread = curve.standard_uncertainty(at)
-    rows = [[f"{x.words}, {x.unit}", f"curve, {y.unit}", "standard uncertainty", "expanded", "slope"]]
+    rows = [
+        [f"{x.words}, {x.unit}", f"curve, {y.unit}", "standard uncertainty", "expanded", "slope"]
+    ]
     for place, value, slope, u in zip(at, values, slopes, spread, strict=True):
         rows.append(
             [
@@ -186,7 +213,12 @@ def curve_data(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> dict[
         "knots": list(fitted.space.knots),
         "boundaries": list(curve.boundaries),
         "prescribed": [
-            {"at": hold.places[0], "derivative": hold.derivative, "value": hold.value, "missed_by": missed}
+            {
+                "at": hold.places[0],
+                "derivative": hold.derivative,
+                "value": hold.value,
+                "missed_by": missed,
+            }
             for hold, missed in ((hold, fitted.violation(hold)) for hold in curve.holds)
         ],
         "free_coefficients": fitted.free,
@@ -212,7 +244,12 @@ def curve_data(curve: Curve, file: str, powers: Powers, at: np.ndarray) -> dict[
                 "standard_uncertainty": _known(u),
             }
             for name, x, y, residual, u in zip(
-                points.names, fitted.x.tolist(), fitted.y.tolist(), fitted.residuals.tolist(), spread, strict=True
+                points.names,
+                fitted.x.tolist(),
+                fitted.y.tolist(),
+                fitted.residuals.tolist(),
+                spread,
+                strict=True,
             )
         ],
         "values": [
@@ -241,7 +278,10 @@ def coefficients_csv(curve: Curve, powers: Powers) -> str:
     sum_ = " + ".join("c0" if k == 0 else "c1 u" if k == 1 else f"c{k} u^{k}" for k in range(count))
     text.write(f"# {y.name} = {sum_}, where u is {_variable(curve, powers)}\n")
     writer = CsvWriter(text)
-    names = [f"c{k}_{derivative_unit(curve, k).replace('/', '_per_').replace('^', '')}" for k in range(count)]
+    names = [
+        f"c{k}_{derivative_unit(curve, k).replace('/', '_per_').replace('^', '')}"
+        for k in range(count)
+    ]
     writer.writerow([f"start_{x.unit}", f"end_{x.unit}", *names])
     breaks = (found.breaks / x.factor).tolist()
     for start, end, row in zip(breaks, breaks[1:], coefficients.tolist(), strict=False):

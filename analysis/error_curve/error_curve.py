@@ -1,4 +1,6 @@
-"""An error curve through measured points: a spline with what is prescribed for it, and how well it is known."""
+"""An error curve through measured points: a spline with what is prescribed for it, and how well it
+is known.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ Place = float | tuple[float, float] | Literal["start", "end"]
 """An abscissa, nominal co-ordinates (radius, axial) on the profile, or an end of the curve."""
 
 EVERY = 5
-# A profile goes on beyond its points for no more than this many times the largest distance between two of them.
+# A profile goes on beyond its points for no more than this many times the largest distance between
+# two of them.
 CONTINUED = 2.0
 # Time grows with the square of these, times the points.
 MOST_COEFFICIENTS = 500
@@ -39,8 +42,9 @@ class Hold:
 class CurveSettings:
     """What curve is wanted. Lengths and angles are in metres and radians.
 
-    Knots are at every `every`-th point of each feature, or where `knots` says. At `boundaries` only value and slope are
-    continuous; `straight` are the features, counted from 1, that are straight lines. `period` closes the curve.
+    Knots are at every `every`-th point of each feature, or where `knots` says. At `boundaries` only
+    value and slope are continuous; `straight` are the features, counted from 1, that are straight
+    lines. `period` closes the curve.
     """
 
     order: int = 4
@@ -56,10 +60,11 @@ class CurveSettings:
 
 @dataclass(frozen=True)
 class Curve:
-    """A fitted curve. `fit` has the points in ascending order of x, which `points` (names and columns) follows.
+    """A fitted curve. `fit` has the points in ascending order of x, which `points` (names and
+    columns) follows.
 
-    `sigma` is the standard uncertainty of a point, or the factor of the stated ones: `sigma_is_estimated` from the
-    residuals, and then not a number without degrees of freedom, or 1.
+    `sigma` is the standard uncertainty of a point, or the factor of the stated ones:
+    `sigma_is_estimated` from the residuals, and then not a number without degrees of freedom, or 1.
     """
 
     points: Points
@@ -74,11 +79,17 @@ class Curve:
 
     @property
     def coverage_factor(self) -> float:
-        """Of the expanded uncertainty for 95 %: Student's where sigma is estimated, otherwise normal."""
+        """Of the expanded uncertainty for 95 %: Student's where sigma is estimated, otherwise
+        normal.
+        """
         from scipy.special import ndtri, stdtrit
 
         if self.sigma_is_estimated:
-            return float(stdtrit(self.fit.degrees_of_freedom, 0.975)) if self.fit.degrees_of_freedom else float("nan")
+            return (
+                float(stdtrit(self.fit.degrees_of_freedom, 0.975))
+                if self.fit.degrees_of_freedom
+                else float("nan")
+            )
         return float(ndtri(0.975))
 
     def standard_uncertainty(self, x: Array, derivative: int = 0) -> Array:
@@ -90,27 +101,45 @@ class Curve:
 
 
 def fit_curve(
-    points: Points, settings: CurveSettings, uncertainty: float | None = None, sigma: str | None = None
+    points: Points,
+    settings: CurveSettings,
+    uncertainty: float | None = None,
+    sigma: str | None = None,
 ) -> Curve:
-    """Fit the curve. `uncertainty` is that of each point where the points state none; `sigma` is given or estimated.
+    """Fit the curve. `uncertainty` is that of each point where the points state none; `sigma` is
+    given or estimated.
 
-    :raises SplineError: it cannot be fitted, all reasons found; or sigma should be given, and no uncertainty is.
+    :raises SplineError: it cannot be fitted, all reasons found; or sigma should be given, and no
+        uncertainty is.
     """
     x, ends, boundaries, holds, on_profile = _located(points, settings)
     lower, upper = ends
     if lower == upper == x.min() == x.max():
-        raise SplineError([Problem("all points are at {0}, where there is no curve; give points at several", (lower,))])
+        raise SplineError(
+            [
+                Problem(
+                    "all points are at {0}, where there is no curve; give points at several",
+                    (lower,),
+                )
+            ]
+        )
     order = np.argsort(x, kind="stable")
     x, points = x[order], points.chosen(order.tolist())
     boundaries = tuple(sorted(set(boundaries)))
     knots = settings.knots
     problems = [
-        Problem(f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of the curve")
+        Problem(
+            f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of"
+            " the curve"
+        )
         for k in settings.straight
         if not 1 <= k <= len(boundaries) + 1
     ]
     problems += [
-        Problem("the boundary at {0} is not between the ends of the curve, {1} and {2}", (place, lower, upper))
+        Problem(
+            "the boundary at {0} is not between the ends of the curve, {1} and {2}",
+            (place, lower, upper),
+        )
         for place in boundaries
         if not lower < place < upper
     ]
@@ -120,17 +149,26 @@ def fit_curve(
         if knot in boundaries
     ]
     if settings.order < 3 and boundaries:
-        problems.append(Problem("broken lines share no slope at boundaries; give an order of 3 or more"))
+        problems.append(
+            Problem("broken lines share no slope at boundaries; give an order of 3 or more")
+        )
     if problems:
         raise SplineError(problems)
     features = list(pairwise((lower, *boundaries, upper)))
     lines = [features[k - 1] for k in sorted(set(settings.straight))]
     if knots is None:
         found = at_every(x, settings.every, lower, upper, boundaries)
-        knots = tuple(knot for knot in found if not any(start <= knot <= end for start, end in lines))
-    space = SplineSpace(settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order))
+        knots = tuple(
+            knot for knot in found if not any(start <= knot <= end for start, end in lines)
+        )
+    space = SplineSpace(
+        settings.order, lower, upper, with_boundaries(knots, boundaries, settings.order)
+    )
     if space.count > MOST_COEFFICIENTS:
-        text = f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible, leave out knots"
+        text = (
+            f"{space.count} coefficients are too many; at most {MOST_COEFFICIENTS} are possible,"
+            " leave out knots"
+        )
         raise SplineError([Problem(text)])
     constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
     for start, end in lines:
@@ -139,16 +177,30 @@ def fit_curve(
     if stated is None and uncertainty is not None:
         stated = np.full(len(x), uncertainty)
     if stated is None and sigma == "given":
-        text = "no uncertainty is given that could be believed; add a column such as u_um, or give --uncertainty"
+        text = (
+            "no uncertainty is given that could be believed; add a column such as u_um, or give"
+            " --uncertainty"
+        )
         raise SplineError([Problem(text)])
     fitted = fit(space, x, points.y, stated, constraints)
     is_estimated = (sigma or ("estimated" if stated is None else "given")) == "estimated"
     factor = fitted.sigma if is_estimated else 1.0
-    return Curve(points, settings, fitted, boundaries, holds, factor, is_estimated, stated is not None, on_profile)
+    return Curve(
+        points,
+        settings,
+        fitted,
+        boundaries,
+        holds,
+        factor,
+        is_estimated,
+        stated is not None,
+        on_profile,
+    )
 
 
 def whole_profile(points: Points, boundaries: Array) -> tuple[Profile, Array]:
-    """The profile of all points of a file with boundaries (n, 2) on it, and the points' indices in it.
+    """The profile of all points of a file with boundaries (n, 2) on it, and the points' indices in
+    it.
 
     :raises SplineError: the points do not make a profile.
     """
@@ -161,14 +213,19 @@ def whole_profile(points: Points, boundaries: Array) -> tuple[Profile, Array]:
 def _located(
     points: Points, settings: CurveSettings
 ) -> tuple[Array, tuple[float, float], tuple[float, ...], tuple[Constraint, ...], Array]:
-    """Abscissae of points, ends, boundaries and prescribed values, and the places among them on the profile (n, 2)."""
+    """Abscissae of points, ends, boundaries and prescribed values, and the places among them on the
+    profile (n, 2).
+    """
     wanted = [*settings.boundaries, *(hold.at for hold in settings.holds)]
     nominal = list(dict.fromkeys(place for place in wanted if isinstance(place, tuple)))
     ends = [settings.start, settings.end]
     where: dict[Place, float] = {}
     if points.x is not None:
         if nominal or any(isinstance(end, tuple) for end in ends):
-            text = f"nominal co-ordinates tell a place on the profile, but the abscissa is {points.x_column.words}"
+            text = (
+                "nominal co-ordinates tell a place on the profile, but the abscissa is"
+                f" {points.x_column.words}"
+            )
             raise SplineError([Problem(f"{text}; give one value, or choose --x {ARC_LENGTH}")])
         x = points.x
     else:
@@ -177,16 +234,23 @@ def _located(
     upper = float(x.max()) if settings.end == "end" else _abscissa(settings.end, where)
     if settings.period is not None:
         if settings.end != "end":
-            raise SplineError([Problem("a periodic curve ends one period after its start; leave the end out")])
+            raise SplineError(
+                [Problem("a periodic curve ends one period after its start; leave the end out")]
+            )
         if settings.start == "start" and points.x_column.kind == "angle":
             lower = 0.0
         upper = lower + settings.period
         x = lower + np.mod(x - lower, settings.period)
     where |= {"start": lower, "end": upper}
     # The slope at the upper end is that of the last piece, so that either side will do.
-    holds = tuple(prescribed(_abscissa(hold.at, where), hold.derivative, hold.value) for hold in settings.holds)
+    holds = tuple(
+        prescribed(_abscissa(hold.at, where), hold.derivative, hold.value)
+        for hold in settings.holds
+    )
     boundaries = tuple(_abscissa(place, where) for place in settings.boundaries)
-    on_profile = np.array([place for place in settings.boundaries if isinstance(place, tuple)]).reshape(-1, 2)
+    on_profile = np.array(
+        [place for place in settings.boundaries if isinstance(place, tuple)]
+    ).reshape(-1, 2)
     return x, (lower, upper), boundaries, holds, on_profile
 
 
@@ -200,15 +264,24 @@ def _on_profile(
     """Arc lengths of the points and of places by their nominal co-ordinates."""
     assert points.places is not None
     start, end = (
-        None if isinstance(place, float | str) or (points.places == place).all(axis=1).any() else np.array(place)
+        (
+            None
+            if isinstance(place, float | str) or (points.places == place).all(axis=1).any()
+            else np.array(place)
+        )
         for place in (settings.start, settings.end)
     )
     _refuse_coincident(points.places)
     _refuse_distant(points.places, start, end)
     try:
-        profile, own, at = along(points.places, points.features, np.array(nominal).reshape(-1, 2), start, end)
+        profile, own, at = along(
+            points.places, points.features, np.array(nominal).reshape(-1, 2), start, end
+        )
     except NotOnProfileError as error:
-        text = "the place ({0}, {1}) is not on the profile between two points; correct it, or give the arc length"
+        text = (
+            "the place ({0}, {1}) is not on the profile between two points; correct it, or give the"
+            " arc length"
+        )
         raise SplineError([Problem(text, nominal[error.args[0]])]) from None
     lengths = profile.lengths
     where: dict[Place, float] = dict(zip(nominal, lengths[at].tolist(), strict=True))
@@ -221,7 +294,8 @@ def _on_profile(
 def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> None:
     """Refuse a start or an end that does not continue the profile beyond its first or last point.
 
-    :raises SplineError: it is nearer to another point, or much farther away than points are from one another.
+    :raises SplineError: it is nearer to another point, or much farther away than points are from
+        one another.
     """
     if len(places) < 2:
         return
@@ -232,7 +306,10 @@ def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> No
             continue
         away = np.hypot(*(places - place).T)
         if away[own] > min(float(away.min()), farthest):
-            text = "the place ({0}, {1}) is not on the profile or just beyond it; correct it, or give the arc length"
+            text = (
+                "the place ({0}, {1}) is not on the profile or just beyond it; correct it, or give"
+                " the arc length"
+            )
             problems.append(Problem(text, tuple(place.tolist())))
     if problems:
         raise SplineError(problems)

@@ -1,4 +1,6 @@
-"""The rival estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as in section 6.2.7."""
+"""The rival estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as
+in section 6.2.7.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,23 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
-from ballplate.simulator.estimation.length_equations import LengthEstimator, NotAMetricError, length_estimate
+from ballplate.simulator.estimation.length_equations import (
+    LengthEstimator,
+    NotAMetricError,
+    length_estimate,
+)
 from ballplate.simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import NoReadingError, noisy_certificate, noisy_readings, on_true_machine
+from ballplate.simulator.readings.generate import (
+    NoReadingError,
+    noisy_certificate,
+    noisy_readings,
+    on_true_machine,
+)
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
 from ..results.estimates import ParameterEstimate
@@ -26,20 +37,23 @@ from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
-# Derivatives, terms times parameters, of a rival estimator, which takes some 70 bytes for each, and more for few
-# parameters.
+# Derivatives, terms times parameters, of a rival estimator, which takes some 70 bytes for each, and
+# more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
 # Pairs of points of a comparison.
 MOST_POINTS = 100_000
 
-# Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth of that.
+# Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth
+# of that.
 ENOUGH = GaussNewtonSettings(smallest_step=1e-8)
 
 
 @dataclass(frozen=True)
 class RivalFit:
-    """Estimates of the machine's parameters by a rival estimator from `pairs` pairs of balls, without uncertainties."""
+    """Estimates of the machine's parameters by a rival estimator from `pairs` pairs of balls,
+    without uncertainties.
+    """
 
     label: str
     title: str
@@ -51,10 +65,12 @@ class RivalFit:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic data sets.
+    """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic
+    data sets.
 
-    For each data set on which both converged: root mean square `rms` and largest absolute value `maximum` (m,),
-    in metres, of the differences at `points` random pairs of points. `failed` lists the other data sets, from 0.
+    For each data set on which both converged: root mean square `rms` and largest absolute value
+    `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
+    the other data sets, from 0.
     """
 
     label: str
@@ -71,7 +87,8 @@ class Comparison:
 
 
 def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
-    """Pairs (p, 2) of balls of all plates: of the named set or, without a name, `braced` where that is defined.
+    """Pairs (p, 2) of balls of all plates: of the named set or, without a name, `braced` where that
+    is defined.
 
     :raises ExperimentError: an artefact has no such set.
     """
@@ -90,9 +107,15 @@ def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
 
 
 def count_terms(
-    experiment: Experiment, design: Design, estimator: RivalName, name: str | None = None, across_probes: bool = False
+    experiment: Experiment,
+    design: Design,
+    estimator: RivalName,
+    name: str | None = None,
+    across_probes: bool = False,
 ) -> int:
-    """Number of terms of a rival estimator, but for certificates and priors, if every position has all the balls."""
+    """Number of terms of a rival estimator, but for certificates and priors, if every position has
+    all the balls.
+    """
     count = 0
     artefact_of = design.ball_artefact[design.readings.ball]
     for k, (artefact, layout) in enumerate(experiment.layouts.items()):
@@ -100,7 +123,9 @@ def count_terms(
             continue
         chosen = name or ("braced" if "braced" in layout.pair_sets else "all")
         balls = len(layout.names)
-        found = balls * (balls - 1) // 2 if chosen == "all" else len(layout.pair_sets.get(chosen, ()))
+        found = (
+            balls * (balls - 1) // 2 if chosen == "all" else len(layout.pair_sets.get(chosen, ()))
+        )
         own = artefact_of == k
         read = np.stack([design.readings.position[own], design.readings.probe[own]], axis=1)
         probes = np.unique(np.unique(read, axis=0)[:, 0], return_counts=True)[1]
@@ -110,7 +135,11 @@ def count_terms(
 
 
 def _refuse_many_terms(
-    experiment: Experiment, design: Design, estimator: RivalName, name: str | None, across_probes: bool
+    experiment: Experiment,
+    design: Design,
+    estimator: RivalName,
+    name: str | None,
+    across_probes: bool,
 ) -> None:
     """Refuse what would take more memory than there is, before pairs are made.
 
@@ -119,8 +148,14 @@ def _refuse_many_terms(
     count = count_terms(experiment, design, estimator, name, across_probes)
     most = MOST_DERIVATIVES // max(len(design.model.parameters), 1)
     if count > most:
-        text = f"{estimator} with these pairs of balls has {count} terms; at most {most} are possible with "
-        text += f"{len(design.model.parameters)} parameters: take fewer --pairs, such as corners, or fewer balls"
+        text = (
+            f"{estimator} with these pairs of balls has {count} terms; at most {most} are possible"
+            " with "
+        )
+        text += (
+            f"{len(design.model.parameters)} parameters: take fewer --pairs, such as corners, or"
+            " fewer balls"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
 
 
@@ -131,23 +166,34 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
     """
     gauges = design.is_gauge is not None and bool(design.is_gauge.any())
     if gauges or design.length_names:
-        what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({design.length_names[0]})"
-        text = f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
+        what = (
+            "a Bryan gauge's pivot" if gauges else f"an unknown length ({design.length_names[0]})"
+        )
+        text = (
+            f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
 
 
 def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
     """Refuse what length equations and the full estimator do not both estimate.
 
-    :raises ExperimentError: no lengths, another error model than three scales and squareness, or errors left open.
+    :raises ExperimentError: no lengths, another error model than three scales and squareness, or
+        errors left open.
     """
     what, text = "artefacts", ""
     if not len(design.lengths):
         text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
     elif not has_all_errors(design):
-        what, text = "error_model", "length equations have the errors of {kind: metric}, in three dimensions, only"
+        what, text = (
+            "error_model",
+            "length equations have the errors of {kind: metric}, in three dimensions, only",
+        )
     elif as_drawn(design).deficiency:
-        text = "the design leaves errors open, and then estimates differ by what they hold; see ballplate check"
+        text = (
+            "the design leaves errors open, and then estimates differ by what they hold; see"
+            " ballplate check"
+        )
     if text:
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
 
@@ -162,7 +208,8 @@ def fit_rival(
 ) -> RivalFit:
     """Estimate machine errors from the distances of readings.
 
-    Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of t, t^2, ...
+    Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of
+    t, t^2, ...
     """
     design = observed.design
     _refuse_unknown_lengths(experiment, design)
@@ -170,7 +217,11 @@ def fit_rival(
     chosen = ball_pairs(experiment, pair_set)
     solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
-    names, units, matrix = [p.name for p in parameters], [p.unit for p in parameters], np.eye(len(parameters))
+    names, units, matrix = (
+        [p.name for p in parameters],
+        [p.unit for p in parameters],
+        np.eye(len(parameters)),
+    )
     if monomials:
         reported = design.model.reported()
         names, units, matrix = list(reported.names), list(reported.units), reported.matrix
@@ -182,7 +233,9 @@ def fit_rival(
         ParameterEstimate(name, float(value), np.nan, unit)
         for name, value, unit in zip(names, values, units, strict=True)
     )
-    return RivalFit(experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates)
+    return RivalFit(
+        experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates
+    )
 
 
 def compare_estimators(
@@ -197,9 +250,10 @@ def compare_estimators(
 ) -> Comparison:
     """Compare a rival with the full estimator on readings of the file's true machine.
 
-    Each data set has noise, a certificate and `points` random pairs of points in the volume of its own, all drawn
-    from `seed` (default: the file's) and its number, so that more data sets only add to those before. Points are
-    corrected with the probe of the file's evaluation. `report` is told the number of data sets done.
+    Each data set has noise, a certificate and `points` random pairs of points in the volume of its
+    own, all drawn from `seed` (default: the file's) and its number, so that more data sets only add
+    to those before. Points are corrected with the probe of the file's evaluation. `report` is told
+    the number of data sets done.
     """
     design = lay_out(experiment)
     chosen = np.zeros((0, 2), np.int64)
@@ -210,19 +264,27 @@ def compare_estimators(
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
     corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
-    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(experiment.true_machine, design.model, *corners)
+    )
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
         try:
-            both = _both_estimates(design, on_truth, truth, chosen, estimator, across_probes, generator)
+            both = _both_estimates(
+                design, on_truth, truth, chosen, estimator, across_probes, generator
+            )
         except NoReadingError as error:
-            raise ExperimentError([experiment.message(("true_machine",), f"{error}; state smaller ones")]) from None
+            raise ExperimentError(
+                [experiment.message(("true_machine",), f"{error}; state smaller ones")]
+            ) from None
         if both is None:
             failed.append(trial)
         else:
-            ends = design.lower + (design.upper - design.lower) * generator.random((2, points, design.dimension))
+            ends = design.lower + (design.upper - design.lower) * generator.random(
+                (2, points, design.dimension)
+            )
             difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
@@ -251,7 +313,9 @@ def _both_estimates(
     across_probes: bool,
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
-    """Parameters by the full and by the other estimator from one data set; None where one did not converge."""
+    """Parameters by the full and by the other estimator from one data set; None where one did not
+    converge.
+    """
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
     full = estimate(observed.design, observed.x, ENOUGH)
@@ -260,8 +324,14 @@ def _both_estimates(
             solved = length_estimate(observed.design, observed.x, estimator)
         except NotAMetricError:
             return None
-        return (full.state.a, solved.parameters) if full.status == "converged" and solved.converged else None
-    rival = rival_estimate(observed.design, observed.x, chosen, estimator, across_probes, ENOUGH, start=full.state.a)
+        return (
+            (full.state.a, solved.parameters)
+            if full.status == "converged" and solved.converged
+            else None
+        )
+    rival = rival_estimate(
+        observed.design, observed.x, chosen, estimator, across_probes, ENOUGH, start=full.state.a
+    )
     if full.status != "converged" or rival.status != "converged":
         return None
     return full.state.a, rival.a
@@ -287,12 +357,18 @@ def rival_fit_lines(fit: RivalFit) -> list[str]:
     lines = [
         f"{fit.label}: {fit.title}",
         f"estimator {fit.solution.estimator}: {used}, {fit.solution.observations} terms; {rank}",
-        f"{fit.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g} (its terms "
-        "are not independent, so that it estimates no sigma and the values have no uncertainty here)",
+        (
+            f"{fit.solution.status} after {len(record) - 1} iterations; S^2 ="
+            f" {record[-1].sum_of_squares:.6g} (its terms are not independent, so that it estimates"
+            " no sigma and the values have no uncertainty here)"
+        ),
         "",
     ]
     rows = [["iteration", "step", "S^2"]]
-    rows += [[str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
+    rows += [
+        [str(k), f"{it.step:.5e}" if k else "", f"{it.sum_of_squares:.5e}"]
+        for k, it in enumerate(record)
+    ]
     lines += [*aligned(rows, [True, True, True]), ""]
     rows = [["parameter", "value", "unit"]]
     rows += [[e.name, number(1e6 * e.value, 6), SHOWN[e.unit]] for e in fit.estimates]
@@ -320,28 +396,57 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
         "observations": fit.solution.observations,
         "rank_deficiency": fit.solution.deficiency,
         "status": fit.solution.status,
-        "iterations": [{"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations],
-        "estimates": {e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit} for e in fit.estimates},
+        "iterations": [
+            {"step": it.step, "sum_of_squares": it.sum_of_squares} for it in fit.solution.iterations
+        ],
+        "estimates": {
+            e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit}
+            for e in fit.estimates
+        },
     }
 
 
 def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
-    """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum") stand in them."""
+    """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum")
+    stand in them.
+    """
     across = ", across probes" if found.across_probes else ""
     used = _used(found.pairs, found.lengths)
     lines = [
         f"{found.label}: {found.title}",
-        f"estimator {found.estimator} ({used}{across}) against the full one: corrected distances "
-        f"of {found.points} random pairs of points in each of {found.trials} data sets, differences in um",
+        (
+            f"estimator {found.estimator} ({used}{across}) against the full one: corrected"
+            f" distances of {found.points} random pairs of points in each of {found.trials} data"
+            " sets, differences in um"
+        ),
     ]
     if found.failed:
-        lines.append(f"not converged: {len(found.failed)} data sets, numbers {', '.join(map(str, found.failed[:20]))}")
+        lines.append(
+            f"not converged: {len(found.failed)} data sets, numbers"
+            f" {', '.join(map(str, found.failed[:20]))}"
+        )
     if not len(found.rms):
         return lines
-    rows = [["", "least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest", "published", "below it"]]
-    for words, key, values in (("root mean square", "rms", found.rms), ("largest", "maximum", found.maximum)):
+    rows = [
+        [
+            "",
+            "least",
+            *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]),
+            "largest",
+            "published",
+            "below it",
+        ]
+    ]
+    for words, key, values in (
+        ("root mean square", "rms", found.rms),
+        ("largest", "maximum", found.maximum),
+    ):
         value = published.get(key)
-        placed = ["", ""] if value is None else [number(1e6 * value), f"{100 * share_below(values, value):.0f} %"]
+        placed = (
+            ["", ""]
+            if value is None
+            else [number(1e6 * value), f"{100 * share_below(values, value):.0f} %"]
+        )
         rows.append([words, *(number(1e6 * q) for q in np.quantile(values, QUANTILES)), *placed])
     if all(value is None for value in published.values()):
         rows = [row[:-2] for row in rows]
@@ -364,7 +469,9 @@ def comparison_data(found: Comparison, published: dict[str, float | None]) -> di
     for key, values in (("rms", found.rms), ("maximum", found.maximum)):
         quantiles = list(np.quantile(values, QUANTILES)) if len(values) else []
         data[key] = {
-            "quantiles": {str(q): float(value) for q, value in zip(QUANTILES, quantiles, strict=False)},
+            "quantiles": {
+                str(q): float(value) for q, value in zip(QUANTILES, quantiles, strict=False)
+            },
             "values": [float(value) for value in values],
         }
         value = published.get(key)

@@ -1,4 +1,6 @@
-"""The length equations of US 4,437,151 at work: a fit of readings of bars and gauges, without weights."""
+"""The length equations of US 4,437,151 at work: a fit of readings of bars and gauges, without
+weights.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +33,12 @@ FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 
 @dataclass(frozen=True)
 class LengthFit:
-    """Length equations solved for an experiment's readings; `pivots` have the names of the gauges' positions.
+    """Length equations solved for an experiment's readings; `pivots` have the names of the gauges'
+    positions.
 
-    `factors`, `pivots` and `lengths` are NaN where they are open. `spheres` are the radii of spheres through each
-    position's readings of a gauge, a length in scale readings that is told even where no length is known.
-    `remarks` tell what should be known beside the figures.
+    `factors`, `pivots` and `lengths` are NaN where they are open. `spheres` are the radii of
+    spheres through each position's readings of a gauge, a length in scale readings that is told
+    even where no length is known. `remarks` tell what should be known beside the figures.
     """
 
     label: str
@@ -54,7 +57,9 @@ def has_all_errors(design: Design) -> bool:
     return isinstance(design.model, SpatialMetricModel) and design.model.with_scales
 
 
-def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: LengthEstimator) -> LengthFit:
+def fit_lengths(
+    experiment: Experiment, observed: ObservedReadings, estimator: LengthEstimator
+) -> LengthFit:
     """Solve the length equations of an experiment's readings.
 
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
@@ -62,18 +67,33 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
     design = observed.design
     if design.dimension != 3 or not len(design.lengths):
         what = "machine.volume" if design.dimension != 3 else "artefacts"
-        has = "has two dimensions" if design.dimension != 3 else "has no ball bar or Bryan gauge whose lengths are read"
-        text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
-        bars = [name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)]
+        has = (
+            "has two dimensions"
+            if design.dimension != 3
+            else "has no ball bar or Bryan gauge whose lengths are read"
+        )
+        text = (
+            f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
+        )
+        bars = [
+            name
+            for name, one in experiment.artefacts.items()
+            if isinstance(one, TwoSpheresSettings)
+        ]
         if bars and design.dimension == 3:
-            text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
+            text = (
+                f"is a plate, but {estimator} needs length standards; state role: length_standard"
+            )
             mark = experiment.place(("artefacts", bars[0]))
             raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
     try:
         solution = length_estimate(design, observed.x, estimator)
     except NotAMetricError as error:
-        text = f"{error}; look for wrong units, balls or positions among the readings, or read more directions"
+        text = (
+            f"{error}; look for wrong units, balls or positions among the readings, or read more"
+            " directions"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
     remarks = []
     if len(design.plate_readings):
@@ -81,17 +101,24 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
     if len(design.priors):
         remarks.append(f"{estimator} takes no notice of priors")
     if design.free_offsets is not None and design.free_offsets.any():
-        remarks.append(f"{estimator} takes the probes' offsets as the file states them, though they are unknown")
+        remarks.append(
+            f"{estimator} takes the probes' offsets as the file states them, though they are"
+            " unknown"
+        )
     if not has_all_errors(design):
         remarks.append(
-            f"{estimator} has three scale errors and three squareness errors, whatever the file's error model"
+            f"{estimator} has three scale errors and three squareness errors, whatever the file's"
+            " error model"
         )
     if design.lengths.free is not None and (design.lengths.free >= 0).all():
-        remarks.append("no length is known: scales are told against one another, and the overall scale stays open")
+        remarks.append(
+            "no length is known: scales are told against one another, and the overall scale stays"
+            " open"
+        )
     if estimator == "sphere-then-metric" and len(design.gauge_positions):
         remarks.append(
-            "the pivot is the centre of a sphere, as if the machine were right: the errors that it takes up are "
-            "missing; see length-equations, or the full estimator"
+            "the pivot is the centre of a sphere, as if the machine were right: the errors that it"
+            " takes up are missing; see length-equations, or the full estimator"
         )
     if not np.isfinite(solution.scatter):
         remarks.append("there are no more equations than unknowns, and hence no uncertainties")
@@ -105,9 +132,13 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
         experiment.label,
         experiment.title,
         solution,
-        adjustments(solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom),
+        adjustments(
+            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
+        ),
         tuple(factors.tolist()),
-        tuple((design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions),
+        tuple(
+            (design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
+        ),
         tuple(zip(design.length_names, lengths.tolist(), strict=True)),
         tuple(remarks),
         tuple(_spheres(design, observed.x)),
@@ -115,7 +146,9 @@ def fit_lengths(experiment: Experiment, observed: ObservedReadings, estimator: L
 
 
 def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
-    """Positions of gauges with the radius (m) of the sphere through their readings x (m, d), where they fix one."""
+    """Positions of gauges with the radius (m) of the sphere through their readings x (m, d), where
+    they fix one.
+    """
     for k in design.gauge_positions:
         rows = design.readings.position == k
         points = x[rows] + design.probes[design.readings.probe[rows]]
@@ -131,17 +164,29 @@ def length_fit_lines(fit: LengthFit) -> list[str]:
     status = "converged" if found.converged else "not converged"
     lines = [
         f"{fit.label}: {fit.title}",
-        f"estimator {found.estimator}: {found.equations} equations, all of the same weight; {rank}; "
-        f"{freedom_words(found.degrees_of_freedom)}",
+        (
+            f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
+            f" {rank}; {freedom_words(found.degrees_of_freedom)}"
+        ),
         f"{status} after {found.iterations} iterations",
         "",
     ]
-    rows = [["factor of the metric", *FACTORS], ["1e-6", *(number(1e6 * value) for value in fit.factors)]]
+    rows = [
+        ["factor of the metric", *FACTORS],
+        ["1e-6", *(number(1e6 * value) for value in fit.factors)],
+    ]
     lines += [*aligned(rows, [False] + 6 * [True]), "", *adjustment_lines(fit.adjustments)]
-    where = [f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm" for name, centre in fit.pivots]
+    where = [
+        f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm"
+        for name, centre in fit.pivots
+    ]
     lines += [f"pivots: {'; '.join(where)}, in scale readings"] if where else []
     radii = [f"{name} {_millimetres(radius, 5)} mm" for name, radius in fit.spheres]
-    lines += [f"radii of the spheres through the readings: {'; '.join(radii)}, in scale readings"] if radii else []
+    lines += (
+        [f"radii of the spheres through the readings: {'; '.join(radii)}, in scale readings"]
+        if radii
+        else []
+    )
     return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in fit.lengths]
 
 

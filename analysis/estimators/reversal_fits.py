@@ -1,7 +1,9 @@
-"""The reversal of NBSIR 79-1752 on an experiment's readings, with the full estimate of the same readings beside it.
+"""The reversal of NBSIR 79-1752 on an experiment's readings, with the full estimate of the same
+readings beside it.
 
-The full estimate is what the report calls multiple redundancy: all co-ordinates of the plate, one pose, and the
-two-dimensional metric as the machine's error model. It needs no approximation and has standard uncertainties.
+The full estimate is what the report calls multiple redundancy: all co-ordinates of the plate, one
+pose, and the two-dimensional metric as the machine's error model. It needs no approximation and has
+standard uncertainties.
 """
 
 from __future__ import annotations
@@ -14,7 +16,12 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.estimation.parameters import SharedLayout
-from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
+from ballplate.simulator.estimation.reversal import (
+    Reversal,
+    UndeterminedError,
+    reverse,
+    turn_between,
+)
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.geometry.motions import rotation_from_vector, vector_from_rotation
@@ -34,7 +41,8 @@ from ..results.formatting import number
 from ..results.plates import axes_of_plates
 from ..results.study import fit
 
-# The first-order equations may change a result by this many of its standard uncertainties before a warning is due.
+# The first-order equations may change a result by this many of its standard uncertainties before a
+# warning is due.
 NOTICEABLE = 0.5
 # With more than this many they are of no use.
 USELESS = 5.0
@@ -49,12 +57,13 @@ INSTEAD = "or fit without --estimator, which takes any positions"
 class ReversalFit:
     """Both estimates of the same readings.
 
-    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the first; `places` (n, 2)
-    are the readings in the first. `names` and
-    `coordinates` (n, 2) are the balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple
-    redundancy with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless `scale` is
-    "none") and offsets as the reversal defines them, with standard uncertainties. `without_offsets` is the chance of a
-    ratio of sums of squares such as found if there were none; NaN where they are parameters.
+    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
+    first; `places` (n, 2) are the readings in the first. `names` and `coordinates` (n, 2) are the
+    balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple redundancy
+    with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless
+    `scale` is "none") and offsets as the reversal defines them, with standard uncertainties.
+    `without_offsets` is the chance of a ratio of sums of squares such as found if there were none;
+    NaN where they are parameters.
     """
 
     label: str
@@ -75,13 +84,19 @@ class ReversalFit:
 
     @property
     def turn(self) -> float:
-        """The turn in radians that multiple redundancy finds, or the reversal where that finds none."""
-        betas = [one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)]
+        """The turn in radians that multiple redundancy finds, or the reversal where that finds
+        none.
+        """
+        betas = [
+            one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)
+        ]
         return np.pi / 2.0 + (betas[0] if betas else self.found.exact_beta)
 
     @property
     def distortion(self) -> float:
-        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's own axes."""
+        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's
+        own axes.
+        """
         exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
         return float(np.abs(self.coordinates - exact).max())
 
@@ -102,10 +117,11 @@ class ReversalFit:
         offset = float(np.abs(self.found.offset - self.found.exact_offset).max())
         shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
         return (
-            f"the turn is {told} from 90 degrees, too far for equations of the first order: what they neglect changes "
-            f"co-ordinates of balls by up to {_length(self.distortion)}{shift}, and results by up to "
-            f"{number(self.found.bias, 2)} of their standard uncertainties; turn the plate closer to 90 degrees, or "
-            "take the results of multiple redundancy"
+            f"the turn is {told} from 90 degrees, too far for equations of the first order: what"
+            " they neglect changes co-ordinates of balls by up to"
+            f" {_length(self.distortion)}{shift}, and results by up to {number(self.found.bias, 2)}"
+            " of their standard uncertainties; turn the plate closer to 90 degrees, or take the"
+            " results of multiple redundancy"
         )
 
     @property
@@ -115,11 +131,19 @@ class ReversalFit:
         if NOTICEABLE < self.found.bias <= USELESS:
             told.append(self._neglected())
         if self.without_offsets < ERRS:
-            told.append("the residuals are those of an offset between the positions; fit without --no-offsets")
+            told.append(
+                "the residuals are those of an offset between the positions; fit without"
+                " --no-offsets"
+            )
         if self.full.converged and self.full.too_large:
             told.append(
-                "the residuals are larger than the stated repeatability explains; standard uncertainties of multiple "
-                + ("redundancy are scaled by them" if self.full.sigma_is_estimated else "redundancy are too small")
+                "the residuals are larger than the stated repeatability explains; standard"
+                " uncertainties of multiple "
+                + (
+                    "redundancy are scaled by them"
+                    if self.full.sigma_is_estimated
+                    else "redundancy are too small"
+                )
             )
         return tuple(told)
 
@@ -134,7 +158,8 @@ def fit_reversal(
 ) -> ReversalFit:
     """Estimate squareness, scale difference and the plate from two positions a quarter turn apart.
 
-    `scale` overrides which axis the file gives the scale difference, `sigma` what it says about uncertainties.
+    `scale` overrides which axis the file gives the scale difference, `sigma` what it says about
+    uncertainties.
 
     :raises ExperimentError: the experiment is no reversal; every reason at once.
     """
@@ -142,7 +167,10 @@ def fit_reversal(
     settings: MetricSettings = experiment.error_model
     scale = settings.plane_scale if scale is None else scale
     experiment = replace(experiment, error_model=settings.model_copy(update={"scale": scale}))
-    corners = (tuple(map(float, experiment.machine.volume.lower)), tuple(map(float, experiment.machine.volume.upper)))
+    corners = (
+        tuple(map(float, experiment.machine.volume.lower)),
+        tuple(map(float, experiment.machine.volume.upper)),
+    )
     design = replace(observed.design, model=build_error_model(experiment.error_model, *corners))
     observed = replace(observed, design=design)
     seen = _mean_readings(observed)
@@ -152,7 +180,9 @@ def fit_reversal(
         chance = float("nan") if offsets else _chance(found, reverse(seen[k], seen[m], scale))
     except UndeterminedError as error:
         text = f"{error}; read balls that are not"
-        raise ExperimentError([_message(experiment, ("artefacts", design.artefact_names[0]), text)]) from None
+        raise ExperimentError(
+            [_message(experiment, ("artefacts", design.artefact_names[0]), text)]
+        ) from None
     axes = axes_of_plates(experiment)[design.artefact_names[0]]
     full = fit(experiment, observed, sigma)
     values = [found.alpha, found.beta, found.gamma, *found.offset.tolist()][: 5 if offsets else 3]
@@ -165,7 +195,10 @@ def fit_reversal(
         design.position_names[m],
         seen[k] + design.origins[k],
         found,
-        tuple(ParameterEstimate(n, v, np.nan, u) for (n, u), v in zip(PARAMETERS, values, strict=False)),
+        tuple(
+            ParameterEstimate(n, v, np.nan, u)
+            for (n, u), v in zip(PARAMETERS, values, strict=False)
+        ),
         axes,
         design.ball_names,
         in_plate_axes(found.coordinates, axes)[0],
@@ -203,17 +236,31 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
         kind = experiment.error_model.kind
         text = 'the reversal is about a machine of kind "metric" in two dimensions'
         solid = experiment.dimension == 3
-        remedy = "write metric" + (" and leave z out of the volume and of all places" if solid else "")
-        say(("error_model", "kind"), f'{text}, not "{kind}"{" in three" if solid else ""}; {remedy}')
+        remedy = "write metric" + (
+            " and leave z out of the volume and of all places" if solid else ""
+        )
+        say(
+            ("error_model", "kind"), f'{text}, not "{kind}"{" in three" if solid else ""}; {remedy}'
+        )
     elif experiment.dimension != 2:
         say(("machine", "volume"), "the reversal is about two dimensions, not three; leave z out")
     elif scale not in (None, experiment.error_model.plane_scale) and experiment.priors:
-        say(("priors",), f"priors are about the file's error model; write scale: {scale} there instead of --scale")
+        say(
+            ("priors",),
+            f"priors are about the file's error model; write scale: {scale} there instead of"
+            " --scale",
+        )
     if len(experiment.artefacts) != 1:
         names = listing(experiment.artefacts)
-        say(("artefacts",), f"the reversal takes one artefact, not {len(experiment.artefacts)} ({names}); keep one")
+        say(
+            ("artefacts",),
+            f"the reversal takes one artefact, not {len(experiment.artefacts)} ({names}); keep one",
+        )
     if len(experiment.positions) != 2:
-        text = f"the reversal takes two positions, a quarter turn apart, not {len(experiment.positions)}"
+        text = (
+            "the reversal takes two positions, a quarter turn apart, not"
+            f" {len(experiment.positions)}"
+        )
         say(("positions",), f"{text}; keep two")
     elif not found:
         found += _unusable_readings(experiment, observed)
@@ -224,12 +271,20 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
 
 
 def _unusable_readings(experiment: Experiment, observed: ObservedReadings) -> list[Message]:
-    """What is wrong with readings that are not of all balls in both positions, or with several probes."""
-    design, file = observed.design, observed.marks[0].file if observed.marks else str(experiment.source)
+    """What is wrong with readings that are not of all balls in both positions, or with several
+    probes.
+    """
+    design, file = (
+        observed.design,
+        observed.marks[0].file if observed.marks else str(experiment.source),
+    )
     found = []
     probes = [design.probe_names[probe] for probe in np.unique(design.readings.probe)]
     if len(probes) > 1:
-        text = f"the reversal takes readings with one probe, not with {listing(probes)}; keep those with one, {INSTEAD}"
+        text = (
+            f"the reversal takes readings with one probe, not with {listing(probes)}; keep those"
+            f" with one, {INSTEAD}"
+        )
         found.append(Message(file, 0, 0, "", text))
     count = np.zeros((2, len(design.ball_names)), np.int64)
     np.add.at(count, (design.readings.position, design.readings.ball), 1)
@@ -237,7 +292,8 @@ def _unusable_readings(experiment: Experiment, observed: ObservedReadings) -> li
         unread = [f'"{design.ball_names[ball]}"' for ball in np.flatnonzero(count[k] == 0)]
         if unread:
             text = (
-                f'the reversal needs every ball in both positions; in "{design.position_names[k]}" the readings lack '
+                f'the reversal needs every ball in both positions; in "{design.position_names[k]}"'
+                " the readings lack "
             )
             found.append(Message(file, 0, 0, "", f"{text}{listing(unread)}; read them, {INSTEAD}"))
     return found
@@ -250,11 +306,16 @@ def _refuse_turn(observed: ObservedReadings, say: Callable[[Steps, str], None]) 
     turn = np.degrees(turn_between(*_mean_readings(observed)))
     if not 45.0 < abs(turn) < 135.0:
         names = " and ".join(f'"{name}"' for name in observed.design.position_names)
-        say(("positions",), f"a turn of {abs(turn):.4g} degrees lies between {names}; turn the plate by about 90")
+        say(
+            ("positions",),
+            f"a turn of {abs(turn):.4g} degrees lies between {names}; turn the plate by about 90",
+        )
 
 
 def _mean_readings(observed: ObservedReadings) -> Array:
-    """Mean reading (2, n, 2) of each ball in each position, with its probe's offset, from the nominal origin."""
+    """Mean reading (2, n, 2) of each ball in each position, with its probe's offset, from the
+    nominal origin.
+    """
     design, readings = observed.design, observed.design.readings
     places = observed.x + design.probes[readings.probe] - design.origins[readings.position]
     total = np.zeros((2, len(design.ball_names), 2))
@@ -265,18 +326,26 @@ def _mean_readings(observed: ObservedReadings) -> Array:
 
 
 def _chance(three: Reversal, five: Reversal) -> float:
-    """Chance that offsets explain as much of the residuals as they do if there are none, by an F test."""
+    """Chance that offsets explain as much of the residuals as they do if there are none, by an F
+    test.
+    """
     from scipy.special import fdtrc
 
     if five.degrees_of_freedom <= 0:
         return 1.0
     left = five.sigma**2 * five.degrees_of_freedom
     explained = (three.sigma**2 * three.degrees_of_freedom - left) / 2.0
-    return float(fdtrc(2.0, five.degrees_of_freedom, max(explained, 0.0) / five.sigma**2)) if left > 0.0 else 0.0
+    return (
+        float(fdtrc(2.0, five.degrees_of_freedom, max(explained, 0.0) / five.sigma**2))
+        if left > 0.0
+        else 0.0
+    )
 
 
 def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEstimate, ...]:
-    """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the first, `k`."""
+    """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the
+    first, `k`.
+    """
     at = linearised_fit(design, full.solution)
     layout, state = at.layout, at.state
     own = np.eye(len(layout))
@@ -285,16 +354,26 @@ def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEsti
     rows = np.concatenate([np.transpose(by_shared), own[layout.model]])
     values = np.concatenate([_relation(design, layout, state, k, m, 0.0 * own[0]), state.a])
     uncertainties = full.sigma * at.of_shared(rows)
-    names = ("beta", "offset x", "offset y", *(parameter.name for parameter in design.model.parameters))
+    names = (
+        "beta",
+        "offset x",
+        "offset y",
+        *(parameter.name for parameter in design.model.parameters),
+    )
     found = dict(zip(names, zip(values.tolist(), uncertainties.tolist(), strict=True), strict=True))
-    return tuple(ParameterEstimate(name, *found[name], unit) for name, unit in PARAMETERS if name in found)
+    return tuple(
+        ParameterEstimate(name, *found[name], unit) for name, unit in PARAMETERS if name in found
+    )
 
 
-def _relation(design: Design, layout: SharedLayout, state: State, k: int, m: int, change: NDArray[Any]) -> NDArray[Any]:
-    """Beta and the offset (3,) as functions of a `change` of the shared parameters, which may be complex.
+def _relation(
+    design: Design, layout: SharedLayout, state: State, k: int, m: int, change: NDArray[Any]
+) -> NDArray[Any]:
+    """Beta and the offset (3,) as functions of a `change` of the shared parameters, which may be
+    complex.
 
-    Points of the plate are at R y + o, so that readings x of the second position, less its nominal origin, are at
-    M x + offset in the first, with M = A R_k R_m^T A^-1.
+    Points of the plate are at R y + o, so that readings x of the second position, less its nominal
+    origin, are at M x + offset in the first, with M = A R_k R_m^T A^-1.
     """
     poses = np.where(layout.pose_columns >= 0, change[layout.pose_columns], 0.0)
     a = state.a + change[layout.model]

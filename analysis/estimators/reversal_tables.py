@@ -13,7 +13,9 @@ from .reversal_fits import ReversalFit
 
 
 def reversal_lines(fit: ReversalFit) -> list[str]:
-    """A reversal as lines of text: parameters and co-ordinates, those of multiple redundancy beside them."""
+    """A reversal as lines of text: parameters and co-ordinates, those of multiple redundancy beside
+    them.
+    """
     found, full = fit.found, fit.full
     turn = number(float(np.degrees(fit.turn)), 8)
     count = "five parameters" if fit.offsets else "three parameters, no offsets"
@@ -21,13 +23,24 @@ def reversal_lines(fit: ReversalFit) -> list[str]:
     lines = [
         f"{fit.label}: {fit.title}",
         f"reversal, {count}, scale difference: {scale}",
-        f'{len(fit.names)} balls; "{fit.second}" is turned by {turn} degrees, clockwise, from "{fit.first}"',
-        f"sigma = {number(1e6 * found.sigma)} um with {found.degrees_of_freedom} degrees of freedom, of the difference "
-        f"of two readings; of a single one {number(1e6 * found.single)} um",
-        f"what the first-order equations neglect changes no result by more than {number(found.bias, 2)} standard "
-        "uncertainties",
-        f"multiple redundancy: {full.solution.status}; sigma = {number(full.sigma)} times the stated uncertainties "
-        f"({'estimated from the residuals' if full.sigma_is_estimated else 'as given'})",
+        (
+            f'{len(fit.names)} balls; "{fit.second}" is turned by {turn} degrees, clockwise, from'
+            f' "{fit.first}"'
+        ),
+        (
+            f"sigma = {number(1e6 * found.sigma)} um with {found.degrees_of_freedom} degrees of"
+            " freedom, of the difference of two readings; of a single one"
+            f" {number(1e6 * found.single)} um"
+        ),
+        (
+            "what the first-order equations neglect changes no result by more than"
+            f" {number(found.bias, 2)} standard uncertainties"
+        ),
+        (
+            f"multiple redundancy: {full.solution.status}; sigma = {number(full.sigma)} times the"
+            " stated uncertainties"
+            f" ({'estimated from the residuals' if full.sigma_is_estimated else 'as given'})"
+        ),
         "",
     ]
     redundant = {e.name: e for e in fit.redundant}
@@ -36,7 +49,9 @@ def reversal_lines(fit: ReversalFit) -> list[str]:
         other = redundant.get(one.name)
         u = np.nan if other is None else 1e6 * other.standard_uncertainty
         digits = 1e6 * found.sigma if np.isnan(u) else u
-        beside = ["-", "-"] if other is None else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
+        beside = (
+            ["-", "-"] if other is None else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
+        )
         rows.append([one.name, to_uncertainty(1e6 * one.value, digits), *beside, SHOWN[one.unit]])
     lines += aligned(rows, [False, True, True, True, False])
     return [*lines, "", *_ball_lines(fit)]
@@ -44,7 +59,15 @@ def reversal_lines(fit: ReversalFit) -> list[str]:
 
 def _ball_lines(fit: ReversalFit) -> list[str]:
     rows = [
-        ["ball", "x, mm", "y, mm", "multiple redundancy: x, mm", "y, mm", "standard uncertainty of x, um", "of y, um"]
+        [
+            "ball",
+            "x, mm",
+            "y, mm",
+            "multiple redundancy: x, mm",
+            "y, mm",
+            "standard uncertainty of x, um",
+            "of y, um",
+        ]
     ]
     plate = fit.full.plates[0] if fit.full.plates else None
     nothing = np.full_like(fit.coordinates, np.nan)
@@ -56,9 +79,15 @@ def _ball_lines(fit: ReversalFit) -> list[str]:
             for value, size in zip(values, u, strict=True)
         ]
         rows.append([name, *cells, *(number(1e6 * size, 3) for size in u)])
-    lines = [f"co-ordinates of the balls in the plate's own axes ({axes_words(fit.axes, fit.names)})"]
+    lines = [
+        f"co-ordinates of the balls in the plate's own axes ({axes_words(fit.axes, fit.names)})"
+    ]
     lines += aligned(rows[: MOST_BALLS + 1], [False] + [True] * 6)
-    return lines + ([f"({len(rows) - 1 - MOST_BALLS} balls more in --json)"] if len(rows) - 1 > MOST_BALLS else [])
+    return lines + (
+        [f"({len(rows) - 1 - MOST_BALLS} balls more in --json)"]
+        if len(rows) - 1 > MOST_BALLS
+        else []
+    )
 
 
 def reversal_data(fit: ReversalFit) -> dict[str, Any]:
@@ -77,7 +106,10 @@ def reversal_data(fit: ReversalFit) -> dict[str, Any]:
         "neglected_coordinates": fit.distortion,
         "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
         "estimates": {e.name: {"value": e.value, "unit": e.unit} for e in fit.estimates},
-        "axes": {"origin": fit.names[fit.axes.origin], "xy"[fit.axes.axis]: fit.names[fit.axes.ball]},
+        "axes": {
+            "origin": fit.names[fit.axes.origin],
+            "xy"[fit.axes.axis]: fit.names[fit.axes.ball],
+        },
         "balls": _by_ball(fit.names, fit.coordinates),
         "residuals": _by_ball(fit.names, found.residuals),
         "multiple_redundancy": {

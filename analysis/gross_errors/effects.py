@@ -1,4 +1,6 @@
-"""What a bias that nobody notices changes in the quantities that do not depend on the frame, at the most."""
+"""What a bias that nobody notices changes in the quantities that do not depend on the frame, at the
+most.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ from .response import Response
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# Places of which all pairs are looked at; of more points, or balls of a plate, some are chosen evenly.
+# Places of which all pairs are looked at; of more points, or balls of a plate, some are chosen
+# evenly.
 MOST_PLACES = 200
 
 # Numbers of a product of functions and patterns that are held at once.
@@ -38,7 +41,8 @@ LENGTHS = tuple(symbol for symbol in SYMBOLS if QUANTITIES[symbol].are_lengths)
 
 @dataclass(frozen=True)
 class Largest:
-    """For k patterns the largest change by a unit of the bias (k,), its function (k,), and the latter's uncertainty.
+    """For k patterns the largest change by a unit of the bias (k,), its function (k,), and the
+    latter's uncertainty.
 
     The function is -1, and the change 0, where there is none that is determined.
     """
@@ -50,11 +54,12 @@ class Largest:
 
 @dataclass(frozen=True)
 class Changes:
-    """Linear functions of the displacements of places: rows of `operator` (f, places d), with uncertainties (f,).
+    """Linear functions of the displacements of places: rows of `operator` (f, places d), with
+    uncertainties (f,).
 
-    The places move by `common` (places d, r) times the common part of a response and, for balls, by `own`
-    (places d, n d) times its own part; None for points. `first` and `second` (f,) are the places of each function, or
-    one and its axis.
+    The places move by `common` (places d, r) times the common part of a response and, for balls, by
+    `own` (places d, n d) times its own part; None for points. `first` and `second` (f,) are the
+    places of each function, or one and its axis.
     """
 
     operator: csr_array
@@ -82,14 +87,22 @@ class Changes:
 
 
 def changes_of(at: Linearisation, given: Coordinates | Distances) -> Callable[[Integers], Changes]:
-    """Changes of co-ordinates, or of distances; of a large artefact, those that end at some or the asked balls."""
+    """Changes of co-ordinates, or of distances; of a large artefact, those that end at some or the
+    asked balls.
+    """
     places, made = given.places, displacements(at, given.places, narrow=False)
     if isinstance(given, Coordinates):
         found = _coordinates(made, places)
         return lambda asked: found
     if isinstance(given.places, Points):
-        chosen = np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
-        pairs = np.stack(np.triu_indices(len(chosen), 1), axis=1) if given.pairs is None else given.pairs
+        chosen = (
+            np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
+        )
+        pairs = (
+            np.stack(np.triu_indices(len(chosen), 1), axis=1)
+            if given.pairs is None
+            else given.pairs
+        )
         of_points = _distances(made.select(chosen), None, pairs, chosen)
         return lambda asked: of_points
     own = _own_parts(at, made, given.places.index)
@@ -129,7 +142,9 @@ def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_a
     n, d = at.design.balls.shape
     row = d * np.arange(len(index))[:, None, None] + np.arange(d)[:, None] + np.zeros(d, np.int64)
     column = d * index[:, None, None] + np.zeros((d, 1), np.int64) + np.arange(d)
-    own = coo_array((made.own.ravel(), (row.ravel(), column.ravel())), shape=(len(index) * d, n * d)).tocsr()
+    own = coo_array(
+        (made.own.ravel(), (row.ravel(), column.ravel())), shape=(len(index) * d, n * d)
+    ).tocsr()
     own.eliminate_zeros()
     return own
 
@@ -147,12 +162,18 @@ def _coordinates(made: Displacements, places: Places) -> Changes:
     return Changes(operator, common, None, uncertainty[known], places.labels[place], axis)
 
 
-def _distances(made: Displacements, own: csr_array | None, pairs: Integers, labels: Integers) -> Changes:
-    """Distances between pairs (m, 2) of places that are apart and, where they are as drawn, determined."""
+def _distances(
+    made: Displacements, own: csr_array | None, pairs: Integers, labels: Integers
+) -> Changes:
+    """Distances between pairs (m, 2) of places that are apart and, where they are as drawn,
+    determined.
+    """
     from scipy.sparse import coo_array
 
     n, d = made.places.shape
-    places, drawn = (where - where.mean(axis=0) if n else where for where in (made.places, made.drawn))
+    places, drawn = (
+        where - where.mean(axis=0) if n else where for where in (made.places, made.drawn)
+    )
     common, null = without_rigid_motion(places, made.common), without_rigid_motion(drawn, made.null)
     first, second = pairs.T
     apart = np.sqrt(((places[first] - places[second]) ** 2).sum(axis=1)) > 0.0
@@ -163,7 +184,9 @@ def _distances(made: Displacements, own: csr_array | None, pairs: Integers, labe
         length = np.sqrt((unit**2).sum(axis=1))
         unit /= np.where(length > 0.0, length, 1.0)[:, None]
         row = np.repeat(np.arange(len(first)), 2 * d)
-        column = np.concatenate([d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1)
+        column = np.concatenate(
+            [d * first[:, None] + np.arange(d), d * second[:, None] + np.arange(d)], axis=1
+        )
         value = np.concatenate([unit, -unit], axis=1)
         return coo_array((value.ravel(), (row, column.ravel())), shape=(len(first), n * d)).tocsr()
 

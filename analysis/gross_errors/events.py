@@ -20,7 +20,9 @@ SLIP: tuple[Kind, ...] = ("shift", "turn")
 
 
 def event_groups(given: Patterns) -> list[Integers]:
-    """All events that are looked for, as arrays (g, q) of patterns: single ones, and what one cause may do together."""
+    """All events that are looked for, as arrays (g, q) of patterns: single ones, and what one cause
+    may do together.
+    """
     found = [np.flatnonzero(given.kind != "moved")[:, None]]
     for kind in BY_AXIS:
         found += _by_subject(given, kind)
@@ -30,7 +32,11 @@ def event_groups(given: Patterns) -> list[Integers]:
         found += [shift, np.concatenate([shift, turn], axis=1)]
     expansion = given.of_kind("expansion")
     artefact = given.design.position_artefact[given.subject[expansion]]
-    pairs = [expansion[[i, j]] for i, j in combinations(range(len(expansion)), 2) if artefact[i] == artefact[j]]
+    pairs = [
+        expansion[[i, j]]
+        for i, j in combinations(range(len(expansion)), 2)
+        if artefact[i] == artefact[j]
+    ]
     if pairs:
         found.append(np.array(pairs))
     return found
@@ -69,8 +75,8 @@ def _by_start(given: Patterns, kind: Kind) -> Integers:
 
 @dataclass(frozen=True)
 class Cause:
-    """What patterns come of: a `kind` (that of the patterns, or "slip"), its `subjects`, what is wrong as in
-    `patterns.Block`, and the first reading after a slip, or -1.
+    """What patterns come of: a `kind` (that of the patterns, or "slip"), its `subjects`, what is
+    wrong as in `patterns.Block`, and the first reading after a slip, or -1.
     """
 
     kind: str

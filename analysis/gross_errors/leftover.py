@@ -26,9 +26,10 @@ MOST_ENTRIES = 20_000_000
 
 @dataclass(frozen=True)
 class Leftover:
-    """Residuals (n,), whitened, orthogonal to the columns of Q, the root of the hat matrix, of which rows have a part
-    `common` (n, r) and a part `own` (n, d) in the columns of `ball` (n,), -1 without one. What has been taken out
-    stands in further columns of `common`. `freedom` are the degrees of freedom.
+    """Residuals (n,), whitened, orthogonal to the columns of Q, the root of the hat matrix, of
+    which rows have a part `common` (n, r) and a part `own` (n, d) in the columns of `ball` (n,), -1
+    without one. What has been taken out stands in further columns of `common`. `freedom` are the
+    degrees of freedom.
     """
 
     residual: Array
@@ -45,7 +46,9 @@ class Leftover:
     def of(self, columns: Array) -> Array:
         """What is left of biases (n, k)."""
         own = self.own_columns
-        return np.asarray(columns - self.common @ (self.common.T @ columns) - own @ (own.T @ columns))
+        return np.asarray(
+            columns - self.common @ (self.common.T @ columns) - own @ (own.T @ columns)
+        )
 
     def without(self, columns: Array) -> Leftover:
         """The same after biases (n, k) have been taken out, those that are not hidden."""
@@ -69,19 +72,29 @@ class Leftover:
 def entries(design: Design) -> tuple[int, int]:
     """Rows of all observations of a design, and columns that they may have in common.
 
-    Those are the shared parameters and the co-ordinates of balls that certificates of distances tie together.
+    Those are the shared parameters and the co-ordinates of balls that certificates of distances tie
+    together.
     """
     tied = np.unique(np.concatenate([design.distances.first, design.distances.second]))
     return len(row_places(design)), len(shared_layout(design)) + design.dimension * len(tied)
 
 
 def too_many_entries(design: Design) -> str:
-    """Why there is no memory to look for mistakes in so many observations of so many parameters; otherwise empty."""
+    """Why there is no memory to look for mistakes in so many observations of so many parameters;
+    otherwise empty.
+    """
     rows, columns = entries(design)
     if rows * columns <= MOST_ENTRIES:
         return ""
-    text = f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; at most "
-    return text + f"{MOST_ENTRIES // columns} are possible with {columns} parameters of machine, poses and tied balls"
+    text = (
+        f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; at"
+        " most "
+    )
+    return (
+        text
+        + f"{MOST_ENTRIES // columns} are possible with {columns} parameters of machine, poses and"
+        " tied balls"
+    )
 
 
 def orthonormal(left: Array, size: Array) -> Array:
@@ -92,7 +105,9 @@ def orthonormal(left: Array, size: Array) -> Array:
 
 
 def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
-    """What an estimate from scale readings x (readings, d), or error-free ones, leaves, to first order."""
+    """What an estimate from scale readings x (readings, d), or error-free ones, leaves, to first
+    order.
+    """
     design = at.design
     n, d = len(row_places(design)), design.dimension
     common, own, ball = np.zeros((n, at.balls.common.shape[2])), np.zeros((n, d)), np.full(n, -1)
@@ -112,7 +127,8 @@ class Explained:
 
 
 class Columns:
-    """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat matrix.
+    """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat
+    matrix.
 
     `groups` are arrays (g, q) of columns that are tested together.
     """
@@ -126,7 +142,9 @@ class Columns:
         private = np.asarray(own.power(2).sum(axis=1)).ravel()
         self._information = self.square - (common**2).sum(axis=1) - private
         self._width = of.common.shape[1]
-        self._grams = [self._gram(index, common, own) if index.shape[1] > 1 else None for index in groups]
+        self._grams = [
+            self._gram(index, common, own) if index.shape[1] > 1 else None for index in groups
+        ]
         self.groups = groups
         self.update(of)
 
@@ -139,23 +157,36 @@ class Columns:
 
     def tests(self) -> int:
         """Number of groups that can be tested."""
-        return sum(int((self.explained(number).dimensions > 0).sum()) for number in range(len(self.groups)))
+        return sum(
+            int((self.explained(number).dimensions > 0).sum()) for number in range(len(self.groups))
+        )
 
     def statistics(self) -> Array:
         """Estimated biases (k,) in their standard uncertainties, 0 for what cannot be tested."""
         can = self.information > 0.0
-        return np.asarray(np.where(can, self.product / np.sqrt(np.where(can, self.information, 1.0)), 0.0))
+        return np.asarray(
+            np.where(can, self.product / np.sqrt(np.where(can, self.information, 1.0)), 0.0)
+        )
 
     def _gram(self, index: Integers, common: Array, own: csr_array) -> Array:
-        """Products (g, q, q) of what is left of the columns of groups (g, q), each column in units of its size."""
+        """Products (g, q, q) of what is left of the columns of groups (g, q), each column in units
+        of its size.
+        """
         g, q = index.shape
         scaled = common[index] / self.size[index][:, :, None]
         found = -scaled @ scaled.transpose(0, 2, 1)
-        plain, private = [self.rows[column] for column in index.T], [own[column] for column in index.T]
+        plain, private = (
+            [self.rows[column] for column in index.T],
+            [own[column] for column in index.T],
+        )
         for i in range(q):
             for j in range(i, q):
-                product = plain[i].multiply(plain[j]).sum(axis=1) - private[i].multiply(private[j]).sum(axis=1)
-                value = np.asarray(product).ravel() / (self.size[index[:, i]] * self.size[index[:, j]])
+                product = plain[i].multiply(plain[j]).sum(axis=1) - private[i].multiply(
+                    private[j]
+                ).sum(axis=1)
+                value = np.asarray(product).ravel() / (
+                    self.size[index[:, i]] * self.size[index[:, j]]
+                )
                 found[:, i, j] += value
                 if i != j:
                     found[:, j, i] += value
@@ -166,7 +197,9 @@ class Columns:
         index, gram = self.groups[number], self._grams[number]
         if gram is None:
             single = index[:, 0]
-            return Explained(self.statistics()[single] ** 2, (self.information[single] > 0.0).astype(float))
+            return Explained(
+                self.statistics()[single] ** 2, (self.information[single] > 0.0).astype(float)
+            )
         further = self.further[index] / self.size[index][:, :, None]
         values, vectors = np.linalg.eigh(gram - further @ further.transpose(0, 2, 1))
         along = np.einsum("gij,gi->gj", vectors, self.product[index] / self.size[index])

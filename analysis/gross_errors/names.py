@@ -18,17 +18,25 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
     if kind in ("reading", "end"):
         return f"{reading_name(design, subject, with_position)}, {letter}"
     if kind == "length":
-        return f"{length_name(design, subject)} in position {design.position_names[_position(design, subject)]}"
+        return (
+            f"{length_name(design, subject)} in position"
+            f" {design.position_names[_position(design, subject)]}"
+        )
     if kind == "prior":
         return f"prior of {design.priors.names[subject]}"
     if kind == "coordinate":
         return f"{letter} of ball {design.ball_label(int(design.coordinates.ball[subject]))}"
     if kind == "distance":
-        first, second = (int(end[subject]) for end in (design.distances.first, design.distances.second))
+        first, second = (
+            int(end[subject]) for end in (design.distances.first, design.distances.second)
+        )
         return f"distance {design.ball_label(first)} to {design.ball_names[second]}"
     if kind == "ball":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
-        return f"dirt on ball {design.ball_label(int(ball))} in position {design.position_names[position]}, {letter}"
+        return (
+            f"dirt on ball {design.ball_label(int(ball))} in position"
+            f" {design.position_names[position]}, {letter}"
+        )
     if kind == "moved":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
         where = f"from position {design.position_names[position]} on"
@@ -66,19 +74,32 @@ def slip_place(given: Patterns, k: int) -> str:
 def reading_name(design: Design, reading: int, with_position: bool = True) -> str:
     """A reading by ball and position, and by its probe where there are several."""
     readings = design.readings
-    position = f" in position {design.position_names[readings.position[reading]]}" if with_position else ""
-    probe = f" with {design.probe_names[readings.probe[reading]]}" if len(design.probe_names) > 1 else ""
+    position = (
+        f" in position {design.position_names[readings.position[reading]]}" if with_position else ""
+    )
+    probe = (
+        f" with {design.probe_names[readings.probe[reading]]}"
+        if len(design.probe_names) > 1
+        else ""
+    )
     return f"ball {design.ball_label(int(readings.ball[reading]))}{position}{probe}"
 
 
 def length_name(design: Design, length: int, of_reading: bool = True) -> str:
-    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is certified."""
+    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is
+    certified.
+    """
     given, readings = design.lengths, design.readings
     ball = int(readings.ball[given.first[length]])
     artefact = design.artefact_names[design.ball_artefact[ball]]
     if given.second[length] < 0:
-        return f"radius of {artefact}" + (f" to ball {design.ball_names[ball]}" if of_reading else "")
-    return f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]} of {artefact}"
+        return f"radius of {artefact}" + (
+            f" to ball {design.ball_names[ball]}" if of_reading else ""
+        )
+    return (
+        f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]}"
+        f" of {artefact}"
+    )
 
 
 def _position(design: Design, length: int) -> int:

@@ -1,7 +1,8 @@
-"""What may be wrong with observations: a single one, or an event that touches many, each as a pattern over all rows.
+"""What may be wrong with observations: a single one, or an event that touches many, each as a
+pattern over all rows.
 
-A pattern is what one unit of the bias changes in the whitened residuals. Single observations come first, in the
-order of their rows; the events after them.
+A pattern is what one unit of the bias changes in the whitened residuals. Single observations come
+first, in the order of their rows; the events after them.
 """
 
 from __future__ import annotations
@@ -29,18 +30,30 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 Kind = Literal[
-    "reading", "length", "prior", "coordinate", "distance", "end", "ball", "moved", "shift", "turn", "probe",
+    "reading",
+    "length",
+    "prior",
+    "coordinate",
+    "distance",
+    "end",
+    "ball",
+    "moved",
+    "shift",
+    "turn",
+    "probe",
     "length value",
-    "scale", "expansion",
-]  # fmt: skip
+    "scale",
+    "expansion",
+]
 SINGLE: tuple[Kind, ...] = ("reading", "length", "prior", "coordinate", "distance")
 
-# Axes along which a reading changes lengths by less than this share of the most are left out, and so are those that
-# change all of them in a proportion equal to within the square of this.
+# Axes along which a reading changes lengths by less than this share of the most are left out, and
+# so are those that change all of them in a proportion equal to within the square of this.
 SLIGHT = 1e-3
 UNITS: dict[Kind, Literal["m", "rad", "1"]] = {"turn": "rad", "scale": "1", "expansion": "1"}
 
-# A slip leaves at least so many readings of the position on either side, and is looked for before at most so many.
+# A slip leaves at least so many readings of the position on either side, and is looked for before
+# at most so many.
 LEAST_PART, MOST_STARTS = 3, 60
 
 
@@ -48,11 +61,12 @@ LEAST_PART, MOST_STARTS = 3, 60
 class Block:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
-    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position, probe or artefact;
-    of a certified length, the first that has it, and of a ball, its first reading in that position, or from that
-    position on. An `end` is a reading of a standard whose lengths are read together, with which several of them are
-    wrong. `axis` (count,) is along or about which, -1 without one, the plate's own axis of a ball that moved; `start`
-    (count,) the first reading after a slip, -1 without one.
+    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position,
+    probe or artefact; of a certified length, the first that has it, and of a ball, its first
+    reading in that position, or from that position on. An `end` is a reading of a standard whose
+    lengths are read together, with which several of them are wrong. `axis` (count,) is along or
+    about which, -1 without one, the plate's own axis of a ball that moved; `start` (count,) the
+    first reading after a slip, -1 without one.
     """
 
     kind: Kind
@@ -70,7 +84,9 @@ class Block:
 
 @dataclass(frozen=True)
 class Patterns:
-    """Patterns as columns of `matrix` (rows, k), with `kind`, `subject`, `axis` and `start` (k,) as in `Block`."""
+    """Patterns as columns of `matrix` (rows, k), with `kind`, `subject`, `axis` and `start` (k,) as
+    in `Block`.
+    """
 
     design: Design
     matrix: csc_array
@@ -84,7 +100,9 @@ class Patterns:
 
     @cached_property
     def is_local(self) -> np.ndarray:
-        """Which patterns (k,) are of rows that come together: of one ball at the most, or one kind."""
+        """Which patterns (k,) are of rows that come together: of one ball at the most, or one
+        kind.
+        """
         return np.isin(self.kind, [*SINGLE, "end", "ball", "moved", "length value"])
 
     def of_kind(self, *kinds: Kind) -> Integers:
@@ -100,16 +118,20 @@ class Patterns:
 
 
 def patterns(design: Design, state: State, x: Array | None, every_start: bool = False) -> Patterns:
-    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free ones.
+    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free
+    ones.
 
-    Slips are half-way and between probes, or with `every_start` at every reading, up to `MOST_STARTS` of a position.
+    Slips are half-way and between probes, or with `every_start` at every reading, up to
+    `MOST_STARTS` of a position.
     """
     from scipy.sparse import coo_array
 
     at = _Place(design, state, x, row_places(design), every_start)
     blocks = [block for build in BUILDERS for block in build(at)]
     start = np.cumsum([0, *(block.count for block in blocks)])
-    column = np.concatenate([block.column + first for block, first in zip(blocks, start, strict=False)])
+    column = np.concatenate(
+        [block.column + first for block, first in zip(blocks, start, strict=False)]
+    )
     row = np.concatenate([block.row for block in blocks])
     value = np.concatenate([block.value for block in blocks])
     matrix = coo_array((value, (row, column)), shape=(len(at.places), int(start[-1]))).tocsc()
@@ -138,7 +160,9 @@ def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
 class _Place:
     """A design where it is linearised, with what several kinds of patterns need."""
 
-    def __init__(self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool) -> None:
+    def __init__(
+        self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool
+    ) -> None:
         self.design, self.state, self.places, self.every_start = design, state, places, every_start
         self.chosen = design.plate_readings
         self.readings = design.readings.select(self.chosen)
@@ -152,7 +176,8 @@ class _Place:
     def of_readings(
         self, rows: Integers, by_axis: Array, group: Integers | None = None
     ) -> tuple[Integers, Integers, Array]:
-        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k columns.
+        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k
+        columns.
 
         With `group` (m,) each group has k columns of its own.
         """
@@ -172,11 +197,17 @@ class _Place:
 
 
 def _block(
-    kind: Kind, entries: tuple[Integers, Integers, Array], subject: Any, axis: Any = -1, start: Any = -1
+    kind: Kind,
+    entries: tuple[Integers, Integers, Array],
+    subject: Any,
+    axis: Any = -1,
+    start: Any = -1,
 ) -> Block:
     subject = np.atleast_1d(np.asarray(subject, np.int64))
     axis = np.broadcast_to(np.asarray(axis, np.int64), subject.shape)
-    return Block(kind, *entries, subject, axis, np.broadcast_to(np.asarray(start, np.int64), subject.shape))
+    return Block(
+        kind, *entries, subject, axis, np.broadcast_to(np.asarray(start, np.int64), subject.shape)
+    )
 
 
 def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integers, Array]:
@@ -187,7 +218,12 @@ def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integer
 def _single_readings(at: _Place) -> Iterator[Block]:
     m, d = at.weight.shape
     rows = np.arange(m * d)
-    yield _block("reading", (rows, rows, at.weight.ravel()), np.repeat(at.chosen, d), np.tile(np.arange(d), m))
+    yield _block(
+        "reading",
+        (rows, rows, at.weight.ravel()),
+        np.repeat(at.chosen, d),
+        np.tile(np.arange(d), m),
+    )
 
 
 def _single_lengths(at: _Place) -> Iterator[Block]:
@@ -200,21 +236,29 @@ def _single_lengths(at: _Place) -> Iterator[Block]:
 
 
 def _ends(at: _Place) -> Iterator[Block]:
-    """Readings of standards whose lengths are read together, each along the axes that change lengths differently."""
+    """Readings of standards whose lengths are read together, each along the axes that change
+    lengths differently.
+    """
     given = at.design.lengths
     joint = np.setdiff1d(np.arange(len(given)), at.white.alone)
     for reading in np.unique([given.first[joint], given.second[joint]]):
         sign = (given.first == reading).astype(float) - (given.second == reading)
         axes = _different(sign[:, None] * given.direction)
-        yield _block("end", at.of_lengths(sign[:, None] * at.unit[:, axes]), [reading] * len(axes), axes)
+        yield _block(
+            "end", at.of_lengths(sign[:, None] * at.unit[:, axes]), [reading] * len(axes), axes
+        )
 
 
 def _different(columns: Array) -> list[int]:
-    """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of the first."""
+    """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of
+    the first.
+    """
     size = np.sqrt((columns**2).sum(axis=0))
     chosen: list[int] = []
     for k in np.argsort(-(size / size.max()).round(6), kind="stable").tolist():
-        cosine = np.abs(columns[:, chosen].T @ columns[:, k]) / (size[chosen] * max(size[k], np.finfo(float).tiny))
+        cosine = np.abs(columns[:, chosen].T @ columns[:, k]) / (
+            size[chosen] * max(size[k], np.finfo(float).tiny)
+        )
         if size[k] > SLIGHT * size.max() and not (cosine > 1.0 - SLIGHT**2).any():
             chosen.append(k)
     return sorted(chosen)
@@ -234,7 +278,9 @@ def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers
 
 
 def _single_items(at: _Place) -> Iterator[Block]:
-    """Priors, co-ordinates and distances: a value that is stated too large makes residuals smaller."""
+    """Priors, co-ordinates and distances: a value that is stated too large makes residuals
+    smaller.
+    """
     design = at.design
     kinds: tuple[tuple[Kind, slice, Array], ...] = (
         ("prior", at.places.priors, design.priors.uncertainty),
@@ -248,10 +294,14 @@ def _single_items(at: _Place) -> Iterator[Block]:
 
 
 def _dirty_balls(at: _Place) -> Iterator[Block]:
-    """A ball that is read several times in a position, displaced there; read once, it is the same as its reading."""
+    """A ball that is read several times in a position, displaced there; read once, it is the same
+    as its reading.
+    """
     d = at.design.dimension
     key = at.readings.ball * len(at.design.position_names) + at.readings.position
-    _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+    _, first, group, count = np.unique(
+        key, return_index=True, return_inverse=True, return_counts=True
+    )
     number = np.where(count > 1, np.cumsum(count > 1) - 1, -1)
     rows = np.flatnonzero(number[group] >= 0)
     row = d * rows[:, None] + np.arange(d)
@@ -274,11 +324,14 @@ def _moved_balls(at: _Place) -> Iterator[Block]:
     rows = order[rows]
     turn = at.state.rotations[readings.position[rows]]
     first = np.repeat(at.chosen[order[starts]], d)
-    yield _block("moved", at.of_readings(rows, turn, group), first, np.tile(np.arange(d), len(starts)))
+    yield _block(
+        "moved", at.of_readings(rows, turn, group), first, np.tile(np.arange(d), len(starts))
+    )
 
 
 def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
-    """All of several ranges (g,) one after the other: the number of each one's range, and what stands in it.
+    """All of several ranges (g,) one after the other: the number of each one's range, and what
+    stands in it.
 
     >>> _runs(np.array([3, 7]), np.array([5, 8]))
     (array([0, 0, 1]), array([3, 4, 7]))
@@ -302,7 +355,11 @@ def _slip_starts(at: _Place, rows: Integers) -> Integers:
         count = len(rows) - 2 * LEAST_PART + 1
         if count < 1:
             return np.zeros(0, np.int64)
-        return np.unique(np.linspace(LEAST_PART, len(rows) - LEAST_PART, min(count, MOST_STARTS)).astype(np.int64))
+        return np.unique(
+            np.linspace(LEAST_PART, len(rows) - LEAST_PART, min(count, MOST_STARTS)).astype(
+                np.int64
+            )
+        )
     probe = at.readings.probe[rows]
     changes = np.flatnonzero(np.diff(probe)) + 1
     # Between probes only where each has its readings together.
@@ -333,7 +390,9 @@ def _slips(at: _Place) -> Iterator[Block]:
 
 
 def _probes(at: _Place) -> Iterator[Block]:
-    """Probes whose offsets are stated too large; of one that is estimated only its prior can be wrong."""
+    """Probes whose offsets are stated too large; of one that is estimated only its prior can be
+    wrong.
+    """
     design, state = at.design, at.state
     d, offsets = design.dimension, probe_offsets(design, state)[design.readings.probe]
     given = design.lengths
@@ -342,19 +401,27 @@ def _probes(at: _Place) -> Iterator[Block]:
         fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
         if not fixed.any():
             continue
-        rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[:, :, fixed]
+        rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[
+            :, :, fixed
+        ]
         rows = np.flatnonzero(at.readings.probe == probe)
-        apart = rate[given.first] - np.where(given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)])
+        apart = rate[given.first] - np.where(
+            given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)]
+        )
         of_lengths = np.einsum("md,mdk->mk", at.unit, apart)
         entries = _joined(at.of_readings(rows, rate[at.chosen[rows]]), at.of_lengths(of_lengths))
         yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
 
 
 def _length_values(at: _Place) -> Iterator[Block]:
-    """Certified lengths that are stated too long and are read several times, or together with others."""
+    """Certified lengths that are stated too long and are read several times, or together with
+    others.
+    """
     given = at.design.lengths
     known = np.ones(len(given), bool) if given.free is None else given.free < 0
-    numbers, first, count = np.unique(given.certificate[known], return_index=True, return_counts=True)
+    numbers, first, count = np.unique(
+        given.certificate[known], return_index=True, return_counts=True
+    )
     is_alone = np.isin(np.flatnonzero(known)[first], at.white.alone)
     for number in numbers[(count > 1) | ~is_alone]:
         entries = at.of_lengths(-1.0 * (given.certificate == number)[:, None])
@@ -364,15 +431,30 @@ def _length_values(at: _Place) -> Iterator[Block]:
 def _scales(at: _Place) -> Iterator[Block]:
     """Certificates of an artefact of which all values are too long by one ratio."""
     design, places = at.design, at.places
-    known = np.ones(len(design.lengths), bool) if design.lengths.free is None else design.lengths.free < 0
+    known = (
+        np.ones(len(design.lengths), bool)
+        if design.lengths.free is None
+        else design.lengths.free < 0
+    )
     for artefact in range(len(design.artefact_names)):
         of_distances = np.flatnonzero(design.ball_artefact[design.distances.first] == artefact)
         of_coordinates = np.flatnonzero(design.ball_artefact[design.coordinates.ball] == artefact)
-        of_lengths = known & (design.ball_artefact[design.readings.ball[design.lengths.first]] == artefact)
-        if len(of_distances) + len(of_coordinates) + len(np.unique(design.lengths.certificate[of_lengths])) < 2:
+        of_lengths = known & (
+            design.ball_artefact[design.readings.ball[design.lengths.first]] == artefact
+        )
+        if (
+            len(of_distances)
+            + len(of_coordinates)
+            + len(np.unique(design.lengths.certificate[of_lengths]))
+            < 2
+        ):
             continue
         parts = [
-            (start + rows, np.zeros(len(rows), np.int64), -given.value[rows] / given.uncertainty[rows])
+            (
+                start + rows,
+                np.zeros(len(rows), np.int64),
+                -given.value[rows] / given.uncertainty[rows],
+            )
             for start, rows, given in (
                 (places.distances.start, of_distances, design.distances),
                 (places.coordinates.start, of_coordinates, design.coordinates),
@@ -393,7 +475,9 @@ def _expansions(at: _Place) -> Iterator[Block]:
             continue
         away = at.arm[rows] - at.arm[rows].mean(axis=0) if len(rows) else at.arm[rows]
         columns = np.where(of_lengths == k, values, 0.0)[:, None]
-        yield _block("expansion", _joined(at.of_readings(rows, away[:, :, None]), at.of_lengths(columns)), k)
+        yield _block(
+            "expansion", _joined(at.of_readings(rows, away[:, :, None]), at.of_lengths(columns)), k
+        )
 
 
 BUILDERS: tuple[Callable[[_Place], Iterator[Block]], ...] = (

@@ -1,4 +1,6 @@
-"""How large a bias must be, in standard deviations, for a two-sided test to find it with a stated power."""
+"""How large a bias must be, in standard deviations, for a two-sided test to find it with a stated
+power.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,11 @@ LARGEST = 1e4
 
 
 def alarm_limit(false_alarm: float, freedom: float = math.inf) -> float:
-    """What a statistic exceeds in absolute value with the probability `false_alarm` if there is no bias.
+    """What a statistic exceeds in absolute value with the probability `false_alarm` if there is no
+    bias.
 
-    Normal where sigma is known; with sigma from other observations of `freedom` degrees of freedom Student's.
+    Normal where sigma is known; with sigma from other observations of `freedom` degrees of freedom
+    Student's.
 
     >>> round(alarm_limit(0.001), 4), round(alarm_limit(0.001, 10), 4)
     (3.2905, 4.5869)
@@ -28,10 +32,11 @@ def alarm_limit(false_alarm: float, freedom: float = math.inf) -> float:
 
 
 def chance_of_alarm(noncentrality: float, limit: float, freedom: float = math.inf) -> float:
-    """Probability that a statistic whose mean is off by `noncentrality` exceeds `limit` in absolute value.
+    """Probability that a statistic whose mean is off by `noncentrality` exceeds `limit` in absolute
+    value.
 
-    Of Student's non-central distribution by the trapezoidal rule over the logarithm of the estimated sigma: SciPy's is
-    not a number for some biases at few degrees of freedom.
+    Of Student's non-central distribution by the trapezoidal rule over the logarithm of the
+    estimated sigma: SciPy's is not a number for some biases at few degrees of freedom.
 
     >>> round(chance_of_alarm(0.0, alarm_limit(0.05, 4), 4), 9)
     0.05
@@ -49,7 +54,8 @@ def chance_of_alarm(noncentrality: float, limit: float, freedom: float = math.in
 
 
 def noncentrality(false_alarm: float, power: float, freedom: float = math.inf) -> float:
-    """The bias, in standard deviations of its estimate, that a two-sided test finds with the stated power.
+    """The bias, in standard deviations of its estimate, that a two-sided test finds with the stated
+    power.
 
     It solves the test's power exactly, with both tails; infinite without a degree of freedom.
 
@@ -66,4 +72,6 @@ def noncentrality(false_alarm: float, power: float, freedom: float = math.inf) -
         upper *= 2.0
         if upper > LARGEST:
             return math.inf
-    return float(brentq(lambda value: chance_of_alarm(value, limit, freedom) - power, 0.0, upper, xtol=1e-10))
+    return float(
+        brentq(lambda value: chance_of_alarm(value, limit, freedom) - power, 0.0, upper, xtol=1e-10)
+    )

@@ -1,4 +1,6 @@
-"""Redundancy, minimal detectable biases and their effects for all observations and events of a design."""
+"""Redundancy, minimal detectable biases and their effects for all observations and events of a
+design.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,8 @@ def reliability(
     sigma: Literal["estimated", "given"] | None = None,
     report: Report = unreported,
 ) -> Reliability:
-    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file says.
+    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file
+    says.
 
     `report` is told the number of observations done.
 
@@ -48,9 +51,15 @@ def reliability(
     reason = too_many_entries(design)
     if reason:
         raise ExperimentError(
-            [experiment.message(("positions",), f"{reason}: read fewer balls, or in fewer positions")]
+            [
+                experiment.message(
+                    ("positions",), f"{reason}: read fewer balls, or in fewer positions"
+                )
+            ]
         )
-    return reliability_of(design, false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment, report)
+    return reliability_of(
+        design, false_alarm, power, (sigma or experiment.sigma) == "estimated", experiment, report
+    )
 
 
 @single_threaded
@@ -71,7 +80,11 @@ def reliability_of(
         for symbol, groups in functions.items()
     }
     places = row_places(design)
-    redundancy, left, information = np.zeros(len(places)), np.zeros(len(given)), np.zeros(len(given))
+    redundancy, left, information = (
+        np.zeros(len(places)),
+        np.zeros(len(given)),
+        np.zeros(len(given)),
+    )
     effects = {symbol: _nothing(len(given), groups) for symbol, groups in functions.items()}
     done = 0
     for one in responses(at, None, given):
@@ -80,7 +93,11 @@ def reliability_of(
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information
         left[one.index] = one.information / np.where(one.square > 0.0, one.square, 1.0)
-        asked = np.unique(one.own.indices // design.dimension) if len(one.rows) else np.zeros(0, np.int64)
+        asked = (
+            np.unique(one.own.indices // design.dimension)
+            if len(one.rows)
+            else np.zeros(0, np.int64)
+        )
         for symbol, groups in changes.items():
             for among in groups:
                 _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
@@ -119,11 +136,15 @@ def reliability_of(
 
 
 def _nothing(count: int, groups: tuple[Functions, ...]) -> Effects:
-    return Effects(groups, np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan))
+    return Effects(
+        groups, np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan)
+    )
 
 
 def _put(effects: Effects, index: Integers, changes: Changes, found: Largest) -> None:
-    """Enter what patterns `index` change, where that is more than what has been entered of other artefacts."""
+    """Enter what patterns `index` change, where that is more than what has been entered of other
+    artefacts.
+    """
     more = comparable(found.change) > comparable(effects.change[index])
     use = (found.function >= 0) & (more | (effects.first[index] < 0))
     index, function = index[use], found.function[use]

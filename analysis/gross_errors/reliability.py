@@ -1,4 +1,6 @@
-"""Reliability of a design, as text for people, plain data for programs, and a table for spreadsheets."""
+"""Reliability of a design, as text for people, plain data for programs, and a table for
+spreadsheets.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +45,11 @@ ITEMS: tuple[Kind, ...] = ("length", "end", "prior", "coordinate", "distance")
 
 @dataclass(frozen=True)
 class Effects:
-    """Largest changes `change` (k,) of `functions` of one kind by a unit of each pattern's bias, and where.
+    """Largest changes `change` (k,) of `functions` of one kind by a unit of each pattern's bias,
+    and where.
 
-    `first` and `second` (k,) are the places of the function that changes most, -1 where none is determined;
-    `uncertainty` (k,) is its standard uncertainty.
+    `first` and `second` (k,) are the places of the function that changes most, -1 where none is
+    determined; `uncertainty` (k,) is its standard uncertainty.
     """
 
     functions: tuple[Functions, ...]
@@ -60,13 +63,14 @@ class Effects:
 class Reliability(Result):
     """What a design notices of biases, for each of its patterns.
 
-    `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands for the mean of its
-    repeats, which have `among_repeats` degrees of freedom more among themselves. `left` (k,) is that of each pattern:
-    of a single observation its redundancy number, otherwise the share of its square that is left in the residuals.
-    `information` (k,) is what is left of a pattern in the residuals, per unit of the bias squared, and 0 where that is
-    nil. `effects` are by symbol. `noncentrality` belongs to the test with `false_alarm` and `power`, sigma
-    being known or estimated from the observations, less the one suspected, and `fit_noncentrality` to each of all those
-    tests that a fit makes.
+    `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands
+    for the mean of its repeats, which have `among_repeats` degrees of freedom more among
+    themselves. `left` (k,) is that of each pattern: of a single observation its redundancy number,
+    otherwise the share of its square that is left in the residuals. `information` (k,) is what is
+    left of a pattern in the residuals, per unit of the bias squared, and 0 where that is nil.
+    `effects` are by symbol. `noncentrality` belongs to the test with `false_alarm` and `power`,
+    sigma being known or estimated from the observations, less the one suspected, and
+    `fit_noncentrality` to each of all those tests that a fit makes.
     """
 
     label: str
@@ -89,10 +93,15 @@ class Reliability(Result):
     def headline(self) -> str:
         observations = self.design.observations
         mean = (float(self.redundancy.sum()) + self.among_repeats) / observations
-        return f"redundancy {mean:.3g} of an observation on average; {len(self.patterns)} biases judged"
+        return (
+            f"redundancy {mean:.3g} of an observation on average; {len(self.patterns)} biases"
+            " judged"
+        )
 
     def lines(self, with_all: bool = False) -> list[str]:
-        """As lines of text; `with_all` lists every event, not only the worst of each position or probe."""
+        """As lines of text; `with_all` lists every event, not only the worst of each position or
+        probe.
+        """
         return _lines(self, with_all)
 
     def to_dict(self) -> dict[str, Any]:
@@ -115,12 +124,16 @@ class Reliability(Result):
 
     @property
     def detectable(self) -> Array:
-        """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can be detected."""
+        """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can
+        be detected.
+        """
         return self._biases(self.noncentrality)
 
     def _biases(self, noncentrality: float) -> Array:
         with np.errstate(divide="ignore"):
-            return np.asarray(np.where(self.information > 0.0, noncentrality / np.sqrt(self.information), np.inf))
+            return np.asarray(
+                np.where(self.information > 0.0, noncentrality / np.sqrt(self.information), np.inf)
+            )
 
     def is_harmless(self, k: int) -> bool:
         """Whether a bias changes no distance, between balls or between corrected points."""
@@ -133,13 +146,18 @@ class Reliability(Result):
 
 
 def _lines(result: Reliability, with_all: bool) -> list[str]:
-    """Reliability as lines of text; `with_all` lists every event, not only the worst of each position or probe."""
+    """Reliability as lines of text; `with_all` lists every event, not only the worst of each
+    position or probe.
+    """
     lines = [*_heading(result), "", *_positions(result)]
     readings = result.patterns.of_kind("reading")
     items = result.patterns.of_kind(*ITEMS)
     for title, chosen in (("worst readings", readings), ("worst items", items)):
         if len(chosen):
-            lines += ["", *_table(result, title, _worst_first(result, chosen)[:MOST], with_redundancy=True)]
+            lines += [
+                "",
+                *_table(result, title, _worst_first(result, chosen)[:MOST], with_redundancy=True),
+            ]
     events: list[int] = []
     for kinds in EVENTS:
         found = result.patterns.of_kind(*kinds)
@@ -157,19 +175,31 @@ def _heading(result: Reliability) -> list[str]:
     effects = [f"{symbol} ({QUANTITIES[symbol].effect})" for symbol in SYMBOLS]
     lines = [
         f"{result.label}: {result.title}",
-        f"{rank}; {design.parameter_count} parameters, {count} observations; redundancy {number(total)} in all, "
-        f"{number(total / count, 3)} of an observation on average",
-        f"detectable: found with a power of {_percent(result.power)} by a test with a false alarm of "
-        f"{_percent(result.false_alarm)}, sigma {sigma}: {number(result.noncentrality)} standard deviations",
-        f"by fit: found with that power by `fit`, which makes all its tests together: "
-        f"{number(result.fit_noncentrality)} standard deviations",
-        f"effects: the most that a bias just detectable changes in {', '.join(effects[:-1])} and {effects[-1]}, "
-        "with the standard uncertainty there in brackets",
+        (
+            f"{rank}; {design.parameter_count} parameters, {count} observations; redundancy"
+            f" {number(total)} in all, {number(total / count, 3)} of an observation on average"
+        ),
+        (
+            f"detectable: found with a power of {_percent(result.power)} by a test with a false"
+            f" alarm of {_percent(result.false_alarm)}, sigma {sigma}:"
+            f" {number(result.noncentrality)} standard deviations"
+        ),
+        (
+            "by fit: found with that power by `fit`, which makes all its tests together: "
+            f"{number(result.fit_noncentrality)} standard deviations"
+        ),
+        (
+            f"effects: the most that a bias just detectable changes in {', '.join(effects[:-1])}"
+            f" and {effects[-1]}, with the standard uncertainty there in brackets"
+        ),
     ]
     if result.among_repeats:
         lines.append("a reading stands for the mean of its repeats")
     if math.isinf(result.noncentrality):
-        lines.append("too few degrees of freedom to estimate sigma without what is tested; nothing is detectable")
+        lines.append(
+            "too few degrees of freedom to estimate sigma without what is tested; nothing is"
+            " detectable"
+        )
     return lines
 
 
@@ -177,7 +207,15 @@ def _positions(result: Reliability) -> list[str]:
     """A summary of the readings of plates by position."""
     design, given = result.design, result.patterns
     readings = given.of_kind("reading")
-    head = ["position", "readings", "redundancy: smallest", "average", "detectable, um", "by fit, um", "largest at"]
+    head = [
+        "position",
+        "readings",
+        "redundancy: smallest",
+        "average",
+        "detectable, um",
+        "by fit, um",
+        "largest at",
+    ]
     rows = [[*head, "effect on U6, um", "largest at"]]
     position = design.readings.position[given.subject[readings]]
     of_u6 = _effect(result, "U6")
@@ -186,7 +224,10 @@ def _positions(result: Reliability) -> list[str]:
         by_bias = own[comparable(result.detectable[own]).argmax()]
         by_effect = own[comparable(_finite_or_zero(of_u6[own])).argmax()]
         known = bool(np.isfinite(of_u6[by_effect]))
-        u = f"{number(1e6 * of_u6[by_effect], 3)} ({number(1e6 * result.effects['U6'].uncertainty[by_effect], 3)})"
+        u = (
+            f"{number(1e6 * of_u6[by_effect], 3)}"
+            f" ({number(1e6 * result.effects['U6'].uncertainty[by_effect], 3)})"
+        )
         rows.append(
             [
                 design.position_names[k],
@@ -205,7 +246,9 @@ def _positions(result: Reliability) -> list[str]:
     return aligned(rows, [False, True, True, True, True, True, False, True, False])
 
 
-def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundancy: bool) -> list[str]:
+def _table(
+    result: Reliability, title: str, chosen: Sequence[int], with_redundancy: bool
+) -> list[str]:
     rows = [
         [
             title,
@@ -229,7 +272,15 @@ def _table(result: Reliability, title: str, chosen: Sequence[int], with_redundan
             cells.append("-" if math.isnan(effect) else told)
         cells.append("" if math.isinf(result.detectable[k]) else _where(result, "U6", k))
         rows.append(cells)
-    right = [False, *([True] if with_redundancy else []), True, True, False, *(True for _ in SYMBOLS), False]
+    right = [
+        False,
+        *([True] if with_redundancy else []),
+        True,
+        True,
+        False,
+        *(True for _ in SYMBOLS),
+        False,
+    ]
     return aligned(rows, right)
 
 
@@ -241,7 +292,9 @@ def _effect_number(result: Reliability, symbol: str, k: int) -> str:
 
 
 def _effect(result: Reliability, symbol: str) -> np.ndarray:
-    """Effects (k,) of biases that are just detectable; NaN where nothing can be detected or nothing is determined."""
+    """Effects (k,) of biases that are just detectable; NaN where nothing can be detected or nothing
+    is determined.
+    """
     effects = result.effects[symbol]
     known = np.isfinite(result.detectable) & (effects.first >= 0)
     with np.errstate(invalid="ignore"):
@@ -253,7 +306,9 @@ def _finite_or_zero(values: np.ndarray) -> np.ndarray:
 
 
 def _worst_first(result: Reliability, chosen: Integers) -> list[int]:
-    """Patterns by their effect on U6, then on U5, those that cannot be detected but do harm first."""
+    """Patterns by their effect on U6, then on U5, those that cannot be detected but do harm
+    first.
+    """
     keys = [comparable(_finite_or_zero(_effect(result, symbol)[chosen])) for symbol in ("U5", "U6")]
     hidden = np.array([_is_dangerous(result, k) for k in chosen.tolist()], bool)
     return [int(chosen[i]) for i in np.lexsort((chosen, -keys[0], -keys[1], ~hidden))]
@@ -264,7 +319,9 @@ def _is_dangerous(result: Reliability, k: int) -> bool:
 
 
 def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
-    """The worst pattern of each subject, or of each position for balls, in the order of the design."""
+    """The worst pattern of each subject, or of each position for balls, in the order of the
+    design.
+    """
     if not len(chosen):
         return []
     of_balls = result.patterns.kind[chosen[0]] in ("ball", "moved")
@@ -282,8 +339,12 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     harmless = [k for k in hidden if result.is_harmless(k)]
     if harmless:
         told = _listed(name(result.patterns, k) for k in harmless)
-        which = "no distance that is determined changes" if result.deficiency else "no distance changes"
-        lines.append(f"cannot be detected, harmless: {told}: {which}, between balls or corrected points")
+        which = (
+            "no distance that is determined changes" if result.deficiency else "no distance changes"
+        )
+        lines.append(
+            f"cannot be detected, harmless: {told}: {which}, between balls or corrected points"
+        )
     for k in [k for k in hidden if k not in set(harmless)][: 4 * MOST]:
         unit = result.patterns.unit(k)
         parts = [
@@ -291,18 +352,30 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
             for symbol in LENGTHS
             if result.effects[symbol].change[k] > 0.0
         ]
-        lines.append(f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes {', '.join(parts)}")
+        lines.append(
+            f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes"
+            f" {', '.join(parts)}"
+        )
     left = len(hidden) - len(harmless) - 4 * MOST
     if left > 0:
         lines.append(f"({left} more that cannot be detected are in --json)")
     if len(result.patterns.of_kind("reading")) and not len(result.patterns.of_kind("ball")):
-        lines.append("(no ball is read twice in one position: dirt on it is the same as a bias of its reading)")
+        lines.append(
+            "(no ball is read twice in one position: dirt on it is the same as a bias of its"
+            " reading)"
+        )
     if not with_all:
-        lines.append("(the worst ball of each position, and the worst direction of each event; --all lists the others)")
+        lines.append(
+            "(the worst ball of each position, and the worst direction of each event; --all lists"
+            " the others)"
+        )
     if result.deficiency:
         lines.append("(functions that the observations leave undetermined are left out)")
     if len(result.design.points) > MOST_PLACES:
-        lines.append(f"(effects on U6 are those on {MOST_PLACES} of {len(result.design.points)} evaluation points)")
+        lines.append(
+            f"(effects on U6 are those on {MOST_PLACES} of {len(result.design.points)} evaluation"
+            " points)"
+        )
     return ["", *lines] if lines else []
 
 
@@ -330,7 +403,9 @@ def _where(result: Reliability, symbol: str, k: int) -> str:
 
 
 def _data(result: Reliability) -> dict[str, Any]:
-    """Reliability as plain data in metres, radians and ratios; None where nothing can be detected or determined."""
+    """Reliability as plain data in metres, radians and ratios; None where nothing can be detected
+    or determined.
+    """
     is_single = np.isin(result.patterns.kind, [*SINGLE, "end"])
     return {
         "experiment": result.label,
@@ -393,7 +468,11 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             "minimal_detectable",
             "found_by_fit",
         ]
-        + [f"{symbol}_{what}" for symbol in SYMBOLS for what in ("effect_um", "standard_uncertainty_um", "at")]
+        + [
+            f"{symbol}_{what}"
+            for symbol in SYMBOLS
+            for what in ("effect_um", "standard_uncertainty_um", "at")
+        ]
     )
     design, given = result.design, result.patterns
     effects = {symbol: _effect(result, symbol) for symbol in SYMBOLS}
@@ -402,10 +481,24 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
         if given.kind[k] in ("reading", "end"):
             i = int(given.subject[k])
             readings = design.readings
-            position, probe = design.position_names[readings.position[i]], design.probe_names[readings.probe[i]]
-            names = [position, design.ball_label(int(readings.ball[i])), probe, AXIS_NAMES[given.axis[k]]]
+            position, probe = (
+                design.position_names[readings.position[i]],
+                design.probe_names[readings.probe[i]],
+            )
+            names = [
+                position,
+                design.ball_label(int(readings.ball[i])),
+                probe,
+                AXIS_NAMES[given.axis[k]],
+            ]
         unit = given.unit(k)
-        cells: list[Any] = [given.kind[k], *names, name(given, k), repr(float(result.left[k])), SHOWN[unit]]
+        cells: list[Any] = [
+            given.kind[k],
+            *names,
+            name(given, k),
+            repr(float(result.left[k])),
+            SHOWN[unit],
+        ]
         cells += [_cell(result.detectable[k]), _cell(result.found_by_fit[k])]
         for symbol in SYMBOLS:
             cells += [

@@ -16,16 +16,19 @@ from .patterns import Patterns
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# A share of a pattern's square that is left in the residuals and counts as none: rounding leaves about 1e-15.
+# A share of a pattern's square that is left in the residuals and counts as none: rounding leaves
+# about 1e-15.
 NIL = 1e-10
 
 
 @dataclass(frozen=True)
 class Response:
-    """Q' h of the patterns `index` (k,): `common` (k, r), and `own` (k, n d) in the columns of the balls.
+    """Q' h of the patterns `index` (k,): `common` (k, r), and `own` (k, n d) in the columns of the
+    balls.
 
-    `square` (k,) is h'h and `information` (k,) is h'(I - H) h, per unit of the bias squared; 0 where it is nil.
-    `hat` (b,) is the diagonal of H at the `rows` (b,) that were worked through for them.
+    `square` (k,) is h'h and `information` (k,) is h'(I - H) h, per unit of the bias squared; 0
+    where it is nil. `hat` (b,) is the diagonal of H at the `rows` (b,) that were worked through for
+    them.
     """
 
     rows: Integers
@@ -64,7 +67,9 @@ def responses(at: Linearisation, x: Array | None, given: Patterns) -> Iterator[R
         local = np.flatnonzero(given.is_local & here[first_row])
         block = matrix[some.rows]
         mine = block[:, local].T.tocsr()
-        yield Response(some.rows, hat, local, mine @ some.common, (mine @ private).tocsr(), square[local])
+        yield Response(
+            some.rows, hat, local, mine @ some.common, (mine @ private).tocsr(), square[local]
+        )
         through = block[:, wide].T.tocsr()
         common += through @ some.common
         own = own + through @ private

@@ -13,7 +13,9 @@ from .leftover import Leftover
 
 @dataclass(frozen=True)
 class Scatter:
-    """Readings (m,) of one position or probe, whichever is not -1, and their rows (k,) among the residuals."""
+    """Readings (m,) of one position or probe, whichever is not -1, and their rows (k,) among the
+    residuals.
+    """
 
     position: int
     probe: int
@@ -37,11 +39,12 @@ def scatters(design: Design) -> list[Scatter]:
 
 
 def log_chances(every: list[Scatter], left: Leftover, sigma_is_estimated: bool) -> Array:
-    """Logarithms (s,) of the chance that some readings scatter so much more than all other observations.
+    """Logarithms (s,) of the chance that some readings scatter so much more than all other
+    observations.
 
-    By Fisher's F with the redundancies as degrees of freedom, which errs on the safe side, as residuals of redundancy
-    below 1 scatter less than so many independent ones. Where sigma is given they must scatter more than stated as
-    well: the larger of that chance and that of chi-squared.
+    By Fisher's F with the redundancies as degrees of freedom, which errs on the safe side, as
+    residuals of redundancy below 1 scatter less than so many independent ones. Where sigma is given
+    they must scatter more than stated as well: the larger of that chance and that of chi-squared.
     """
     from scipy.special import chdtrc, fdtrc
 

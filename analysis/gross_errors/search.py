@@ -1,4 +1,6 @@
-"""Search of a fit's residuals for their cause, among mistakes, errors of the model, drifts and scatter."""
+"""Search of a fit's residuals for their cause, among mistakes, errors of the model, drifts and
+scatter.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ from .smooth import Smooth, smooth_errors
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
 from .tails import log_chance, normal_equivalent
 
-# Chance that anything at all is suspected where nothing is wrong: half for mistakes, half for all else.
+# Chance that anything at all is suspected where nothing is wrong: half for mistakes, half for all
+# else.
 FAMILY = 0.01
 
 # How many are told at the most.
@@ -32,10 +35,12 @@ ROUNDING = 1e-6
 # A direction of which no more than this share is left is the same as what was taken out.
 SAME = 1e-3
 
-# Times by which a mistake must be less by chance than what a lacking model or a drift explains, or it is not named.
+# Times by which a mistake must be less by chance than what a lacking model or a drift explains, or
+# it is not named.
 CLEARLY = math.log(1000.0)
 
-# Chance below which a position is one of several that expand together, and a direction one of a cause's several.
+# Chance below which a position is one of several that expand together, and a direction one of a
+# cause's several.
 TOGETHER, DIRECTIONS = math.log(1e-4), math.log(1e-2)
 
 # Chance below which a smooth error that contains a mistake explains more than that.
@@ -44,7 +49,8 @@ CONTAINED = math.log(1e-2)
 # Stated uncertainties are believed where what a suspect leaves has at least this chance.
 BELIEVED = math.log(1e-2)
 
-# Residuals that are less than this of the stated uncertainties are not laid to the model, a drift or noise.
+# Residuals that are less than this of the stated uncertainties are not laid to the model, a drift
+# or noise.
 HARMLESS = 0.1
 
 # Squared standard deviations within which the moments of a slip are told.
@@ -56,13 +62,15 @@ WEIGHINGS = 4
 
 @single_threaded
 def diagnosis(at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> Diagnosis:
-    """What is suspected of the observations behind a linearised fit; the estimate itself stays what it is.
+    """What is suspected of the observations behind a linearised fit; the estimate itself stays what
+    it is.
 
-    Causes are spaces of biases, tested to first order by what they explain of the residuals: by chi-squared where sigma
-    is given and what they leave is as stated, otherwise by Fisher's F. The limits are Bonferroni's for `FAMILY`. A
-    mistake is taken out if it is clearly less by chance than each smooth error and each scatter, and what it leaves is
-    searched anew; if what is left at the end shows smooth errors, no mistake is named at all, unless all that is left
-    is less than `HARMLESS` of what is stated.
+    Causes are spaces of biases, tested to first order by what they explain of the residuals: by
+    chi-squared where sigma is given and what they leave is as stated, otherwise by Fisher's F. The
+    limits are Bonferroni's for `FAMILY`. A mistake is taken out if it is clearly less by chance
+    than each smooth error and each scatter, and what it leaves is searched anew; if what is left at
+    the end shows smooth errors, no mistake is named at all, unless all that is left is less than
+    `HARMLESS` of what is stated.
     """
     if freedom < 3 or at.factor.sum_of_squares <= ROUNDING**2 * freedom:
         return Diagnosis()
@@ -79,8 +87,8 @@ class _Event:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """A cause as it was found: its patterns, the logarithm of its chance, a slip's moments, and causes of the kind
-    that explain as much.
+    """A cause as it was found: its patterns, the logarithm of its chance, a slip's moments, and
+    causes of the kind that explain as much.
     """
 
     columns: Integers
@@ -129,23 +137,32 @@ class Search:
             event = self._best_event()
             smooth = self._smooth_chances(event)
             scattered = log_chances(self.scatters, self.left, self.estimated)
-            of_smooth, of_scatter = float(smooth.min(initial=0.0)), float(scattered.min(initial=0.0))
+            of_smooth, of_scatter = (
+                float(smooth.min(initial=0.0)),
+                float(scattered.min(initial=0.0)),
+            )
             rival = min(of_smooth, of_scatter)
             significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
             if significant and event.log_p < rival - CLEARLY:
                 columns = self._testable(self._with_other_directions(self._together(event.columns)))
-                chosen.append(_Chosen(columns, event.log_p, self._range(columns), self._as_good(columns)))
+                chosen.append(
+                    _Chosen(columns, event.log_p, self._range(columns), self._as_good(columns))
+                )
                 self._take_out(columns)
             elif self.left.sum_of_squares < HARMLESS**2 * self.left.freedom:
                 return Diagnosis(tuple(self._told(chosen)), scatter)
             elif scatter is None and of_scatter < min(self.other_limit, of_smooth - CLEARLY):
                 one, limit = self.scatters[int(scattered.argmin())], self.other_limit
                 times = self._weigh(one)
-                scatter = MoreScatter(self.design, one, times, normal_equivalent(of_scatter), normal_equivalent(limit))
+                scatter = MoreScatter(
+                    self.design, one, times, normal_equivalent(of_scatter), normal_equivalent(limit)
+                )
                 for earlier in chosen:
                     self._take_out(earlier.columns)
             elif rival < self.other_limit:
-                words = self.smooth[int(smooth.argmin())].words if of_smooth < self.other_limit else ""
+                words = (
+                    self.smooth[int(smooth.argmin())].words if of_smooth < self.other_limit else ""
+                )
                 return Diagnosis((), scatter, self._unexplained(words, rival, self.other_limit))
             elif significant:
                 return Diagnosis((), scatter, self._unexplained("", event.log_p, self.limit))
@@ -153,7 +170,9 @@ class Search:
                 return Diagnosis(tuple(self._told(chosen)), scatter)
 
     def _unexplained(self, words: str, log_p: float, limit: float) -> Unexplained:
-        """What is told of residuals that no mistake explains, as they were before anything was weighed."""
+        """What is told of residuals that no mistake explains, as they were before anything was
+        weighed.
+        """
         total, freedom = self.sum_of_squares, self.freedom
         too_large = float(log_chance(total, total, freedom, freedom, True)) < BELIEVED
         statistics = normal_equivalent(log_p), normal_equivalent(limit)
@@ -211,7 +230,9 @@ class Search:
         self.columns.update(self.left)
 
     def _weigh(self, one: Scatter) -> float:
-        """Weigh some readings by how much they scatter, and begin anew; how many times that is as much as stated."""
+        """Weigh some readings by how much they scatter, and begin anew; how many times that is as
+        much as stated.
+        """
         times, plain, left = 1.0, self.design, self.left
         for _ in range(WEIGHINGS):
             times *= ratio(left, one.rows)
@@ -227,11 +248,14 @@ class Search:
         return self._log_p(*_explained(rest, _basis(rest, more)), rest)
 
     def _together(self, columns: Integers) -> Integers:
-        """Of positions that expand, or distances that are wrong, together, those without each of which the residuals
-        are significantly larger.
+        """Of positions that expand, or distances that are wrong, together, those without each of
+        which the residuals are significantly larger.
         """
         while len(columns) > 1 and self.patterns.kind[columns[0]] in ("expansion", "distance"):
-            chances = [self._conditional(np.delete(columns, k), self._dense(columns[[k]])) for k in range(len(columns))]
+            chances = [
+                self._conditional(np.delete(columns, k), self._dense(columns[[k]]))
+                for k in range(len(columns))
+            ]
             worst = int(np.argmax(chances))
             if chances[worst] < TOGETHER:
                 break
@@ -246,7 +270,9 @@ class Search:
         return every if self._conditional(columns, self._dense(every)) < DIRECTIONS else columns
 
     def _testable(self, columns: Integers) -> Integers:
-        """Of a cause's directions those that show beside each other, the one of which most is left first."""
+        """Of a cause's directions those that show beside each other, the one of which most is left
+        first.
+        """
         if len(columns) == 1:
             return columns
         dense = self._dense(columns)
@@ -272,17 +298,21 @@ class Search:
             return -1, -1
         given, wide = self.patterns, len(whole(self.patterns, columns))
         is_slip = np.isin(given.kind, SLIP)
-        number = next(k for k, one in enumerate(self.groups) if one.shape[1] == wide and is_slip[one[0]].all())
+        number = next(
+            k for k, one in enumerate(self.groups) if one.shape[1] == wide and is_slip[one[0]].all()
+        )
         group = self.groups[number]
         here = np.flatnonzero(given.subject[group[:, 0]] == mine.subjects[0])
         square = self.columns.explained(number).square[here]
-        variance = (self.left.sum_of_squares - square.max()) / self.left.freedom if self.estimated else 1.0
+        variance = (
+            (self.left.sum_of_squares - square.max()) / self.left.freedom if self.estimated else 1.0
+        )
         starts = given.start[group[here[square >= square.max() - RANGE * variance], 0]]
         return min(int(starts.min()), mine.start), max(int(starts.max()), mine.start)
 
     def _as_good(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
-        """Of several certified distances, those of other balls that leave nothing significant of the residuals that
-        these explain, though they are other directions.
+        """Of several certified distances, those of other balls that leave nothing significant of
+        the residuals that these explain, though they are other directions.
         """
         if len(columns) == 1 or self.patterns.kind[columns[0]] != "distance":
             return ()
@@ -290,7 +320,11 @@ class Search:
         for group in self.groups:
             if group.shape[1] > 1 and self.patterns.kind[group[0, 0]] == "distance":
                 others = (row for row in group if not np.array_equal(row, columns))
-                found += [tuple(row.tolist()) for row in others if self._conditional(row, dense) > CONTAINED]
+                found += [
+                    tuple(row.tolist())
+                    for row in others
+                    if self._conditional(row, dense) > CONTAINED
+                ]
         return tuple(found)
 
     def _told(self, chosen: list[_Chosen]) -> Iterator[Suspect]:
@@ -315,7 +349,11 @@ class Search:
                 normal_equivalent(one.log_p),
                 normal_equivalent(self.limit),
                 tuple(dict.fromkeys([*self._alternatives(one.columns), *one.others])),
-                tuple(dict.fromkeys(other.words for other in self.smooth if self._is_part(other, one.columns))),
+                tuple(
+                    dict.fromkeys(
+                        other.words for other in self.smooth if self._is_part(other, one.columns)
+                    )
+                ),
                 *one.range,
             )
 
@@ -345,7 +383,9 @@ def _basis(left: Leftover, columns: Array) -> Array:
 
 
 def _further(left: Leftover, basis: Array, since: int) -> Array:
-    """What is left of an orthonormal basis that is orthogonal to the first `since` columns taken out."""
+    """What is left of an orthonormal basis that is orthogonal to the first `since` columns taken
+    out.
+    """
     later = left.common[:, since:]
     if not later.shape[1]:
         return basis

@@ -1,4 +1,6 @@
-"""Smooth errors: what residuals look like when the error model lacks something, or when something drifts."""
+"""Smooth errors: what residuals look like when the error model lacks something, or when something
+drifts.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,11 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, probe_offsets
-from ballplate.simulator.estimation.observations import length_directions, reading_weights, rotation_sensitivity
+from ballplate.simulator.estimation.observations import (
+    length_directions,
+    reading_weights,
+    rotation_sensitivity,
+)
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.polynomial import legendre
@@ -19,7 +25,8 @@ SAME_PLACE = 1e-3
 # Places on a scale that each have a value of their own; of more, waves up to so many half periods.
 MOST_PLACES, WAVES = 60, 20
 
-# Degrees of polynomials along one axis with levers, of those that turn probes, and of those in all co-ordinates.
+# Degrees of polynomials along one axis with levers, of those that turn probes, and of those in all
+# co-ordinates.
 ALONG, OF_PROBES, TOGETHER = 7, 4, 4
 
 # Half periods of a drift over all readings.
@@ -39,7 +46,9 @@ class Smooth:
 
 
 def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
-    """All smooth errors that are looked for, at scale readings x (readings, d) in the order they were taken in."""
+    """All smooth errors that are looked for, at scale readings x (readings, d) in the order they
+    were taken in.
+    """
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, x):
             yield Smooth(words, _rows(design, state, x, displacement))
@@ -56,13 +65,18 @@ def _on_scales(design: Design, state: State, x: Array) -> Displacements:
 
 
 def _along_axes(design: Design, state: State, x: Array) -> Displacements:
-    """All components as polynomials of one scale reading, and of the others as levers of rotations."""
+    """All components as polynomials of one scale reading, and of the others as levers of
+    rotations.
+    """
     t = _fractions(x)
     for axis, letter in enumerate(AXIS_NAMES[: design.dimension]):
         along = legendre.legvander(t[:, axis], ALONG)
         levers = np.column_stack([np.ones(len(t)), np.delete(t, axis, axis=1)])
         values = np.asarray((along[:, :, None] * levers[:, None, :]).reshape(len(t), -1), float)
-        yield f"displacements and rotations that depend on {letter}", _in_all_directions(values, design.dimension)
+        yield (
+            f"displacements and rotations that depend on {letter}",
+            _in_all_directions(values, design.dimension),
+        )
 
 
 def _of_probes(design: Design, state: State, x: Array) -> Displacements:
@@ -86,7 +100,10 @@ def _in_space(design: Design, state: State, x: Array) -> Displacements:
         if 0 < sum(powers) <= TOGETHER:
             factors = [one[:, power] for one, power in zip(by_axis, powers, strict=True)]
             terms.append(np.prod(factors, axis=0))
-    yield "an error that depends on several co-ordinates together", _in_all_directions(np.stack(terms, axis=1), d)
+    yield (
+        "an error that depends on several co-ordinates together",
+        _in_all_directions(np.stack(terms, axis=1), d),
+    )
 
 
 def _in_time(design: Design, state: State, x: Array) -> Displacements:
@@ -117,7 +134,9 @@ def _places(x: Array) -> Array:
 
 
 def _time_within(design: Design) -> Array:
-    """Time (readings, positions) in each position, between -1 and 1, by the order of the readings."""
+    """Time (readings, positions) in each position, between -1 and 1, by the order of the
+    readings.
+    """
     position = design.readings.position
     within = np.zeros((len(position), len(design.position_names)))
     for k in np.unique(position):

@@ -1,4 +1,6 @@
-"""What the residuals of a fit make suspect: observations, events, the scatter of some readings, or the model."""
+"""What the residuals of a fit make suspect: observations, events, the scatter of some readings, or
+the model.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,14 @@ from .scatter import Scatter
 
 @dataclass(frozen=True)
 class Suspect:
-    """A cause that the residuals show: its `columns` (q,) among `patterns`, their sizes and standard uncertainties.
+    """A cause that the residuals show: its `columns` (q,) among `patterns`, their sizes and
+    standard uncertainties.
 
-    `values` (q,), in metres, radians or ratios, are estimated together with the other suspects'. `statistic` is that of
-    a normal variable of the same chance, which exceeded `limit` when the cause was found. `alternatives` are patterns
-    of causes that the readings cannot tell from it, and `of_model` errors of the model that they cannot; `first` and
-    `last` are readings that a slip may have come before, -1 of other causes.
+    `values` (q,), in metres, radians or ratios, are estimated together with the other suspects'.
+    `statistic` is that of a normal variable of the same chance, which exceeded `limit` when the
+    cause was found. `alternatives` are patterns of causes that the readings cannot tell from it,
+    and `of_model` errors of the model that they cannot; `first` and `last` are readings that a slip
+    may have come before, -1 of other causes.
     """
 
     patterns: Patterns
@@ -69,9 +73,11 @@ class MoreScatter:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Residuals that no single mistake explains; `words` tell the smooth error that does best, empty without one.
+    """Residuals that no single mistake explains; `words` tell the smooth error that does best,
+    empty without one.
 
-    They are `times` as large as the stated uncertainties make them, which is `too_large` if these do not explain it.
+    They are `times` as large as the stated uncertainties make them, which is `too_large` if these
+    do not explain it.
     """
 
     words: str
@@ -83,7 +89,8 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the residuals show: mistakes, readings that scatter more, or that no single mistake explains them.
+    """What the residuals show: mistakes, readings that scatter more, or that no single mistake
+    explains them.
 
     Readings may scatter more beside mistakes, or beside what no single mistake explains.
     """

@@ -1,4 +1,6 @@
-"""Chances of large sums of squares, as logarithms: those of gross mistakes are too small for a number."""
+"""Chances of large sums of squares, as logarithms: those of gross mistakes are too small for a
+number.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +11,14 @@ from ballplate.simulator.machines.protocol import Array
 SMALLEST = 1e-280
 
 
-def log_chance(square: Array | float, total: float, dimensions: Array | float, freedom: float, given: bool) -> Array:
-    """Logarithms (k,) of the chance that `dimensions` of the residuals' `freedom` explain a sum of squares so large.
+def log_chance(
+    square: Array | float, total: float, dimensions: Array | float, freedom: float, given: bool
+) -> Array:
+    """Logarithms (k,) of the chance that `dimensions` of the residuals' `freedom` explain a sum of
+    squares so large.
 
-    With `given` sigma chi-squared of `square` itself; otherwise that of the share of `square` in `total`, Fisher's F.
+    With `given` sigma chi-squared of `square` itself; otherwise that of the share of `square` in
+    `total`, Fisher's F.
 
     >>> log_chance(np.array([3.841459]), 100.0, 1.0, 90.0, True).round(6)
     array([-2.995732])
@@ -35,7 +41,9 @@ def log_chance(square: Array | float, total: float, dimensions: Array | float, f
             chance = betainc(np.maximum(a, 1e-9), b, left)
             leading = a * np.log(left) + b * np.log1p(-left) - np.log(a) - betaln(a, b)
         found = np.where(chance > SMALLEST, np.log(np.maximum(chance, SMALLEST)), leading)
-    return np.asarray(np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(found, 0.0)))
+    return np.asarray(
+        np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(found, 0.0))
+    )
 
 
 def normal_equivalent(log_p: float) -> float:

@@ -27,7 +27,10 @@ def diagnosis_lines(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[str]:
     """A line for each thing suspected, mistakes first; `marks` tell where the readings stand."""
     lines = [f"suspected: {words}" for words in _all_words(found, marks)]
     if len(found.suspects) == MOST:
-        what = "look for what these have in common, or state larger uncertainties, or a richer error model"
+        what = (
+            "look for what these have in common, or state larger uncertainties, or a richer error"
+            " model"
+        )
         lines.append(f"suspected: there may be more than these {MOST}; {what}")
     return lines
 
@@ -49,18 +52,23 @@ def suspect_words(one: Suspect, marks: Sequence[Mark] = ()) -> str:
 def scatter_words(one: MoreScatter) -> str:
     """Which readings scatter more than the others."""
     return (
-        f"readings {_scatter_place(one)} scatter {number(one.times, 2)} times as much as stated for the others "
-        f"{_significance(one)}; look for what was different there, or state their uncertainty in a column u"
+        f"readings {_scatter_place(one)} scatter {number(one.times, 2)} times as much as stated for"
+        f" the others {_significance(one)}; look for what was different there, or state their"
+        " uncertainty in a column u"
     )
 
 
 def unexplained_words(one: Unexplained) -> str:
     """That no single mistake explains the residuals, and what may."""
-    best = f"what explains most is {one.words} {_significance(one)}" if one.words else f"{_significance(one)[1:-1]}"
+    best = (
+        f"what explains most is {one.words} {_significance(one)}"
+        if one.words
+        else f"{_significance(one)[1:-1]}"
+    )
     return (
-        "the error model, a drift or the noise, for no single mistake explains the residuals, which are "
-        f"{number(one.times, 3)} times as large as stated; {best}; try a richer error model"
-        f"{', or larger uncertainties' if one.too_large else ''}"
+        "the error model, a drift or the noise, for no single mistake explains the residuals,"
+        f" which are {number(one.times, 3)} times as large as stated; {best}; try a richer error"
+        f" model{', or larger uncertainties' if one.too_large else ''}"
     )
 
 
@@ -84,10 +92,13 @@ def _cause_name(given: Patterns, columns: Sequence[int]) -> str:
 
 
 def with_uncertainty(value: float, uncertainty: float) -> str:
-    """A value with its standard uncertainty in brackets, to the latter's first digit, or second if it is 1 or 2.
+    """A value with its standard uncertainty in brackets, to the latter's first digit, or second if
+    it is 1 or 2.
 
-    >>> with_uncertainty(4.128, 0.71), with_uncertainty(31.28, 17.3), with_uncertainty(0.1234, 0.0123)
-    ('4.1(0.7)', '31(17)', '0.123(0.012)')
+    >>> with_uncertainty(4.128, 0.71), with_uncertainty(31.28, 17.3)
+    ('4.1(0.7)', '31(17)')
+    >>> with_uncertainty(0.1234, 0.0123)
+    '0.123(0.012)'
     """
     exponent = math.floor(math.log10(uncertainty))
     decimals = max(-exponent + int(uncertainty / 10.0**exponent < 3.0), 0)
@@ -96,8 +107,16 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
 
 def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     given, k = one.patterns, one.pattern
-    design, kind, subject, axis = given.design, given.kind[k], int(given.subject[k]), int(given.axis[k])
-    size = f"{with_uncertainty(1e6 * abs(one.value), 1e6 * one.standard_uncertainty)} {SHOWN[one.unit]}"
+    design, kind, subject, axis = (
+        given.design,
+        given.kind[k],
+        int(given.subject[k]),
+        int(given.axis[k]),
+    )
+    size = (
+        f"{with_uncertainty(1e6 * abs(one.value), 1e6 * one.standard_uncertainty)}"
+        f" {SHOWN[one.unit]}"
+    )
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
     high = "high" if one.value > 0 else "low"
     long = "long" if one.value > 0 else "short"
@@ -134,16 +153,27 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
         if kind == "ball":
             told = f"ball {ball} in position {place} read {_sizes(one, 'too high')} each time"
             return told, f"clean the ball, and {leave}"
-        told = f"ball {ball} displaced on its plate from position {place} on, by {_sizes(one, 'along')}"
-        return told, "look whether it is loose, dirty or another one; from there on it is a ball of its own"
+        told = (
+            f"ball {ball} displaced on its plate from position {place} on, by"
+            f" {_sizes(one, 'along')}"
+        )
+        return (
+            told,
+            "look whether it is loose, dirty or another one; from there on it is a ball of its own",
+        )
     artefact = design.artefact_names[design.position_artefact[subject]]
     if kind in ("shift", "turn"):
         return (
-            f"{artefact} slipped in position {place}, by {_sizes(one, 'along')}, {_moment(one, marks)}",
+            (
+                f"{artefact} slipped in position {place}, by {_sizes(one, 'along')},"
+                f" {_moment(one, marks)}"
+            ),
             "read the position again, or state two positions, one for each part",
         )
     parts = []
-    for column, value, uncertainty in zip(one.columns, one.values, one.standard_uncertainties, strict=True):
+    for column, value, uncertainty in zip(
+        one.columns, one.values, one.standard_uncertainties, strict=True
+    ):
         larger = "larger" if value > 0 else "smaller"
         told = f"{with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)} {SHOWN[one.unit]} {larger}"
         parts.append(f"{told} in position {design.position_names[given.subject[column]]}")
@@ -170,7 +200,9 @@ def _significant(one: Suspect) -> Integers:
 
 
 def _sizes(one: Suspect, how: str) -> str:
-    """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "… along x"."""
+    """Sizes of a cause by direction, those that are significant: "1.2(0.2) um too high in x" or "…
+    along x".
+    """
     given = one.patterns
     parts = []
     for place in _significant(one):
@@ -221,7 +253,9 @@ def _indices(found: Integers) -> list[int]:
 
 
 def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
-    """Where readings stand, such as "lines 5 and 7 of readings.csv"; empty if they stand in no file."""
+    """Where readings stand, such as "lines 5 and 7 of readings.csv"; empty if they stand in no
+    file.
+    """
     if not marks or not readings:
         return ""
     numbers = [str(marks[i].line) for i in readings]
@@ -239,7 +273,9 @@ def diagnosis_data(found: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[st
         told.append(_other_data(what, "scatter", found.scatter, scatter_words(found.scatter)))
     if found.unexplained:
         what = found.unexplained.words or "error model, drift or noise"
-        told.append(_other_data(what, "model", found.unexplained, unexplained_words(found.unexplained)))
+        told.append(
+            _other_data(what, "model", found.unexplained, unexplained_words(found.unexplained))
+        )
     return told
 
 
@@ -255,12 +291,23 @@ def _suspect_data(one: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
         "limit": one.limit,
         "lines": [marks[i].line for i in _touched(one)] if marks else [],
         "directions": [
-            {"name": name(given, k), "value": value, "standard_uncertainty": u, "unit": given.unit(k)}
+            {
+                "name": name(given, k),
+                "value": value,
+                "standard_uncertainty": u,
+                "unit": given.unit(k),
+            }
             for k, value, u in zip(
-                one.columns.tolist(), one.values.tolist(), one.standard_uncertainties.tolist(), strict=True
+                one.columns.tolist(),
+                one.values.tolist(),
+                one.standard_uncertainties.tolist(),
+                strict=True,
             )
         ],
-        "alternatives": [*(_cause_name(given, columns) for columns in one.alternatives), *one.of_model],
+        "alternatives": [
+            *(_cause_name(given, columns) for columns in one.alternatives),
+            *one.of_model,
+        ],
         "words": suspect_words(one, marks),
     }
 

@@ -33,10 +33,11 @@ NAMED = 3
 
 @dataclass(frozen=True)
 class Settings:
-    """What lengths are looked at: `grid` points along each axis, with a probe, and how they are compared.
+    """What lengths are looked at: `grid` points along each axis, with a probe, and how they are
+    compared.
 
-    `with_repeatability`: whether the scatter of the two readings along the length adds to its uncertainty. The
-    `target` is meant for `target_factor` times the standard uncertainty.
+    `with_repeatability`: whether the scatter of the two readings along the length adds to its
+    uncertainty. The `target` is meant for `target_factor` times the standard uncertainty.
     """
 
     grid: tuple[int, ...]
@@ -49,12 +50,13 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Lengths in g groups; all arrays (g,), uncertainties in metres, NaN where no length is determined.
+    """Lengths in g groups; all arrays (g,), uncertainties in metres, NaN where no length is
+    determined.
 
-    `count` of them there are, `undetermined` of these are open; `average` and `maximum` are standard uncertainties,
-    `average_ratio` and `maximum_ratio` those to the target; `within` and `within_expanded` count the lengths whose
-    standard and expanded uncertainties are no larger than the target, `within_target` those with the uncertainty that
-    the target is meant for.
+    `count` of them there are, `undetermined` of these are open; `average` and `maximum` are
+    standard uncertainties, `average_ratio` and `maximum_ratio` those to the target; `within` and
+    `within_expanded` count the lengths whose standard and expanded uncertainties are no larger than
+    the target, `within_target` those with the uncertainty that the target is meant for.
     """
 
     count: Integers
@@ -68,7 +70,9 @@ class Groups:
     within_target: Integers
 
     def share(self, expanded: bool = False) -> Array:
-        """Shares of lengths within the target (g,), undetermined ones counted as not; NaN of an empty group."""
+        """Shares of lengths within the target (g,), undetermined ones counted as not; NaN of an
+        empty group.
+        """
         within = self.within_expanded if expanded else self.within
         return np.asarray(np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan))
 
@@ -77,10 +81,11 @@ class Groups:
 class LengthMap:
     """Lengths between all points of a grid, grouped.
 
-    `points` (n, d) are scale readings, metres, the last axis changing fastest. `by_point` has a group for each point,
-    of the lengths that start or end there; `by_length` those between neighbouring `edges` (c + 1,); `by_direction`
-    those of `directions`; `whole` a single one. `worst` are the indices of the length with the largest ratio, and
-    `open_pairs` (up to three, 2) of some that are undetermined.
+    `points` (n, d) are scale readings, metres, the last axis changing fastest. `by_point` has a
+    group for each point, of the lengths that start or end there; `by_length` those between
+    neighbouring `edges` (c + 1,); `by_direction` those of `directions`; `whole` a single one.
+    `worst` are the indices of the length with the largest ratio, and `open_pairs` (up to three, 2)
+    of some that are undetermined.
     """
 
     design: Design
@@ -103,7 +108,9 @@ class LengthMap:
 
 
 @single_threaded
-def length_map(experiment: Experiment, settings: Settings, report: Report = unreported) -> LengthMap:
+def length_map(
+    experiment: Experiment, settings: Settings, report: Report = unreported
+) -> LengthMap:
     """Uncertainties of all lengths between points of a grid over the volume, at zero machine error.
 
     `report` is told the number of lengths done.
@@ -130,7 +137,11 @@ def length_map(experiment: Experiment, settings: Settings, report: Report = unre
         apart = (points[tile.second] - points[tile.first]) / (design.upper - design.lower)
         by_direction.add(direction_classes(apart), values, ratio)
         whole.add(np.zeros(len(values), np.int64), values, ratio)
-        if not tile.is_open.all() and (top := int(np.nanargmax(comparable(ratio)))) >= 0 and above(ratio[top], largest):
+        if (
+            not tile.is_open.all()
+            and (top := int(np.nanargmax(comparable(ratio)))) >= 0
+            and above(ratio[top], largest)
+        ):
             worst, largest = (int(tile.first[top]), int(tile.second[top])), float(ratio[top])
         for k in np.flatnonzero(tile.is_open)[: NAMED - len(named)]:
             named.append((int(tile.first[k]), int(tile.second[k])))
@@ -183,7 +194,11 @@ def class_edges(longest: float) -> Array:
     [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45]
     """
     power = 10.0 ** np.floor(np.log10(longest / MOST_CLASSES))
-    width = next(step * power for step in (1.0, 2.0, 5.0, 10.0) if longest <= MOST_CLASSES * step * power * (1 + 1e-9))
+    width = next(
+        step * power
+        for step in (1.0, 2.0, 5.0, 10.0)
+        if longest <= MOST_CLASSES * step * power * (1 + 1e-9)
+    )
     count = int(np.ceil(longest / width * (1 - 1e-9)))
     return np.round(width * np.arange(count + 1), 12)
 
@@ -202,11 +217,13 @@ def direction_names(dimension: int) -> tuple[str, ...]:
 
 
 def direction_classes(apart: Array) -> Integers:
-    """Group of each difference (m, d), in units of the volume's edges, as an index into `direction_names`.
+    """Group of each difference (m, d), in units of the volume's edges, as an index into
+    `direction_names`.
 
     A diagonal is parallel to one of the volume.
 
-    >>> direction_classes(np.array([[0.2, 0, 0], [0, 0.1, -0.1], [0.3, 0.3, 0.3], [0.1, 0.2, 0]])).tolist()
+    >>> apart = [[0.2, 0, 0], [0, 0.1, -0.1], [0.3, 0.3, 0.3], [0.1, 0.2, 0]]
+    >>> direction_classes(np.array(apart)).tolist()
     [0, 3, 6, 7]
     """
     d = apart.shape[1]
@@ -214,7 +231,9 @@ def direction_classes(apart: Array) -> Integers:
     largest = size.max(axis=1)
     moves = size > PARALLEL * largest[:, None]
     count = moves.sum(axis=1)
-    is_equal = (~moves | (np.abs(size - largest[:, None]) <= PARALLEL * largest[:, None])).all(axis=1)
+    is_equal = (~moves | (np.abs(size - largest[:, None]) <= PARALLEL * largest[:, None])).all(
+        axis=1
+    )
     found = np.full(len(apart), len(direction_names(d)) - 1)
     found = np.where(count == 1, moves.argmax(axis=1), found)
     if d == 3:
@@ -223,7 +242,9 @@ def direction_classes(apart: Array) -> Integers:
 
 
 class _Tally:
-    """Running sums of groups of lengths, counted where their uncertainty times each of `factors` is in the target."""
+    """Running sums of groups of lengths, counted where their uncertainty times each of `factors` is
+    in the target.
+    """
 
     def __init__(self, size: int, factors: tuple[float, ...]) -> None:
         self.factors = factors
@@ -232,7 +253,9 @@ class _Tally:
         self.tops = np.full((2, size), -np.inf)
 
     def add(self, group: Integers, values: Array, ratio: Array) -> None:
-        """Count standard uncertainties (m,) and their ratios to the target, NaN where undetermined."""
+        """Count standard uncertainties (m,) and their ratios to the target, NaN where
+        undetermined.
+        """
         is_open = np.isnan(values)
         size = self.counts.shape[1]
         with np.errstate(invalid="ignore"):

@@ -16,7 +16,8 @@ from .length_map import Groups, LengthMap, Settings, length_pairs
 
 AXES = "xyz"
 POINT_COLUMNS = (
-    "lengths,undetermined,u_average_um,u_maximum_um,ratio_average,ratio_maximum,share_within,share_expanded_within"
+    "lengths,undetermined,u_average_um,u_maximum_um,ratio_average,ratio_maximum,share_within,"
+    "share_expanded_within"
 )
 
 
@@ -30,7 +31,9 @@ def target_words(target: LengthFunction) -> str:
 
 
 def length_lines(title: str, found: LengthMap) -> list[str]:
-    """The share of lengths that meet the target, and where, how long and in which direction they are."""
+    """The share of lengths that meet the target, and where, how long and in which direction they
+    are.
+    """
     settings, whole = found.settings, found.whole
     k = f"{settings.coverage_factor:g}"
     rank = f"rank deficiency {found.deficiency}; " if found.deficiency else ""
@@ -38,16 +41,29 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
     count, n = int(whole.count[0]), len(found.points)
     lines = [
         title,
-        f"{rank}{count} lengths between {n} points of a grid, with the probe {settings.probe}{scatter}",
-        f"target {target_words(settings.target)}: met by the standard uncertainty u of {_share(whole, False)}, by the "
-        f"expanded uncertainty {k} u of {_share(whole, True)} lengths",
+        (
+            f"{rank}{count} lengths between {n} points of a grid, with the probe"
+            f" {settings.probe}{scatter}"
+        ),
+        (
+            f"target {target_words(settings.target)}: met by the standard uncertainty u of"
+            f" {_share(whole, False)}, by the expanded uncertainty {k} u of {_share(whole, True)}"
+            " lengths"
+        ),
         f"the target is meant for the {uncertainty_words(settings.target_factor)}",
     ]
     if whole.undetermined[0]:
-        some = ", ".join(f"{_place(found.points[i])} to {_place(found.points[j])}" for i, j in found.open_pairs)
-        lines.append(f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as {some}")
+        some = ", ".join(
+            f"{_place(found.points[i])} to {_place(found.points[j])}" for i, j in found.open_pairs
+        )
+        lines.append(
+            f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as {some}"
+        )
     elif found.deficiency:
-        lines.append("what is undetermined changes none of these lengths; those of another --grid it may change")
+        lines.append(
+            "what is undetermined changes none of these lengths; those of another --grid it may"
+            " change"
+        )
     if found.worst is not None:
         i, j = found.worst
         ratio = settings.target_factor * float(whole.maximum_ratio[0])
@@ -61,8 +77,10 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
         *_table("direction", list(found.directions), found.by_direction, found, None),
         "",
         *_table("point, mm", *_extremes(found), found, None),
-        f"(points in the order of their largest ratio of {_compared(found)} to the target; lengths are those that "
-        "start or end there)",
+        (
+            f"(points in the order of their largest ratio of {_compared(found)} to the target;"
+            " lengths are those that start or end there)"
+        ),
     ]
 
 
@@ -76,14 +94,19 @@ def _place(point: Array) -> str:
 
 
 def _class_names(edges: Array) -> list[str]:
-    return [f"{1e3 * low:g} to {1e3 * high:g} mm" for low, high in zip(edges, edges[1:], strict=False)]
+    return [
+        f"{1e3 * low:g} to {1e3 * high:g} mm" for low, high in zip(edges, edges[1:], strict=False)
+    ]
 
 
 def _class_targets(found: LengthMap) -> list[str] | None:
     if not found.settings.target.slope:
         return None
     ends = 1e6 * found.settings.target.at(found.edges)
-    return [f"{number(float(a), 3)} to {number(float(b), 3)}" for a, b in zip(ends, ends[1:], strict=False)]
+    return [
+        f"{number(float(a), 3)} to {number(float(b), 3)}"
+        for a, b in zip(ends, ends[1:], strict=False)
+    ]
 
 
 # Of the points, this many with the largest ratios, and as many with the smallest.
@@ -93,7 +116,11 @@ SHOWN_POINTS = 3
 def _extremes(found: LengthMap) -> tuple[list[str], Groups]:
     ratio = np.where(np.isnan(found.by_point.maximum_ratio), np.inf, found.by_point.maximum_ratio)
     order = np.argsort(-comparable(ratio), kind="stable")
-    chosen = order if len(order) <= 2 * SHOWN_POINTS else np.concatenate([order[:SHOWN_POINTS], order[-SHOWN_POINTS:]])
+    chosen = (
+        order
+        if len(order) <= 2 * SHOWN_POINTS
+        else np.concatenate([order[:SHOWN_POINTS], order[-SHOWN_POINTS:]])
+    )
     names = [_place(found.points[i]).removesuffix(" mm") for i in chosen]
     return names, Groups(**{name: values[chosen] for name, values in vars(found.by_point).items()})
 
@@ -104,18 +131,34 @@ def _compared(found: LengthMap) -> str:
     return "u" if factor == 1.0 else f"{factor:g} u"
 
 
-def _table(head: str, names: list[str], groups: Groups, found: LengthMap, targets: list[str] | None) -> list[str]:
+def _table(
+    head: str, names: list[str], groups: Groups, found: LengthMap, targets: list[str] | None
+) -> list[str]:
     factor = found.settings.coverage_factor
     k = f"{factor:g}"
-    heads = [head, "lengths", "undetermined", "u average, um", "maximum", f"{k} u maximum", "target"]
+    heads = [
+        head,
+        "lengths",
+        "undetermined",
+        "u average, um",
+        "maximum",
+        f"{k} u maximum",
+        "target",
+    ]
     heads += [f"{_compared(found)} / target, maximum", "u within", f"{k} u within"]
     rows = [heads]
     for i, name in enumerate(names):
         if not groups.count[i]:
             continue
         row = [name, str(groups.count[i]), str(groups.undetermined[i])]
-        row += [number(1e6 * float(v[i])) for v in (groups.average, groups.maximum, factor * groups.maximum)]
-        row += [targets[i] if targets else "", number(found.settings.target_factor * float(groups.maximum_ratio[i]))]
+        row += [
+            number(1e6 * float(v[i]))
+            for v in (groups.average, groups.maximum, factor * groups.maximum)
+        ]
+        row += [
+            targets[i] if targets else "",
+            number(found.settings.target_factor * float(groups.maximum_ratio[i])),
+        ]
         row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
         rows.append(row)
     unused = {6} if not targets else set[int]()
@@ -129,7 +172,13 @@ def point_csv(found: LengthMap) -> Iterator[str]:
     axes = AXES[: found.design.dimension]
     yield ",".join([*(f"{axis}_mm" for axis in axes), POINT_COLUMNS])
     groups = found.by_point
-    columns = [1e3 * found.points, groups.count, groups.undetermined, 1e6 * groups.average, 1e6 * groups.maximum]
+    columns = [
+        1e3 * found.points,
+        groups.count,
+        groups.undetermined,
+        1e6 * groups.average,
+        1e6 * groups.maximum,
+    ]
     columns += [groups.average_ratio, groups.maximum_ratio, groups.share(), groups.share(True)]
     for row in np.column_stack(columns).tolist():
         yield _csv(row)
@@ -139,7 +188,12 @@ def pair_csv(experiment: Experiment, settings: Settings) -> Iterator[str]:
     """A line for each length; what is undetermined is left empty."""
     points, tiles = length_pairs(experiment, settings)
     axes = AXES[: points.shape[1]]
-    yield ",".join([*(f"{axis}{end}_mm" for end in (1, 2) for axis in axes), "length_mm,u_um,expanded_um,target_um"])
+    yield ",".join(
+        [
+            *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
+            "length_mm,u_um,expanded_um,target_um",
+        ]
+    )
     for tile in tiles:
         u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
         target = 1e6 * settings.target.at(tile.lengths)
@@ -170,7 +224,9 @@ def length_data(label: str, title: str, found: LengthMap) -> dict[str, Any]:
         "all": _group_data(found.whole)[0],
         "worst": None if found.worst is None else [found.points[k].tolist() for k in found.worst],
         "by_length": _with(classes, found.by_length),
-        "by_direction": _with([{"direction": name} for name in found.directions], found.by_direction),
+        "by_direction": _with(
+            [{"direction": name} for name in found.directions], found.by_direction
+        ),
         "by_point": _with([{"point": point} for point in found.points.tolist()], found.by_point),
     }
 

@@ -12,15 +12,18 @@ from ..uncertainty.quantities import QUANTITIES
 from .experiments import Trials
 from .figures import BEYOND, Comparison, Figure, Outcome
 
-# S^2 of readings without noise, for each degree of freedom, below which nothing is left but rounding.
+# S^2 of readings without noise, for each degree of freedom, below which nothing is left but
+# rounding.
 NO_MISFIT = 1e-9
 
 
 def with_error(figure: Figure, factor: float = 1.0) -> str:
     """A value with its standard error in units of the last digit, as the GUM writes it (7.2.2).
 
-    >>> with_error(Figure(0.99213, 0.0066)), with_error(Figure(0.9534, 0.0164), 100), with_error(Figure(581.3, 7.3))
-    ('0.992(7)', '95(2)', '581(7)')
+    >>> with_error(Figure(0.99213, 0.0066)), with_error(Figure(0.9534, 0.0164), 100)
+    ('0.992(7)', '95(2)')
+    >>> with_error(Figure(581.3, 7.3))
+    '581(7)'
     """
     value, error = factor * figure.value, factor * figure.error
     if not (math.isfinite(value) and math.isfinite(error)):
@@ -40,13 +43,31 @@ def trials_lines(done: Trials) -> list[str]:
     if outcome is None:
         return [f"no Monte Carlo: {done.reason}"]
     if not outcome.comparisons:
-        return [f"no Monte Carlo: none of {outcome.trials} data sets led to an estimate that converged"]
-    rows = [["", "average U", "actual", "unit", "spread / U", "bias / U", "covered, %", "sigma estimated", ""]]
+        return [
+            f"no Monte Carlo: none of {outcome.trials} data sets led to an estimate that converged"
+        ]
+    rows = [
+        [
+            "",
+            "average U",
+            "actual",
+            "unit",
+            "spread / U",
+            "bias / U",
+            "covered, %",
+            "sigma estimated",
+            "",
+        ]
+    ]
     for symbol, one in outcome.comparisons.items():
         # Lengths and angles have ratios in common, and no average.
         averages = ["", "", ""]
         if ", " not in one.unit:
-            averages = [number(1e6 * one.linear_average), number(1e6 * one.actual_average), shown_unit(one.unit)]
+            averages = [
+                number(1e6 * one.linear_average),
+                number(1e6 * one.actual_average),
+                shown_unit(one.unit),
+            ]
         rows.append(
             [
                 symbol,
@@ -59,8 +80,10 @@ def trials_lines(done: Trials) -> list[str]:
             ]
         )
     lines = [
-        f"Monte Carlo: {outcome.trials} data sets of the true machine, seed {done.seed}; in parentheses the standard "
-        "error of the last digit",
+        (
+            f"Monte Carlo: {outcome.trials} data sets of the true machine, seed {done.seed}; in"
+            " parentheses the standard error of the last digit"
+        ),
         *aligned(rows, [False, True, True, False, True, True, True, True, False]),
     ]
     sampled = [symbol for symbol, one in outcome.comparisons.items() if one.sampled]
@@ -71,37 +94,50 @@ def trials_lines(done: Trials) -> list[str]:
         lines.append(f"<- differs from linear theory by more than {BEYOND:g} standard errors")
     if outcome.failed:
         numbers = listing([str(k) for k in outcome.failed])
-        lines.append(f"{len(outcome.failed)} data sets did not converge and are left out of all figures: {numbers}")
+        lines.append(
+            f"{len(outcome.failed)} data sets did not converge and are left out of all figures:"
+            f" {numbers}"
+        )
     return lines + _misfit_lines(done, outcome)
 
 
 def _misfit_lines(done: Trials, outcome: Outcome) -> list[str]:
     misfit = outcome.misfit
     lines = [
-        f"S^2 is {with_error(misfit.mean)} with {misfit.degrees_of_freedom} degrees of freedom, and beyond its 95 % "
-        f"limit in {with_error(misfit.rejected, 100.0)} % of the data sets"
+        f"S^2 is {with_error(misfit.mean)} with {misfit.degrees_of_freedom} degrees of freedom, and"
+        f" beyond its 95 % limit in {with_error(misfit.rejected, 100.0)} % of the data sets"
     ]
     if done.optimism is None:
         return lines
     if misfit.noise_free < NO_MISFIT * misfit.degrees_of_freedom:
-        return [*lines, "the true machine has another error model, which the fitted one follows exactly"]
-    told = {symbol: one.actual for symbol, one in outcome.comparisons.items() if QUANTITIES[one.symbol].effect}
+        return [
+            *lines,
+            "the true machine has another error model, which the fitted one follows exactly",
+        ]
+    told = {
+        symbol: one.actual
+        for symbol, one in outcome.comparisons.items()
+        if QUANTITIES[one.symbol].effect
+    }
     ratios = [f"{symbol} {with_error(ratio)}" for symbol, ratio in told.items()]
     too_optimistic = any(ratio.value > 1.0 and ratio.differs_from(1.0) for ratio in told.values())
     lines += [
         "",
-        ("Too optimistic? " if too_optimistic else "") + "The fitted model cannot follow the true machine exactly.",
+        ("Too optimistic? " if too_optimistic else "")
+        + "The fitted model cannot follow the true machine exactly.",
         f"actual errors are, as root mean squares, in units of those predicted: {', '.join(ratios)}"
         + ("" if too_optimistic else f"; none is above 1 by more than {BEYOND:g} standard errors"),
-        f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2 alone shows the misfit in "
-        f"{100 * done.optimism.power:.3g} % of experiments",
+        (
+            f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2"
+            f" alone shows the misfit in {100 * done.optimism.power:.3g} % of experiments"
+        ),
     ]
     own = done.optimism.own_model
     if own is not None:
         lines.append(
-            f"a second fit with the true machine's own functions added, {own.more} parameters more that this design "
-            f"determines, brings S^2 down by {own.gain:.4g} beyond chance; comparing the two shows it in "
-            f"{100 * own.power:.3g} %"
+            f"a second fit with the true machine's own functions added, {own.more} parameters more"
+            f" that this design determines, brings S^2 down by {own.gain:.4g} beyond chance;"
+            f" comparing the two shows it in {100 * own.power:.3g} %"
         )
     return lines
 
@@ -118,7 +154,9 @@ def trials_data(done: Trials) -> dict[str, Any]:
         "not_converged": list(outcome.failed),
         "passes": outcome.passes,
         "interrupted": outcome.interrupted,
-        "quantities": {symbol: _comparison_data(one) for symbol, one in outcome.comparisons.items()},
+        "quantities": {
+            symbol: _comparison_data(one) for symbol, one in outcome.comparisons.items()
+        },
         "sum_of_squares": {
             **_figure(misfit.mean),
             "degrees_of_freedom": misfit.degrees_of_freedom,
@@ -130,7 +168,11 @@ def trials_data(done: Trials) -> dict[str, Any]:
         own = done.optimism.own_model
         found["too_optimistic"] = {
             "misfit_noticed": done.optimism.power,
-            "own_model": None if own is None else {"parameters_more": own.more, "gain": own.gain, "noticed": own.power},
+            "own_model": (
+                None
+                if own is None
+                else {"parameters_more": own.more, "gain": own.gain, "noticed": own.power}
+            ),
         }
     return found
 

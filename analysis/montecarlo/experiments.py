@@ -1,4 +1,6 @@
-"""Replicates of an experiment's true machine: are the linearised uncertainties right, or too optimistic?"""
+"""Replicates of an experiment's true machine: are the linearised uncertainties right, or too
+optimistic?
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,13 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, TooWildError, Truth, reference
+from ballplate.simulator.montecarlo.reference import (
+    NoReferenceError,
+    Reference,
+    TooWildError,
+    Truth,
+    reference,
+)
 from ballplate.simulator.readings.generate import NoReadingError, on_true_machine
 
 from .figures import Outcome, outcome, power_of_difference, power_of_misfit
@@ -27,10 +35,11 @@ from .trials import TASK, Progress, run_trials, sum_of_task
 
 @dataclass(frozen=True)
 class OwnModel:
-    """What a second fit, with the true machine's own functions added, would tell (NPL Report CISE 15/98, section 5.3).
+    """What a second fit, with the true machine's own functions added, would tell (NPL Report CISE
+    15/98, section 5.3).
 
-    The design determines `more` parameters more of it; it brings S^2 down by `gain` more than by chance, and the
-    difference of the two S^2 shows the misfit with probability `power`.
+    The design determines `more` parameters more of it; it brings S^2 down by `gain` more than by
+    chance, and the difference of the two S^2 shows the misfit with probability `power`.
     """
 
     more: int
@@ -40,7 +49,9 @@ class OwnModel:
 
 @dataclass(frozen=True)
 class Optimism:
-    """How a misfit would be noticed: by S^2 alone with probability `power`, or by a richer model."""
+    """How a misfit would be noticed: by S^2 alone with probability `power`, or by a richer
+    model.
+    """
 
     power: float
     own_model: OwnModel | None
@@ -48,7 +59,9 @@ class Optimism:
 
 @dataclass(frozen=True)
 class Trials:
-    """Replicates of an experiment; without an outcome there is a reason. `optimism` where the models differ."""
+    """Replicates of an experiment; without an outcome there is a reason. `optimism` where the
+    models differ.
+    """
 
     seed: int
     outcome: Outcome | None
@@ -60,7 +73,9 @@ def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
     """The design, and the artefacts as drawn on the true machine."""
     design = lay_out(experiment)
     lower, upper = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, state = on_true_machine(design, true_machine(experiment.true_machine, design.model, lower, upper))
+    on_truth, state = on_true_machine(
+        design, true_machine(experiment.true_machine, design.model, lower, upper)
+    )
     return design, Truth(state, on_truth.model)
 
 
@@ -85,10 +100,14 @@ def trials(
     return Trials(chosen, found, optimism=_optimism(experiment, shared) if differs else None)
 
 
-def block_of_trials(experiment: Experiment, count: int, seed: int, block: int, size: int) -> Tally | None:
-    """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most; None where there are none.
+def block_of_trials(
+    experiment: Experiment, count: int, seed: int, block: int, size: int
+) -> Tally | None:
+    """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most; None
+    where there are none.
 
-    `size` is a multiple of `TASK` replicates. The same replicates have the same bits, whatever the blocks.
+    `size` is a multiple of `TASK` replicates. The same replicates have the same bits, whatever the
+    blocks.
 
     :raises ExperimentError: as `trials`.
     """
@@ -129,8 +148,13 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     if getattr(experiment.true_machine, "error_model", None) is None:
         return Optimism(power, None)
     design = shared.design
-    # Neither model need contain the other: what the true one's functions add is the rank of both together.
-    both = replace(design, model=JoinedModel(design.model, shared.truth.model), priors=_widened(design, shared.truth))
+    # Neither model need contain the other: what the true one's functions add is the rank of both
+    # together.
+    both = replace(
+        design,
+        model=JoinedModel(design.model, shared.truth.model),
+        priors=_widened(design, shared.truth),
+    )
     more = both.parameter_count - linearise(both).deficiency - design.parameter_count
     if more == 0:
         return Optimism(power, None)
@@ -140,4 +164,6 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
 def _widened(design: Design, truth: Truth) -> Priors:
     """The design's priors for a model that has the true one's parameters besides."""
     by_model = design.priors.by_model
-    return replace(design.priors, by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters)))))
+    return replace(
+        design.priors, by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters))))
+    )

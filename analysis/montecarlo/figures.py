@@ -1,4 +1,6 @@
-"""What replicates come to: bias, spread and coverage beside the linearised uncertainties, with standard errors."""
+"""What replicates come to: bias, spread and coverage beside the linearised uncertainties, with
+standard errors.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +9,21 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.montecarlo.reference import Reference
 
-from .tally import ACTUAL, COVERAGE, ESTIMATED, KNOWN, SPREAD, SYSTEMATIC, QuantityTally, Tally, factors
+from .tally import (
+    ACTUAL,
+    COVERAGE,
+    ESTIMATED,
+    KNOWN,
+    SPREAD,
+    SYSTEMATIC,
+    QuantityTally,
+    Tally,
+    factors,
+)
 from .targets import Target
 
-# Standard errors beyond which a difference is no accident; false in one of some hundred runs with thirty figures each.
+# Standard errors beyond which a difference is no accident; false in one of some hundred runs with
+# thirty figures each.
 BEYOND = 4.0
 
 # Data sets below which standard errors are themselves too uncertain for flags.
@@ -32,14 +45,15 @@ class Figure:
 class Comparison:
     """A quantity's replicates beside its linearised uncertainties.
 
-    `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of the errors, over
-    `count` members, a `sampled` selection of all pairs. `spread` is the ratio of the errors' scatter to the linearised
-    uncertainty, root mean square over the members. `actual` is the root mean square of the errors themselves, what
-    noise-free readings leave included, over that of the linearised uncertainties (of members in the same unit);
-    `bias` the mean error, a root mean square in standard uncertainties like `spread`, and `largest_bias` the
-    largest, in the member's unit. `known` and `estimated` are the shares of true values within the expanded
-    uncertainty for 95 %, with sigma given and with sigma estimated by each replicate. `flags` names the figures that
-    linear theory gets wrong.
+    `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of
+    the errors, over `count` members, a `sampled` selection of all pairs. `spread` is the ratio of
+    the errors' scatter to the linearised uncertainty, root mean square over the members. `actual`
+    is the root mean square of the errors themselves, what noise-free readings leave included, over
+    that of the linearised uncertainties (of members in the same unit); `bias` the mean error, a
+    root mean square in standard uncertainties like `spread`, and `largest_bias` the largest, in the
+    member's unit. `known` and `estimated` are the shares of true values within the expanded
+    uncertainty for 95 %, with sigma given and with sigma estimated by each replicate. `flags` names
+    the figures that linear theory gets wrong.
     """
 
     symbol: str
@@ -61,7 +75,8 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Misfit:
-    """What S^2 tells: its mean over replicates, its expectation, and the share of replicates beyond its 95 % quantile.
+    """What S^2 tells: its mean over replicates, its expectation, and the share of replicates beyond
+    its 95 % quantile.
 
     `noise_free` is S^2 of readings without noise, zero if the fitted model holds the true machine.
     """
@@ -74,7 +89,9 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All comparisons, how many replicates they rest on and which failed; no comparison where all did."""
+    """All comparisons, how many replicates they rest on and which failed; no comparison where all
+    did.
+    """
 
     trials: int
     failed: tuple[int, ...]
@@ -122,19 +139,30 @@ def _error_of_mean(total: float, squares: float, n: int) -> float:
 def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
     count = max(n, 1)
     means = sums.numbers / count
-    errors = [_error_of_mean(one, two, n) for one, two in zip(sums.numbers, sums.numbers_squared, strict=True)]
+    errors = [
+        _error_of_mean(one, two, n)
+        for one, two in zip(sums.numbers, sums.numbers_squared, strict=True)
+    ]
 
     def root(which: int) -> Figure:
         value = float(np.sqrt(means[which]))
         return Figure(value, errors[which] / (2.0 * value) if value else 0.0)
 
     spread, actual = root(SPREAD), root(ACTUAL)
-    known, estimated = Figure(float(means[KNOWN]), errors[KNOWN]), Figure(float(means[ESTIMATED]), errors[ESTIMATED])
+    known, estimated = (
+        Figure(float(means[KNOWN]), errors[KNOWN]),
+        Figure(float(means[ESTIMATED]), errors[ESTIMATED]),
+    )
     mean_error = sums.errors / count
     # Scatter alone makes means differ from zero; what it makes of their square is taken away.
     square = float(((mean_error / aim.uncertainty) ** 2).mean() - means[SPREAD] / count)
-    # Without a bias the square of a mean scatters as a replicate's mean square does, divided by their number once more.
-    error = float(np.hypot(errors[SPREAD] / np.sqrt(count), errors[SYSTEMATIC])) if n > 1 else float("inf")
+    # Without a bias the square of a mean scatters as a replicate's mean square does, divided by
+    # their number once more.
+    error = (
+        float(np.hypot(errors[SPREAD] / np.sqrt(count), errors[SYSTEMATIC]))
+        if n > 1
+        else float("inf")
+    )
     value = float(np.sqrt(max(square, 0.0)))
     bias = Figure(value, error / (2.0 * value) if square > error else float(np.sqrt(error)))
     flags = []
@@ -170,12 +198,15 @@ def _comparison(aim: Target, sums: QuantityTally, n: int) -> Comparison:
 
 
 def power_of_difference(more: int, gain: float) -> float:
-    """Probability that `more` parameters, which take `gain` from S^2 without noise, lower it significantly, at 95 %."""
+    """Probability that `more` parameters, which take `gain` from S^2 without noise, lower it
+    significantly, at 95 %.
+    """
     return power_of_misfit(more, gain)
 
 
 def power_of_misfit(freedom: int, noise_free: float) -> float:
-    """Probability that S^2 exceeds its 95 % quantile when readings without noise leave `noise_free` of it.
+    """Probability that S^2 exceeds its 95 % quantile when readings without noise leave `noise_free`
+    of it.
 
     >>> round(power_of_misfit(100, 0.0), 3)
     0.05

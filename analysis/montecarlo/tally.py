@@ -1,7 +1,9 @@
-"""Running sums over replicates, and the figures that they come to, each with its own standard error.
+"""Running sums over replicates, and the figures that they come to, each with its own standard
+error.
 
-A replicate's errors in one quantity, say all distances of U5, are far from independent of one another; replicates are.
-Each figure is therefore a mean over replicates of one number for each, and its standard error that of the mean.
+A replicate's errors in one quantity, say all distances of U5, are far from independent of one
+another; replicates are. Each figure is therefore a mean over replicates of one number for each, and
+its standard error that of the mean.
 """
 
 from __future__ import annotations
@@ -45,12 +47,13 @@ def factors(freedom: int) -> Factors:
 
 @dataclass(frozen=True)
 class QuantityTally:
-    """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (5,) numbers and their squares.
+    """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (5,) numbers and
+    their squares.
 
-    The five: mean square of the errors' scatter in standard uncertainties; mean square of the errors over that of the
-    uncertainties; how much larger than the first the errors' mean square in standard uncertainties is; share of errors
-    within the expanded uncertainty with sigma known, and with sigma estimated from the
-    replicate's residuals.
+    The five: mean square of the errors' scatter in standard uncertainties; mean square of the
+    errors over that of the uncertainties; how much larger than the first the errors' mean square in
+    standard uncertainties is; share of errors within the expanded uncertainty with sigma known, and
+    with sigma estimated from the replicate's residuals.
     """
 
     errors: Array
@@ -71,7 +74,8 @@ class QuantityTally:
 class Tally:
     """Sums over `count` replicates that converged; `failed` holds the numbers of the others.
 
-    `residual` (2,) sums S^2 and its square, `rejected` counts S^2 beyond its limit, `passes` is the most that any took.
+    `residual` (2,) sums S^2 and its square, `rejected` counts S^2 beyond its limit, `passes` is the
+    most that any took.
     """
 
     count: int
@@ -93,7 +97,8 @@ class Tally:
 
 
 def _against_typical(errors: Array, aim: Target) -> Array:
-    """Mean square of errors (b, q) over the mean square uncertainty of those in the same unit, (b,).
+    """Mean square of errors (b, q) over the mean square uncertainty of those in the same unit,
+    (b,).
 
     Errors in units of their own uncertainties would be ruled by the few that have almost none.
     """

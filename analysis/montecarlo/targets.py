@@ -1,4 +1,6 @@
-"""What is compared between replicates and the truth: the quantities behind U1 to U6, one vector each."""
+"""What is compared between replicates and the truth: the quantities behind U1 to U6, one vector
+each.
+"""
 
 from __future__ import annotations
 
@@ -36,9 +38,9 @@ MOST_PAIRS = 1000
 class Target:
     """A vector of q quantities.
 
-    `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the linearised standard
-    uncertainties, `change` its change (b, q) in replicates, `units` (q,) metres, radians or 1. `sampled` tells that q
-    is a sample of all pairs.
+    `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the
+    linearised standard uncertainties, `change` its change (b, q) in replicates, `units` (q,)
+    metres, radians or 1. `sampled` tells that q is a sample of all pairs.
     """
 
     symbol: str
@@ -51,14 +53,19 @@ class Target:
 
 @single_threaded
 def targets(shared: Reference) -> tuple[Target, ...]:
-    """The quantities that a design has; those of the model only where the true machine is one of the fitted model's."""
+    """The quantities that a design has; those of the model only where the true machine is one of
+    the fitted model's.
+    """
     at = shared.linearisation
     displaced = _displaced(shared, at)
     found: list[Target] = []
     for symbol, kind in QUANTITIES.items():
         for functions in kind.functions(at.design, at.layout) if kind.in_replicates else ():
             if isinstance(functions, Parameters):
-                is_known = shared.truth.model == at.design.model or not functions.rows[:, at.layout.model].any()
+                is_known = (
+                    shared.truth.model == at.design.model
+                    or not functions.rows[:, at.layout.model].any()
+                )
                 found += [_parameters(symbol, shared, at, functions)] if is_known else []
             elif isinstance(functions, Coordinates):
                 found.append(_coordinates(symbol, displaced(functions.places)))
@@ -69,7 +76,9 @@ def targets(shared: Reference) -> tuple[Target, ...]:
 
 @dataclass(frozen=True)
 class Displaced:
-    """Places at the reference, with their displacements, where they `truly` are (n, d), and their change (b, d, n)."""
+    """Places at the reference, with their displacements, where they `truly` are (n, d), and their
+    change (b, d, n).
+    """
 
     moved: Displacements
     truly: Array
@@ -77,13 +86,17 @@ class Displaced:
 
 
 def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displaced]:
-    """A function from places to what becomes of them, which remembers the points that it has been asked for."""
+    """A function from places to what becomes of them, which remembers the points that it has been
+    asked for.
+    """
     made: dict[bytes, Displaced] = {}
 
     def displaced(places: Places) -> Displaced:
         if isinstance(places, Balls):
             truly = places.at(at.design, shared.truth.state)
-            return Displaced(displacements(at, places), truly, lambda found: found.balls[:, :, places.index])
+            return Displaced(
+                displacements(at, places), truly, lambda found: found.balls[:, :, places.index]
+            )
         key = places.points.tobytes() + places.probes.tobytes()
         if key not in made:
             true = replace(at.design, model=shared.truth.model)
@@ -120,7 +133,9 @@ def _uncertain(target: Target) -> Target | None:
     def change(replicates: Deviations) -> Array:
         return target.change(replicates)[:, kept]
 
-    return Target(target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled)
+    return Target(
+        target.symbol, target.base[kept], target.uncertainty[kept], units, change, target.sampled
+    )
 
 
 def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Parameters) -> Target:
@@ -128,7 +143,8 @@ def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Pa
     used = functions.rows.any(axis=0)
     rows = functions.rows[:, used]
     turned = vector_from_rotation(start.rotations @ real.rotations.transpose(0, 2, 1))
-    # Parameters of another true model are no errors of these, which then have no part in the functions.
+    # Parameters of another true model are no errors of these, which then have no part in the
+    # functions.
     a = start.a - real.a if shared.truth.model == design.model else start.a
     offsets = probe_offsets(design, start) - probe_offsets(design, real)
     steps = np.zeros((1, len(layout)))
@@ -143,7 +159,9 @@ def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Pa
 
 
 def _shared(layout: SharedLayout, found: Deviations) -> Array:
-    """Changes (b, s) of the shared parameters; those of rotations are not the sums of their steps."""
+    """Changes (b, s) of the shared parameters; those of rotations are not the sums of their
+    steps.
+    """
     changed = found.shared.copy()
     position, place = np.nonzero(layout.pose_columns >= 0)
     poses = np.concatenate([found.origins, found.rotations], axis=2)
@@ -178,7 +196,8 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> Target:
 
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
-        # The square of the new length less that of the old, without the loss of digits that subtracting would bring.
+        # The square of the new length less that of the old, without the loss of digits that
+        # subtracting would bring.
         gained = np.zeros((len(displaced), len(first)))
         for axis in range(displaced.shape[1]):
             difference = displaced[:, axis, first]

@@ -1,4 +1,6 @@
-"""Runs replicates, on one processor or on several, until there are enough, and sums them up in order."""
+"""Runs replicates, on one processor or on several, until there are enough, and sums them up in
+order.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ MOST_TRIALS = 1_000_000
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run has come: replicates done of those wanted, and how accurate it is, relative to what is measured."""
+    """How far a run has come: replicates done of those wanted, and how accurate it is, relative to
+    what is measured.
+    """
 
     done: int
     wanted: int
@@ -42,9 +46,10 @@ def run_trials(
 ) -> Outcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
-    With `until` the run ends as soon as the relative standard error of every ratio of spread to linearised uncertainty
-    is no larger. Neither `workers` nor an interruption changes what a given number of replicates comes to: after a
-    KeyboardInterrupt the outcome is that of the tasks done so far, in order.
+    With `until` the run ends as soon as the relative standard error of every ratio of spread to
+    linearised uncertainty is no larger. Neither `workers` nor an interruption changes what a given
+    number of replicates comes to: after a KeyboardInterrupt the outcome is that of the tasks done
+    so far, in order.
 
     :raises KeyboardInterrupt: before the first task was done.
     """
@@ -56,7 +61,11 @@ def run_trials(
             total = part if total is None else total + part
             accuracy, count = accuracy_of(total), total.count + len(total.failed)
             # Accuracy improves as the root of the number.
-            enough = trials if until is None else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
+            enough = (
+                trials
+                if until is None
+                else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
+            )
             report(Progress(count, enough, accuracy))
             if until is not None and accuracy <= until:
                 break
@@ -69,7 +78,9 @@ def run_trials(
 
 
 def accuracy_of(total: Tally) -> float:
-    """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite for 1 replicate."""
+    """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite
+    for 1 replicate.
+    """
     if total.count < 2:
         return float("inf")
     n = total.count
@@ -82,7 +93,9 @@ def accuracy_of(total: Tally) -> float:
 
 
 @single_threaded
-def sum_of_task(shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int) -> Tally:
+def sum_of_task(
+    shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int
+) -> Tally:
     """Sums over the replicates of one task."""
     total: Tally | None = None
     for batch in range(task * BATCHES, (task + 1) * BATCHES):
@@ -95,10 +108,14 @@ def sum_of_task(shared: Reference, aims: tuple[Target, ...], seed: int, task: in
     return total
 
 
-def _parts(shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, workers: int) -> Iterator[Tally]:
+def _parts(
+    shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, workers: int
+) -> Iterator[Tally]:
     tasks = range(-(-trials // TASK))
     if workers == 1 or len(tasks) == 1:
         for task in tasks:
             yield sum_of_task(shared, aims, seed, task, trials)
         return
-    yield from in_processes(sum_of_task, ((shared, aims, seed, task, trials) for task in tasks), workers)
+    yield from in_processes(
+        sum_of_task, ((shared, aims, seed, task, trials) for task in tasks), workers
+    )

@@ -1,1 +1,3 @@
-"""What is to be read: positions chosen from a pool, the order to read them in, the design as a file, and its repair."""
+"""What is to be read: positions chosen from a pool, the order to read them in, the design as a
+file, and its repair.
+"""

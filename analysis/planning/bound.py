@@ -1,10 +1,12 @@
-"""What no selection can do better than: the convex relaxation in which candidates may count in part.
+"""What no selection can do better than: the convex relaxation in which candidates may count in
+part.
 
-The reciprocal square of the criterion is a concave function of the information, which is linear in the weights of
-candidates. Its tangent at any weights is a linear function that no selection exceeds; the largest value of the tangent
-within the limits, a linear programme, bounds all selections. The weights are improved until bound and criterion of
-the relaxation meet: each solution of the linear programme is a vertex, and the best mixture of the vertices met so far
-gives the next tangent. The last bound is made sharper by asking for whole candidates in the linear programme.
+The reciprocal square of the criterion is a concave function of the information, which is linear in
+the weights of candidates. Its tangent at any weights is a linear function that no selection
+exceeds; the largest value of the tangent within the limits, a linear programme, bounds all
+selections. The weights are improved until bound and criterion of the relaxation meet: each solution
+of the linear programme is a vertex, and the best mixture of the vertices met so far gives the next
+tangent. The last bound is made sharper by asking for whole candidates in the linear programme.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ POWERS = (8.0, 24.0, 72.0)
 # Vertices to start with, and at most until one of their mixtures determines everything.
 FEWEST_STARTS, MOST_STARTS = 4, 64
 
-# Steps of the inner solver, and the share of the largest below which a vertex is dropped from the mixture.
+# Steps of the inner solver, and the share of the largest below which a vertex is dropped from the
+# mixture.
 MOST_INNER = 12
 DROPPED = 1e-7
 
@@ -51,7 +54,9 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Bound:
-    """A `value` that the criterion of no selection falls below, and the weights (n,) of the relaxation that gave it."""
+    """A `value` that the criterion of no selection falls below, and the weights (n,) of the
+    relaxation that gave it.
+    """
 
     value: float
     weights: Array
@@ -62,7 +67,10 @@ class Bound:
         :raises InternalError: it is, by more than rounding.
         """
         if reached < self.value * (1 - ROUNDING):
-            text = f"{name} of the choice, {reached:.10g}, is below {self.value:.10g}, the bound of any choice"
+            text = (
+                f"{name} of the choice, {reached:.10g}, is below {self.value:.10g}, the bound of"
+                " any choice"
+            )
             raise InternalError(f"{text}; neither is to be trusted")
 
 
@@ -70,8 +78,8 @@ class Bound:
 class _Tangent:
     """Tangent of the reciprocal square at some weights: `constant` + `slope` (n,) v.
 
-    `smooth` is what is made small: the criterion, or for a largest value a mean of high power. `value` is the mean
-    that the tangent touches.
+    `smooth` is what is made small: the criterion, or for a largest value a mean of high power.
+    `value` is the mean that the tangent touches.
     """
 
     constant: float
@@ -85,11 +93,13 @@ class _Tangent:
 
 
 @single_threaded
-def bound(problem: Problem, start: Collection[int] | None = None, steps: int = MOST_STEPS) -> Bound | None:
+def bound(
+    problem: Problem, start: Collection[int] | None = None, steps: int = MOST_STEPS
+) -> Bound | None:
     """Bound of all selections within the limits.
 
-    None where the criterion has no relaxation, or no mixture of selections determines what it is about. `start` is a
-    selection to begin with, a good one saves steps.
+    None where the criterion has no relaxation, or no mixture of selections determines what it is
+    about. `start` is a selection to begin with, a good one saves steps.
     """
     if not problem.criterion.is_bounded:
         return None
@@ -152,7 +162,10 @@ def _first(problem: Problem, start: Collection[int] | None) -> _Mixture | None:
             return None
         vertices.append(found)
         mixture = _Mixture(np.array(vertices), np.full(len(vertices), 1.0 / len(vertices)))
-        if len(vertices) >= FEWEST_STARTS and _tangent(problem, mixture.weights, POWERS[0]) is not None:
+        if (
+            len(vertices) >= FEWEST_STARTS
+            and _tangent(problem, mixture.weights, POWERS[0]) is not None
+        ):
             return mixture
     return None
 
@@ -175,7 +188,9 @@ def _tangent(problem: Problem, weights: Array, power: float) -> _Tangent | None:
 
 
 def _improved(problem: Problem, mixture: _Mixture, power: float) -> _Mixture:
-    """The mixture of the same vertices that makes the criterion smallest, without those that have no share in it."""
+    """The mixture of the same vertices that makes the criterion smallest, without those that have
+    no share in it.
+    """
     from scipy.optimize import minimize
 
     information = problem.information
@@ -202,20 +217,27 @@ def _improved(problem: Problem, mixture: _Mixture, power: float) -> _Mixture:
         options={"maxiter": MOST_INNER, "ftol": 1e-7},
     )
     shares = np.maximum(found.x, 0.0)
-    if not np.isfinite(shares).all() or logarithm(shares / shares.sum())[0] > logarithm(mixture.shares)[0]:
+    if (
+        not np.isfinite(shares).all()
+        or logarithm(shares / shares.sum())[0] > logarithm(mixture.shares)[0]
+    ):
         shares = mixture.shares
     kept = shares > DROPPED * shares.max()
     return _Mixture(mixture.vertices[kept], shares[kept] / shares[kept].sum())
 
 
 def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
-    """The weights (count,) within the limits for which slope (count,) . weights is largest; None if there are none."""
+    """The weights (count,) within the limits for which slope (count,) . weights is largest; None if
+    there are none.
+    """
     from scipy.optimize import linprog
 
     matrix, most, low, high = limits
     cost = np.zeros(matrix.shape[1])
     cost[:count] = -comparable(slope / np.abs(slope).max(), COMPARED)
-    found = linprog(cost, A_ub=matrix, b_ub=most, bounds=np.stack([low, high], axis=1), method="highs")
+    found = linprog(
+        cost, A_ub=matrix, b_ub=most, bounds=np.stack([low, high], axis=1), method="highs"
+    )
     if found.status != 0:
         return None
     return np.clip(np.asarray(found.x[:count], float), 0.0, 1.0)

@@ -1,4 +1,6 @@
-"""The plan of a campaign: what to choose from a pool, how near it is to the best possible, what each choice gains."""
+"""The plan of a campaign: what to choose from a pool, how near it is to the best possible, what
+each choice gains.
+"""
 
 from __future__ import annotations
 
@@ -61,20 +63,24 @@ def campaign(
 ) -> Campaign:
     """Choose from the pool of an experiment.
 
-    `offered` is what may be chosen where some of it has been read already: that is kept and costs nothing more, unless
-    it is of a plate that was only begun and is worth less to go on with than to leave out.
-    `earlier` are the indices of an earlier choice, which the plan is compared with and never worse than within the same
-    budget; without it that is the experiment's own positions. Without a budget the choice may cost what these do, less
-    what is done. The result does not depend on the number of `workers`; `report` is told which step is being done, and
-    how much of it is.
+    `offered` is what may be chosen where some of it has been read already: that is kept and costs
+    nothing more, unless it is of a plate that was only begun and is worth less to go on with than
+    to leave out. `earlier` are the indices of an earlier choice, which the plan is compared with
+    and never worse than within the same budget; without it that is the experiment's own positions.
+    Without a budget the choice may cost what these do, less what is done. The result does not
+    depend on the number of `workers`; `report` is told which step is being done, and how much of it
+    is.
 
-    :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks the limits.
+    :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks
+        the limits.
     :raises InternalError: the choice is better than the bound of any choice.
     """
     pool = experiment.pool
     if pool is None:
         raise _impossible(
-            experiment, "pool", "missing; add candidates to choose from, or see what check --suggest tells"
+            experiment,
+            "pool",
+            "missing; add candidates to choose from, or see what check --suggest tells",
         )
     refuse_many_points(experiment, request.criterion)
     offered = offered or offer(pool)
@@ -90,9 +96,19 @@ def campaign(
         assert found is not None
         return found
     try:
-        request = replace(request, budget=request.budget or (None if found is None else found.budget))
+        request = replace(
+            request, budget=request.budget or (None if found is None else found.budget)
+        )
         names = None if earlier is None else [offered.candidates[k].name for k in earlier]
-        other = _campaign(experiment, pool, request, less, None if names is None else less.find(names), workers, report)
+        other = _campaign(
+            experiment,
+            pool,
+            request,
+            less,
+            None if names is None else less.find(names),
+            workers,
+            report,
+        )
     except ExperimentError as error:
         if found is None:
             raise refusal or error from None
@@ -100,7 +116,10 @@ def campaign(
     if found is not None and found.value <= other.value * (1 + GAIN):
         return found
     kept = {one.name for one in other.done}
-    return replace(other, ignored=tuple(offered.candidates[k] for k in offered.done if offered.name(k) not in kept))
+    return replace(
+        other,
+        ignored=tuple(offered.candidates[k] for k in offered.done if offered.name(k) not in kept),
+    )
 
 
 def _campaign(
@@ -114,7 +133,9 @@ def _campaign(
 ) -> Campaign:
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
-    information = pool_information(experiment, whole, is_about_balls(request.criterion), completed_by, report)
+    information = pool_information(
+        experiment, whole, is_about_balls(request.criterion), completed_by, report
+    )
     wanted = criterion(information, experiment, request.criterion)
     own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
     drawn = sorted(earlier or own)
@@ -148,7 +169,8 @@ def _campaign(
     unlimited = replace(problem, constraints=free)
     done = tuple(candidates[k] for k in offered.done)
     interrupted = tuple(candidates[one.part] for one in offered.interrupted)
-    # In the order in which they will be read, as the first of a plate may hold its frame, on which U1 and U2 depend.
+    # In the order in which they will be read, as the first of a plate may hold its frame, on which
+    # U1 and U2 depend.
     in_order = run_sheet(chosen, pool.changes, done, completed, interrupted).chosen
     return Campaign(
         experiment,
@@ -163,12 +185,15 @@ def _campaign(
         best.value,
         np.nan if relaxed is None else relaxed.value,
         value(problem, reference) if drawn else None,
-        ("chosen before" if earlier else "as drawn") + (", with what is kept" if set(reference) - set(drawn) else ""),
+        ("chosen before" if earlier else "as drawn")
+        + (", with what is kept" if set(reference) - set(drawn) else ""),
         limits.spent(reference) if drawn else None,
         wanted.target,
         _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
-        predict(replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)),
+        predict(
+            replace(with_chosen(experiment, in_order), expected_rank_deficiency=left_open or None)
+        ),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
@@ -181,7 +206,9 @@ def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError
 
 
 def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
-    """Limits on what is offered, and that of several certificates of the same length only one counts."""
+    """Limits on what is offered, and that of several certificates of the same length only one
+    counts.
+    """
     found = list(offered.at_most)
     for name, artefact in experiment.artefacts.items():
         own = tuple(
@@ -195,17 +222,27 @@ def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
 
 
 def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget: Budget) -> None:
-    """Refuse a choice that is no experiment: without a position, or with balls that nobody reads."""
+    """Refuse a choice that is no experiment: without a position, or with balls that nobody
+    reads.
+    """
     positions = [one.item for one in chosen if isinstance(one.item, Position)]
     if not positions:
         raise _impossible(experiment, "pool", f"no position can be read with {budget}; allow more")
     for name in {position.artefact for position in positions}:
         own = [position for position in positions if position.artefact == name]
-        read = {int(ball) for position in own for group in position.readings for ball in group.ball_indices}
+        read = {
+            int(ball)
+            for position in own
+            for group in position.readings
+            for ball in group.ball_indices
+        }
         unread = [ball for k, ball in enumerate(experiment.layouts[name].names) if k not in read]
         if unread and experiment.artefacts[name].role == "plate":
             balls = listing(f'"{ball}"' for ball in unread)
-            text = f"the best choice leaves {balls} of {name} unread, which no experiment may; keep a position of all"
+            text = (
+                f"the best choice leaves {balls} of {name} unread, which no experiment may; keep a"
+                " position of all"
+            )
             raise _impossible(experiment, "pool.limits.keep", text)
 
 
@@ -216,31 +253,46 @@ def _refuse_lacking(
     for plate, others in begun.items():
         if set(others).isdisjoint(best.chosen):
             text = f'"{plate}" was begun, and no position of its other balls can be read with'
-            raise _impossible(experiment, "pool", f"{text} {problem.constraints.budget}; allow more")
+            raise _impossible(
+                experiment, "pool", f"{text} {problem.constraints.budget}; allow more"
+            )
     for members in problem.constraints.at_least:
         if set(members).isdisjoint(best.chosen):
             name = problem.information.candidates[members[0]].name
             text = f'"{name}" has to be chosen, but was interrupted, and cannot be read with'
-            raise _impossible(experiment, "pool.limits.keep", f"{text} {problem.constraints.budget}; allow more")
-    missing = [name for name, placing in problem.criterion.needed if set(placing).isdisjoint(best.chosen)]
+            raise _impossible(
+                experiment, "pool.limits.keep", f"{text} {problem.constraints.budget}; allow more"
+            )
+    missing = [
+        name for name, placing in problem.criterion.needed if set(placing).isdisjoint(best.chosen)
+    ]
     if missing:
         names, name = listing(f'"{one}"' for one in missing), problem.criterion.name
         text = f"{name} takes in the distances of {names}, of which no position can be read with "
-        text += f"{problem.constraints.budget}; allow more, keep one, or take the artefact out of the pool"
+        text += (
+            f"{problem.constraints.budget}; allow more, keep one, or take the artefact out of the"
+            " pool"
+        )
         raise _impossible(experiment, "pool", text)
 
 
-def _as_drawn(experiment: Experiment, free: Constraints, drawn: Sequence[int], reference: Sequence[int]) -> Budget:
+def _as_drawn(
+    experiment: Experiment, free: Constraints, drawn: Sequence[int], reference: Sequence[int]
+) -> Budget:
     """The budget that the experiment's own positions need."""
     if not drawn:
         raise _impossible(
-            experiment, "positions", "there are none to take the budget from; say --hours, or --positions"
+            experiment,
+            "positions",
+            "there are none to take the budget from; say --hours, or --positions",
         )
     spent = free.spent(reference)
     return Budget(spent.seconds, spent.readings, spent.positions)
 
 
-def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: Sequence[Candidate]) -> None:
+def _refuse_impossible(
+    experiment: Experiment, limits: Constraints, candidates: Sequence[Candidate]
+) -> None:
     must = limits.must
     if limits.allows(must):
         return
@@ -248,11 +300,17 @@ def _refuse_impossible(experiment: Experiment, limits: Constraints, candidates: 
         members = sorted(must.intersection(limit.members))
         if len(members) > limit.count:
             names = ", ".join(f'"{candidates[k].name}"' for k in members)
-            text = f"{names} have to be chosen, but no more than {limit.count} of them may be; change one of the two"
+            text = (
+                f"{names} have to be chosen, but no more than {limit.count} of them may be; change"
+                " one of the two"
+            )
             raise _impossible(experiment, "pool.limits", text)
     spent = limits.spent(must)
     needed = Budget(spent.seconds, spent.readings, spent.positions)
-    text = f"what has to be chosen takes {needed}, more than {limits.budget}; allow more, or keep fewer"
+    text = (
+        f"what has to be chosen takes {needed}, more than {limits.budget}; allow more, or keep"
+        " fewer"
+    )
     raise _impossible(experiment, "pool.limits.keep", text)
 
 
@@ -269,19 +327,32 @@ def _search(
     # In a small pool most selections are met again and again, and one process remembers them.
     shares = [first] if is_small else [[start] for start in first]
     depth = 2 if is_small else 1
-    tasks: list[tuple[object, ...]] = [(problem, None, 0), *((problem, share, depth) for share in shares)]
-    relaxed, *found = counted(in_processes(_task, tasks, workers), "starts of the search", len(tasks), report)
+    tasks: list[tuple[object, ...]] = [
+        (problem, None, 0),
+        *((problem, share, depth) for share in shares),
+    ]
+    relaxed, *found = counted(
+        in_processes(_task, tasks, workers), "starts of the search", len(tasks), report
+    )
     selections = [one for some in found if isinstance(some, list) for one in some]
     # Of a selection that is just enough, most of what an exchange passes through is deficient.
-    ways = (False, True) if _is_just_enough(problem, min(selections, key=lambda one: one.order)) else (False,)
+    ways = (
+        (False, True)
+        if _is_just_enough(problem, min(selections, key=lambda one: one.order))
+        else (False,)
+    )
     for by_pivots in ways[1:]:
         tasks = [(problem, share, depth, by_pivots) for share in shares]
-        others = counted(in_processes(_task, tasks, workers), "starts by pivots", len(tasks), report)
+        others = counted(
+            in_processes(_task, tasks, workers), "starts by pivots", len(tasks), report
+        )
         selections += [one for some in others if isinstance(some, list) for one in some]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
         start = starts(problem, by_weight, 0, seed)[-1]
-        selections += [improve(problem, start, Losses(problem, by_pivots), depth) for by_pivots in ways]
+        selections += [
+            improve(problem, start, Losses(problem, by_pivots), depth) for by_pivots in ways
+        ]
     selections = sorted(set(selections), key=lambda one: one.order)
     if not is_small:
         best_starts = [one.chosen for one in selections[:BEST_STARTS]]
@@ -297,16 +368,27 @@ def _best_of_all(problem: Problem, report: Report) -> Found:
     """The best of all selections of a pool that has few."""
     limits, losses = problem.constraints, Losses(problem)
     members = [k for k in range(limits.count) if k not in limits.done]
-    every = (limits.done.union(chosen) for size in range(len(members) + 1) for chosen in combinations(members, size))
+    every = (
+        limits.done.union(chosen)
+        for size in range(len(members) + 1)
+        for chosen in combinations(members, size)
+    )
     tried = counted(every, "selections", 2 ** len(members), report)
-    best = min((chosen for chosen in tried if limits.allows(chosen)), key=lambda one: (losses.of(one), sorted(one)))
+    best = min(
+        (chosen for chosen in tried if limits.allows(chosen)),
+        key=lambda one: (losses.of(one), sorted(one)),
+    )
     return Found(tuple(sorted(best)), value(problem, best))
 
 
 def _is_just_enough(problem: Problem, best: Found) -> bool:
-    """Whether a selection leaves something undetermined without one or another of its candidates."""
+    """Whether a selection leaves something undetermined without one or another of its
+    candidates.
+    """
     chosen = frozenset(best.chosen)
-    return any(not np.isfinite(value(problem, chosen - {k})) for k in chosen - problem.constraints.must)
+    return any(
+        not np.isfinite(value(problem, chosen - {k})) for k in chosen - problem.constraints.must
+    )
 
 
 @single_threaded
@@ -320,8 +402,12 @@ def _task(
     return [improve(problem, start, losses, at_once, thorough) for start in from_]
 
 
-def _gains(problem: Problem, best: Found, candidates: Sequence[Candidate], report: Report) -> tuple[Gain, ...]:
-    """What each chosen candidate gains, those first that gain most, whether it has to be chosen or not."""
+def _gains(
+    problem: Problem, best: Found, candidates: Sequence[Candidate], report: Report
+) -> tuple[Gain, ...]:
+    """What each chosen candidate gains, those first that gain most, whether it has to be chosen or
+    not.
+    """
     free = replace(problem, constraints=replace(problem.constraints, at_least=()))
     new = [k for k in best.chosen if k not in problem.constraints.done]
     gains = [
@@ -344,18 +430,29 @@ def _curve(
     workers: int,
     report: Report,
 ) -> list[CurvePoint]:
-    """The best selections found for smaller and larger budgets, with their bounds, from the smallest on."""
+    """The best selections found for smaller and larger budgets, with their bounds, from the
+    smallest on.
+    """
     budgets = _budgets(problem)
-    tasks = [(replace(problem, constraints=replace(problem.constraints, budget=b)), best) for b in budgets]
+    tasks = [
+        (replace(problem, constraints=replace(problem.constraints, budget=b)), best)
+        for b in budgets
+    ]
     points = []
-    results = counted(in_processes(_curve_point, tasks, workers), "budgets of the curve", len(tasks), report)
+    results = counted(
+        in_processes(_curve_point, tasks, workers), "budgets of the curve", len(tasks), report
+    )
     for budget, result in zip(budgets, results, strict=True):
         if result is None:
             continue
         found, relaxed = result
         if np.isfinite(found.value):
             names = tuple(candidates[k] for k in found.chosen)
-            points.append(CurvePoint(budget, problem.constraints.spent(found.chosen), names, found.value, relaxed))
+            points.append(
+                CurvePoint(
+                    budget, problem.constraints.spent(found.chosen), names, found.value, relaxed
+                )
+            )
     return points
 
 
@@ -385,6 +482,10 @@ def _budgets(problem: Problem) -> list[Budget]:
     for factor in factors:
         positions = None if budget.positions is None else max(round(budget.positions * factor), 1)
         readings = None if budget.readings is None else round(budget.readings * factor)
-        found.append(Budget(None if budget.seconds is None else budget.seconds * factor, readings, positions))
+        found.append(
+            Budget(None if budget.seconds is None else budget.seconds * factor, readings, positions)
+        )
     found = list(dict.fromkeys([*found, budget]))
-    return sorted(found, key=lambda one: (one.seconds or 0.0, one.readings or 0, one.positions or 0))
+    return sorted(
+        found, key=lambda one: (one.seconds or 0.0, one.readings or 0, one.positions or 0)
+    )

@@ -1,11 +1,13 @@
-"""In which order positions cost least change-over: planes, artefacts and probes are changed as seldom as possible.
+"""In which order positions cost least change-over: planes, artefacts and probes are changed as
+seldom as possible.
 
-Going on to another plane or artefact takes `ChangeTimes.plane`; if the last probe of a position is not the first of
-the next, `ChangeTimes.probe` comes on top. The probes of a position are read one after the other in any order, and
-nothing is changed before the first position. Positions of equal kind stand together, so that the order of kinds is
-what is sought: dynamic programming over sets of kinds (Held and Karp, J. SIAM 10 (1962) 196), with the last probe
-and the last place as what the rest depends on. Up to twelve kinds that is exact; of more, only the `MOST_SETS` cheapest
-sets of each size are followed.
+Going on to another plane or artefact takes `ChangeTimes.plane`; if the last probe of a position is
+not the first of the next, `ChangeTimes.probe` comes on top. The probes of a position are read one
+after the other in any order, and nothing is changed before the first position. Positions of equal
+kind stand together, so that the order of kinds is what is sought: dynamic programming over sets of
+kinds (Held and Karp, J. SIAM 10 (1962) 196), with the last probe and the last place as what the
+rest depends on. Up to twelve kinds that is exact; of more, only the `MOST_SETS` cheapest sets of
+each size are followed.
 """
 
 from __future__ import annotations
@@ -56,7 +58,8 @@ def probes_of(position: Position) -> tuple[str, ...]:
 
 
 def changeover(kinds: Collection[Kind], changes: ChangeTimes, first: Kind | None = None) -> float:
-    """Least total change-over, in seconds, of positions of these kinds; one listed twice stands for two positions.
+    """Least total change-over, in seconds, of positions of these kinds; one listed twice stands for
+    two positions.
 
     A position of the kind `first` comes before all of them.
 
@@ -73,10 +76,12 @@ def _least(kinds: frozenset[tuple[Kind, int]], changes: ChangeTimes, first: Kind
 
 
 def _counted(kinds: Iterable[Kind]) -> frozenset[tuple[Kind, int]]:
-    """Kinds with the least number of positions that leaves the same choice of first and last probes.
+    """Kinds with the least number of positions that leaves the same choice of first and last
+    probes.
 
-    A position of two probes ends with the one that it has not begun with, two positions end with that they have begun
-    with, three are like one. Of more probes, two positions can begin and end with any.
+    A position of two probes ends with the one that it has not begun with, two positions end with
+    that they have begun with, three are like one. Of more probes, two positions can begin and end
+    with any.
     """
     found = []
     for kind, count in Counter(kinds).items():
@@ -85,7 +90,8 @@ def _counted(kinds: Iterable[Kind]) -> frozenset[tuple[Kind, int]]:
     return frozenset(found)
 
 
-# By what has been visited: by the last probe and the last artefact and plane, the cost so far and where it came from.
+# By what has been visited: by the last probe and the last artefact and plane, the cost so far and
+# where it came from.
 _Last = tuple[int, int]
 _Came = tuple[int, _Last, int, int]
 _States = dict[_Last, tuple[float, _Came]]
@@ -96,7 +102,9 @@ TIE = 1e-9
 
 @dataclass(frozen=True)
 class Order:
-    """The cheapest order of kinds, what it costs in `seconds`, and the probe that is left from before, if any."""
+    """The cheapest order of kinds, what it costs in `seconds`, and the probe that is left from
+    before, if any.
+    """
 
     seconds: float
     visits: tuple[Visit, ...]
@@ -104,15 +112,20 @@ class Order:
 
 
 def cheapest(
-    kinds: Iterable[tuple[Kind, int]], changes: ChangeTimes, after: Kind | None = None, is_paid: bool = False
+    kinds: Iterable[tuple[Kind, int]],
+    changes: ChangeTimes,
+    after: Kind | None = None,
+    is_paid: bool = False,
 ) -> Order:
     """The cheapest order of kinds with their numbers of positions.
 
-    It begins after a position of the kind `after`, which may end with any of its probes. Unless going on from there
-    `is_paid`, that only decides between orders that cost the same.
+    It begins after a position of the kind `after`, which may end with any of its probes. Unless
+    going on from there `is_paid`, that only decides between orders that cost the same.
     """
     # The order of a set differs from run to run.
-    todo = sorted(kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes), one[1]))
+    todo = sorted(
+        kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes), one[1])
+    )
     every = [kind for kind, _ in todo] + ([] if after is None else [after])
     probe_names = sorted({probe for kind in every for probe in kind.probes})
     places = list(dict.fromkeys((kind.artefact, kind.plane) for kind in every))
@@ -153,7 +166,9 @@ def cheapest(
         visits.append(Visit(todo[i][0], probe_names[first], probe_names[last[0]]))
         last = before_that
     visits.reverse()
-    seconds = sum(_between(one, other, changes) for one, other in zip(visits, visits[1:], strict=False))
+    seconds = sum(
+        _between(one, other, changes) for one, other in zip(visits, visits[1:], strict=False)
+    )
     if after is None:
         return Order(seconds, tuple(visits), None)
     probe = probe_names[last[0]]
@@ -205,9 +220,13 @@ class _Known:
         return cost + change, last
 
 
-def _go_on(states: _States, stop: _Stop, i: int, visited: int, known: _Known | None, changes: ChangeTimes) -> None:
+def _go_on(
+    states: _States, stop: _Stop, i: int, visited: int, known: _Known | None, changes: ChangeTimes
+) -> None:
     """Add what going on to a stop leads to, whichever of its probes comes first and last."""
-    paid, origin = (0.0, (-1, -1)) if known is None else known.with_any_probe(stop.place, changes.plane)
+    paid, origin = (
+        (0.0, (-1, -1)) if known is None else known.with_any_probe(stop.place, changes.plane)
+    )
     for first in stop.probes:
         arrived = (paid + (0.0 if known is None else changes.probe), origin)
         if known is not None:
@@ -221,7 +240,9 @@ def _go_on(states: _States, stop: _Stop, i: int, visited: int, known: _Known | N
 
 
 def _can_end(probes: int, count: int, where_begun: bool) -> bool:
-    """Whether positions of one kind can end with the probe they have begun with, or with another."""
+    """Whether positions of one kind can end with the probe they have begun with, or with
+    another.
+    """
     if probes == 1:
         return where_begun
     if probes == 2:

@@ -15,7 +15,9 @@ from .schedule import Completion
 
 @dataclass(frozen=True)
 class Gain:
-    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something is undetermined."""
+    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something
+    is undetermined.
+    """
 
     candidate: Candidate
     without: float
@@ -42,14 +44,15 @@ class CurvePoint:
 class Selection:
     """A selection and what is to be said of it; values in metres, those of `condition` ratios.
 
-    `chosen` in the order of the pool, `done` those of them that have been read already, in part or in full, in the
-    order of reading. Of `chosen`, that which is `completed` has all its readings, those done and those to come.
-    `interrupted` are all that were read in part, and `left_open` counts the directions of their own poses and lengths
-    that stay undetermined where they are left so; nothing else depends on these. What has been read and is `ignored` is
-    no part of it. `value` is infinite where the
-    selection leaves something undetermined; `bound` is what no selection can do better than, NaN where there is none.
-    `drawn` is the criterion of the positions of the experiment itself, or of an earlier choice, whether these keep to
-    the limits or not, told as `drawn_words`; None without any. `plan` judges what is chosen in full.
+    `chosen` in the order of the pool, `done` those of them that have been read already, in part or
+    in full, in the order of reading. Of `chosen`, that which is `completed` has all its readings,
+    those done and those to come. `interrupted` are all that were read in part, and `left_open`
+    counts the directions of their own poses and lengths that stay undetermined where they are left
+    so; nothing else depends on these. What has been read and is `ignored` is no part of it. `value`
+    is infinite where the selection leaves something undetermined; `bound` is what no selection can
+    do better than, NaN where there is none. `drawn` is the criterion of the positions of the
+    experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
+    `drawn_words`; None without any. `plan` judges what is chosen in full.
     """
 
     experiment: Experiment

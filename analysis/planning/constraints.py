@@ -21,7 +21,9 @@ SLACK = 1e-6
 
 @dataclass(frozen=True)
 class Budget:
-    """What may be spent: seconds of laboratory time, readings, positions; None where there is no limit."""
+    """What may be spent: seconds of laboratory time, readings, positions; None where there is no
+    limit.
+    """
 
     seconds: float | None = None
     readings: int | None = None
@@ -58,10 +60,11 @@ class Spent:
 class Constraints:
     """Costs of candidates and limits on them.
 
-    `seconds`, `readings` and `positions` (n,) are each candidate's own, `kinds` what changes between positions depend
-    on, None of calibration items, `must` what has to be chosen. Candidates that are `done` have taken their time
-    already: they cost nothing any more, and the budget is for the rest. Of each of `at_least` one member has to be
-    chosen. The candidate `first` completes a position whose artefact still stands: it comes before all others.
+    `seconds`, `readings` and `positions` (n,) are each candidate's own, `kinds` what changes
+    between positions depend on, None of calibration items, `must` what has to be chosen. Candidates
+    that are `done` have taken their time already: they cost nothing any more, and the budget is for
+    the rest. Of each of `at_least` one member has to be chosen. The candidate `first` completes a
+    position whose artefact still stands: it comes before all others.
     """
 
     budget: Budget
@@ -83,7 +86,9 @@ class Constraints:
     def spent(self, chosen: Collection[int]) -> Spent:
         """Cost of a selection, less what is done."""
         own = sorted(set(chosen) - self.done)
-        seconds = float(self.seconds[own].sum()) + changeover(self._kinds(own), self.changes, self._first(own))
+        seconds = float(self.seconds[own].sum()) + changeover(
+            self._kinds(own), self.changes, self._first(own)
+        )
         return Spent(seconds, int(self.readings[own].sum()), int(self.positions[own].sum()))
 
     def _kinds(self, own: Iterable[int]) -> list[Kind]:
@@ -93,16 +98,22 @@ class Constraints:
         return None if self.first is None or self.first not in own else self.kinds[self.first]
 
     def allows(self, chosen: Collection[int]) -> bool:
-        """Whether a selection keeps to all limits, or may be extended to one that has what is missing of `at_least`."""
+        """Whether a selection keeps to all limits, or may be extended to one that has what is
+        missing of `at_least`.
+        """
         members = set(chosen)
         return (
             self.must <= members
-            and all(len(members.intersection(limit.members)) <= limit.count for limit in self.at_most)
+            and all(
+                len(members.intersection(limit.members)) <= limit.count for limit in self.at_most
+            )
             and self.spent(members).is_within(self.budget)
         )
 
     def additions(self, chosen: Collection[int]) -> NDArray[np.int64]:
-        """Candidates that a selection, which keeps to the limits itself, may be extended by, one at a time."""
+        """Candidates that a selection, which keeps to the limits itself, may be extended by, one at
+        a time.
+        """
         members = set(chosen)
         allowed = np.ones(self.count, bool)
         allowed[list(members)] = False
@@ -120,8 +131,12 @@ class Constraints:
             kinds, first = self._kinds(own), self._first(own)
             is_first = np.arange(self.count) == self.first
             for kind in dict.fromkeys(self.kinds):
-                within = left - changeover(kinds if kind is None else [*kinds, kind], self.changes, first)
-                too_long = np.array([other == kind for other in self.kinds]) & (self.seconds > within)
+                within = left - changeover(
+                    kinds if kind is None else [*kinds, kind], self.changes, first
+                )
+                too_long = np.array([other == kind for other in self.kinds]) & (
+                    self.seconds > within
+                )
                 allowed &= ~too_long | is_first
             if self.first is not None and first is None:
                 within = left - changeover(kinds, self.changes, self.kinds[self.first])
@@ -129,10 +144,12 @@ class Constraints:
         return np.flatnonzero(allowed)
 
     def linear(self) -> tuple[Any, Array, Array, Array]:
-        """Limits as rows A v <= b with bounds low <= v <= high; every selection that keeps to the limits fulfils them.
+        """Limits as rows A v <= b with bounds low <= v <= high; every selection that keeps to the
+        limits fulfils them.
 
-        Variables are the candidates, then the groups of positions between which the plane or artefact changes,
-        each at least as large as any of its members. Changes of probe between positions are left out.
+        Variables are the candidates, then the groups of positions between which the plane or
+        artefact changes, each at least as large as any of its members. Changes of probe between
+        positions are left out.
         """
         from scipy.sparse import csr_array
 
@@ -171,12 +188,20 @@ class Constraints:
         matrix = csr_array(np.array(rows).reshape(len(rows), size))
         if timed:
             place = {group: n + i for i, group in enumerate(groups)}
-            moved = [k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done]
-            group = [place[kind.artefact, kind.plane] for k in moved if (kind := self.kinds[k]) is not None]
+            moved = [
+                k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done
+            ]
+            group = [
+                place[kind.artefact, kind.plane]
+                for k in moved
+                if (kind := self.kinds[k]) is not None
+            ]
             at = np.arange(len(moved))
             entries = np.concatenate([np.ones(len(moved)), -np.ones(len(moved))])
             columns = np.concatenate([moved, group])
-            linked = csr_array((entries, (np.concatenate([at, at]), columns)), shape=(len(moved), size))
+            linked = csr_array(
+                (entries, (np.concatenate([at, at]), columns)), shape=(len(moved), size)
+            )
             from scipy.sparse import vstack
 
             matrix = vstack([matrix, linked], format="csr")
@@ -196,8 +221,12 @@ def constraints(
     at_least: Sequence[tuple[int, ...]] = (),
     first: int | None = None,
 ) -> Constraints:
-    """Constraints of a pool's candidates; that to be read `first` completes a position, and counts as none itself."""
-    is_position = [isinstance(one.item, Position) and k != first for k, one in enumerate(candidates)]
+    """Constraints of a pool's candidates; that to be read `first` completes a position, and counts
+    as none itself.
+    """
+    is_position = [
+        isinstance(one.item, Position) and k != first for k, one in enumerate(candidates)
+    ]
     return Constraints(
         budget,
         np.array([one.seconds for one in candidates], float),

@@ -1,9 +1,9 @@
 """What a plan makes small: uncertainties that do not depend on the frame.
 
-Every criterion is a standard uncertainty, or a mean or a largest of some, and falls with the root of the information:
-all of it fourfold makes it half. The reciprocal of its square is then a concave function of the information, so that
-a tangent bounds what any selection can reach. A largest value is no smooth function; it is bounded by a weighted
-mean, whose weights are on the largest ones.
+Every criterion is a standard uncertainty, or a mean or a largest of some, and falls with the root
+of the information: all of it fourfold makes it half. The reciprocal of its square is then a concave
+function of the information, so that a tangent bounds what any selection can reach. A largest value
+is no smooth function; it is bounded by a weighted mean, whose weights are on the largest ones.
 """
 
 from __future__ import annotations
@@ -42,30 +42,38 @@ DESCRIPTIONS |= {
     "A": "root mean square uncertainty of the machine's parameters",
     "D": "geometric mean of the semi-axes of the parameters' uncertainty ellipsoid",
     "E": "uncertainty of the least certain direction of the machine's parameters",
-    "condition": "ratio of the uncertainties of the least and the most certain direction of the parameters",
+    "condition": (
+        "ratio of the uncertainties of the least and the most certain direction of the parameters"
+    ),
 }
 NAMES: tuple[CriterionName, ...] = tuple(DESCRIPTIONS)
 
 # Powers that put the weight of a largest value's bound on the largest ones.
 SHARP = 24
 
-# A function counts as open when what the pool leaves open changes it by this, in micrometres for a micrometre.
+# A function counts as open when what the pool leaves open changes it by this, in micrometres for a
+# micrometre.
 OPEN = 1e-7
 
-# Places in each direction of a block of pairs, whose matrices stay in cache, and up to which blocks are kept.
+# Places in each direction of a block of pairs, whose matrices stay in cache, and up to which blocks
+# are kept.
 BLOCK = 256
 MOST_PLACES_KEPT = 1024
 
-# Evaluation points between all of which a plan can make distances small: thousands of times in a search, which with
-# so many takes two minutes on one processor, and ten of a large pool; it grows with the square of their number.
+# Evaluation points between all of which a plan can make distances small: thousands of times in a
+# search, which with so many takes two minutes on one processor, and ten of a large pool; it grows
+# with the square of their number.
 MOST_POINTS = 1000
 
-# Functions whose uncertainties are kept, rather than computed twice, for the tangent of a largest value.
+# Functions whose uncertainties are kept, rather than computed twice, for the tangent of a largest
+# value.
 KEPT = 4_000_000
 
 
 class Functions(Protocol):
-    """Quantities whose uncertainties count, as functions of z; some of them at a time, always in the same order."""
+    """Quantities whose uncertainties count, as functions of z; some of them at a time, always in
+    the same order.
+    """
 
     @property
     def count(self) -> int: ...
@@ -78,9 +86,11 @@ class Functions(Protocol):
         """Standard uncertainties (some,) in metres, where root root' is the covariance of z."""
         ...
 
-    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """Sums over all functions: (m,) of what `weigh` makes of their uncertainties (some,), namely (m, some), and of
-        their squares (z, z) with the first of these for weights."""
+    def squares(
+        self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
+    ) -> tuple[Array, Array]:
+        """Sums over all functions: (m,) of what `weigh` makes of their uncertainties (some,),
+        namely (m, some), and of their squares (z, z) with the first of these for weights."""
         ...
 
 
@@ -88,11 +98,13 @@ class Functions(Protocol):
 class Criterion:
     """A criterion by its `name`: the mean of `functions`, or their largest if `largest`.
 
-    `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded` counts functions that
-    the pool leaves open, whatever is chosen. `functions` are None of criteria that are about eigenvalues; these are of
-    the model's parameters, `scaled` (n, z), in metres. `target` is the criterion at which the target accuracy is met on
-    the average, None where there is none. `needed` holds, for each artefact whose own distances count, its name and the
-    candidates that place it: without one of them the distances are undetermined, whatever certificates say of them.
+    `about_balls` tells whether it concerns all z, or only those of shared parameters. `excluded`
+    counts functions that the pool leaves open, whatever is chosen. `functions` are None of criteria
+    that are about eigenvalues; these are of the model's parameters, `scaled` (n, z), in metres.
+    `target` is the criterion at which the target accuracy is met on the average, None where there
+    is none. `needed` holds, for each artefact whose own distances count, its name and the
+    candidates that place it: without one of them the distances are undetermined, whatever
+    certificates say of them.
     """
 
     name: CriterionName
@@ -136,16 +148,18 @@ class Criterion:
         return self.largest or self.name == "E"
 
     def tangent(self, root: Array, power: float = SHARP) -> tuple[float, float, Array]:
-        """A smooth function near the criterion; a value no larger than it; the derivative (z, z) of this by the
-        covariance.
+        """A smooth function near the criterion; a value no larger than it; the derivative (z, z) of
+        this by the covariance.
 
-        The value is a mean with fixed weights, which is a bound for any selection: of all functions, or mostly of the
-        largest. The smooth function is the mean of that `power`; its logarithm and that of the value have the same
-        derivative.
+        The value is a mean with fixed weights, which is a bound for any selection: of all
+        functions, or mostly of the largest. The smooth function is the mean of that `power`; its
+        logarithm and that of the value have the same derivative.
         """
         if self.functions is not None:
             return (
-                _largest_tangent(self.functions, root, power) if self.largest else _mean_tangent(self.functions, root)
+                _largest_tangent(self.functions, root, power)
+                if self.largest
+                else _mean_tangent(self.functions, root)
             )
         left, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
         n, value = len(sizes), self.value(root)
@@ -184,7 +198,11 @@ def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[f
 
     again = found if isinstance(found, list) else functions.uncertainties(root)
     (_, weight, weighted, powers), squares = functions.squares(again, weigh)
-    return largest * float(powers / functions.count) ** (1 / power), float(weighted / weight), squares / weight
+    return (
+        largest * float(powers / functions.count) ** (1 / power),
+        float(weighted / weight),
+        squares / weight,
+    )
 
 
 def _halved(weights: Array, found: Array) -> Array:
@@ -214,7 +232,9 @@ class Linear:
     def uncertainties(self, root: Array) -> Iterator[Array]:
         yield np.sqrt(((self.rows @ root) ** 2).sum(axis=1))
 
-    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+    def squares(
+        self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
+    ) -> tuple[Array, Array]:
         found = next(iter(uncertainties))
         weighed = weigh(found)
         return weighed.sum(axis=1), (self.rows * weighed[0][:, None]).T @ self.rows
@@ -224,8 +244,9 @@ class Linear:
 class PairBlock:
     """Pairs of two runs of places, those of `first` (rows) and of `second` (columns).
 
-    `chosen` (rows, columns) tells which pairs count, `length` (rows, columns) is their distance, and `weights` have,
-    for components i and j >= i, the products of these components of all directions, those of i < j twice.
+    `chosen` (rows, columns) tells which pairs count, `length` (rows, columns) is their distance,
+    and `weights` have, for components i and j >= i, the products of these components of all
+    directions, those of i < j twice.
     """
 
     first: slice
@@ -239,8 +260,9 @@ class PairBlock:
 class Pairs:
     """Distances between all pairs of places that are apart, less those that the pool leaves open.
 
-    `places` (n, d) in metres; `displacement` (n, d, z) of them, and `open_` (n, d, k) what the pool leaves open of it,
-    both without the motion of all places together. Pairs are worked through in blocks of bounded size.
+    `places` (n, d) in metres; `displacement` (n, d, z) of them, and `open_` (n, d, k) what the pool
+    leaves open of it, both without the motion of all places together. Pairs are worked through in
+    blocks of bounded size.
     """
 
     places: Array
@@ -280,7 +302,9 @@ class Pairs:
                 yield self._block(first, second)
 
     def _apart(self, first: slice, second: slice) -> tuple[Array, NDArray[np.bool_]]:
-        """Vectors (rows, columns, d) between places, and which of them are distances, each of them once."""
+        """Vectors (rows, columns, d) between places, and which of them are distances, each of them
+        once.
+        """
         vector = self.places[first, None] - self.places[None, second]
         apart = (vector**2).sum(axis=2) > 0.0
         return vector, np.triu(apart, 1) if first == second else apart
@@ -296,7 +320,9 @@ class Pairs:
         vector /= np.where(length > 0.0, length, 1.0)[:, :, None]
         d = self.places.shape[1]
         weights = tuple(
-            (i, j, (1.0 if i == j else 2.0) * vector[:, :, i] * vector[:, :, j]) for i in range(d) for j in range(i, d)
+            (i, j, (1.0 if i == j else 2.0) * vector[:, :, i] * vector[:, :, j])
+            for i in range(d)
+            for j in range(i, d)
         )
         return PairBlock(first, second, chosen, length, weights)
 
@@ -320,7 +346,9 @@ class Pairs:
                 total += apart
             yield np.sqrt(np.maximum(total[block.chosen], 0.0))
 
-    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+    def squares(
+        self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
+    ) -> tuple[Array, Array]:
         sums: list[Array] = []
         # The squares' sum is that of displacements times these.
         moved = np.zeros_like(self.displacement)
@@ -333,8 +361,12 @@ class Pairs:
             one, other = self.displacement[block.first], self.displacement[block.second]
             for i, j, weight in block.weights:
                 amount = each * weight
-                moved[block.first, i] += amount.sum(axis=1)[:, None] * one[:, j] - amount @ other[:, j]
-                moved[block.second, i] += amount.sum(axis=0)[:, None] * other[:, j] - amount.T @ one[:, j]
+                moved[block.first, i] += (
+                    amount.sum(axis=1)[:, None] * one[:, j] - amount @ other[:, j]
+                )
+                moved[block.second, i] += (
+                    amount.sum(axis=0)[:, None] * other[:, j] - amount.T @ one[:, j]
+                )
         size = self.displacement.shape[2]
         total = self.displacement.reshape(-1, size).T @ moved.reshape(-1, size)
         return np.sum(sums, axis=0), 0.5 * (total + total.T)
@@ -360,10 +392,14 @@ class Several:
     def uncertainties(self, root: Array) -> Iterator[Array]:
         return chain.from_iterable(part.uncertainties(root) for part in self.parts)
 
-    def squares(self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]) -> tuple[Array, Array]:
+    def squares(
+        self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
+    ) -> tuple[Array, Array]:
         left = iter(uncertainties)
         found = [part.squares(left, weigh) for part in self.parts]
-        return np.sum([sums for sums, _ in found], axis=0), np.sum([squares for _, squares in found], axis=0)
+        return np.sum([sums for sums, _ in found], axis=0), np.sum(
+            [squares for _, squares in found], axis=0
+        )
 
 
 def is_about_balls(name: CriterionName) -> bool:
@@ -380,8 +416,9 @@ def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
     count = len(experiment.evaluation.points)
     if name.startswith("U6") and count > MOST_POINTS:
         text = (
-            f"{count} points make {count * (count - 1) // 2} distances, which a search for {name} computes some "
-            f"thousand times, which takes too long; give at most {MOST_POINTS}, better some hundred, or plan for tasks"
+            f"{count} points make {count * (count - 1) // 2} distances, which a search for {name}"
+            f" computes some thousand times, which takes too long; give at most {MOST_POINTS},"
+            " better some hundred, or plan for tasks"
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
 
@@ -389,7 +426,8 @@ def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
 def criterion(information: Information, experiment: Experiment, name: CriterionName) -> Criterion:
     """A criterion for a pool.
 
-    :raises ExperimentError: it is about something that the experiment does not have, or that no selection determines.
+    :raises ExperimentError: it is about something that the experiment does not have, or that no
+        selection determines.
     """
     drawn = information.drawn
     scaled = np.zeros((0, information.basis.size))
@@ -400,14 +438,19 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         model = slice(0, len(drawn.design.model.parameters))
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
         if not kept.all():
-            raise _impossible(experiment, f"{name} takes in parameters that even all candidates leave undetermined")
+            raise _impossible(
+                experiment,
+                f"{name} takes in parameters that even all candidates leave undetermined",
+            )
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
         parts: list[Pairs | Linear] = []
         for given in kind.functions(drawn.design, drawn.layout):
             assert isinstance(given, Distances)
             if isinstance(given.places, Balls):
-                plate = drawn.design.artefact_names[drawn.design.ball_artefact[given.places.index[0]]]
+                plate = drawn.design.artefact_names[
+                    drawn.design.ball_artefact[given.places.index[0]]
+                ]
                 placing = information.placing(plate)
                 if not placing:
                     continue
@@ -424,7 +467,9 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
 
 
 def _target(experiment: Experiment, name: str, functions: Functions | None) -> float | None:
-    """The target accuracy of the functions: its mean for an average, for a largest value only where it is constant."""
+    """The target accuracy of the functions: its mean for an average, for a largest value only where
+    it is constant.
+    """
     target = experiment.target_accuracy
     if functions is None or target is None:
         return None
@@ -451,7 +496,9 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
     unit = places[first] - places[second]
     length = np.sqrt((unit**2).sum(axis=1))
     unit /= length[:, None]
-    change, rows = (np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement))
+    change, rows = (
+        np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement)
+    )
     kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP
     return Linear(rows[kept], length[kept], int((~kept).sum()))
 
@@ -466,14 +513,18 @@ def _of_balls(information: Information, places: Balls) -> tuple[Array, Array]:
 
 
 def _of_points(information: Information, places: Points) -> tuple[Array, Array]:
-    """Displacements of corrected points (n, d, z), and those that the pool leaves open, in metres."""
+    """Displacements of corrected points (n, d, z), and those that the pool leaves open, in
+    metres.
+    """
     drawn, (n, d) = information.drawn, places.points.shape
     rows = np.zeros((n * d, drawn.shared))
     for some, found in point_rows(drawn.design, drawn.layout, drawn.state, places):
         own = found[:, :, drawn.own].reshape(-1, drawn.own.stop - drawn.own.start)
         rows[some.start * d : some.start * d + len(own), : own.shape[1]] = own
     rows *= drawn.scale
-    return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(n, d, -1)
+    return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(
+        n, d, -1
+    )
 
 
 def _impossible(experiment: Experiment, text: str) -> ExperimentError:

@@ -36,8 +36,8 @@ Amounts = dict[tuple[int, str], int]
 class SetUp:
     """Readings of one set-up of the candidate `base` of a pool.
 
-    `read` has the readings that were taken, `whole` those that were planned as well, and `rest` what is still missing,
-    None where nothing is. `is_last` marks the set-up that was read last.
+    `read` has the readings that were taken, `whole` those that were planned as well, and `rest`
+    what is still missing, None where nothing is. `is_last` marks the set-up that was read last.
     """
 
     base: int
@@ -54,7 +54,8 @@ class SetUp:
 def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
     """Set-ups of a pool's candidates that a file of readings has readings of, in its order.
 
-    A position may have been set up more than once: "low again" is another set-up of the candidate "low".
+    A position may have been set up more than once: "low again" is another set-up of the candidate
+    "low".
 
     :raises ExperimentError: the file is wrong, or names a position that is no candidate.
     """
@@ -81,7 +82,11 @@ def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
     for number, (candidate, base) in enumerate(zip(drawn, found.values(), strict=True)):
         item = _position(candidate)
         own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
-        first = int(np.flatnonzero(design.ball_artefact == list(design.artefact_names).index(item.artefact))[0])
+        first = int(
+            np.flatnonzero(
+                design.ball_artefact == list(design.artefact_names).index(item.artefact)
+            )[0]
+        )
         taken = tuple(_groups(own_readings, first, design.probe_names, experiment, item))
         result.append(_set_up(experiment, candidate, base, taken, candidate.name == name))
     return tuple(result)
@@ -92,7 +97,13 @@ def renamed(candidate: Candidate, name: str) -> Candidate:
     if candidate.name == name:
         return candidate
     settings = {**candidate.settings, "name": name}
-    return replace(candidate, name=name, item=replace(_position(candidate), name=name), settings=settings, drawn=False)
+    return replace(
+        candidate,
+        name=name,
+        item=replace(_position(candidate), name=name),
+        settings=settings,
+        drawn=False,
+    )
 
 
 def next_name(name: str, taken: Sequence[str]) -> str:
@@ -131,7 +142,9 @@ def _position(candidate: Candidate) -> Position:
 def _groups(
     own: Readings, first: int, probes: Sequence[str], experiment: Experiment, item: Position
 ) -> Iterator[ReadingGroup]:
-    """Readings as groups, of those of equal uncertainty and repeats; balls are counted from `first` on."""
+    """Readings as groups, of those of equal uncertainty and repeats; balls are counted from `first`
+    on.
+    """
     names = experiment.layouts[item.artefact].names
     by_probe: dict[tuple[str, tuple[float, ...] | None], dict[int, int]] = {}
     for i in range(len(own)):
@@ -149,12 +162,20 @@ def _groups(
         if stated == tuple(experiment.machine.repeatability.tolist()):
             uncertainty = None
         yield ReadingGroup(
-            tuple(with_probes), tuple(names[k] for k in read_so), np.array(read_so), repeats, uncertainty
+            tuple(with_probes),
+            tuple(names[k] for k in read_so),
+            np.array(read_so),
+            repeats,
+            uncertainty,
         )
 
 
 def _set_up(
-    experiment: Experiment, candidate: Candidate, base: int, taken: tuple[ReadingGroup, ...], is_last: bool
+    experiment: Experiment,
+    candidate: Candidate,
+    base: int,
+    taken: tuple[ReadingGroup, ...],
+    is_last: bool,
 ) -> SetUp:
     assert experiment.pool is not None
     item = _position(candidate)
@@ -163,10 +184,17 @@ def _set_up(
     read = candidate if not missing and _same(taken, planned) else _with_readings(candidate, taken)
     if not missing:
         return SetUp(base, read, read, None, is_last)
-    whole = candidate if _same((*taken, *missing), planned) else _with_readings(candidate, (*taken, *missing))
+    whole = (
+        candidate
+        if _same((*taken, *missing), planned)
+        else _with_readings(candidate, (*taken, *missing))
+    )
     rest = _with_readings(candidate, missing)
     probes = {probe for group in missing for probe in group.probes}
-    seconds = rest.readings * candidate.reading_seconds + (len(probes) - 1) * experiment.pool.changes.probe
+    seconds = (
+        rest.readings * candidate.reading_seconds
+        + (len(probes) - 1) * experiment.pool.changes.probe
+    )
     rest = replace(rest, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
     return SetUp(base, read, whole, rest, is_last)
 
@@ -174,7 +202,9 @@ def _set_up(
 def _missing(
     planned: Sequence[ReadingGroup], taken: Sequence[ReadingGroup], names: Sequence[str]
 ) -> Iterator[ReadingGroup]:
-    """What of the planned readings has not been taken, whatever their uncertainty; balls left alike make a group."""
+    """What of the planned readings has not been taken, whatever their uncertainty; balls left alike
+    make a group.
+    """
     left = _amounts(taken)
     for group in planned:
         alike: dict[tuple[int, tuple[int, ...]], list[str]] = {}
@@ -190,7 +220,11 @@ def _missing(
                 alike.setdefault((count, tuple(balls)), []).append(probe)
         for (count, chosen), probes in alike.items():
             yield ReadingGroup(
-                tuple(probes), tuple(names[k] for k in chosen), np.array(chosen), count, group.standard_uncertainty
+                tuple(probes),
+                tuple(names[k] for k in chosen),
+                np.array(chosen),
+                count,
+                group.standard_uncertainty,
             )
 
 
@@ -221,7 +255,11 @@ def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> 
     said = {key: value for key, value in candidate.settings.items() if key not in GROUP}
     groups = []
     for one in readings:
-        group: dict[str, Any] = {"probes": list(one.probes), "balls": list(one.balls), "repeats": one.repeats}
+        group: dict[str, Any] = {
+            "probes": list(one.probes),
+            "balls": list(one.balls),
+            "repeats": one.repeats,
+        }
         if one.standard_uncertainty is not None:
             group["standard_uncertainty"] = _exactly(one.standard_uncertainty)
         groups.append(group)

@@ -12,12 +12,14 @@ from ballplate.simulator.inputs.messages import in_one_line
 SIZE, MARGIN = 170.0, 22.0
 # Of more balls only those at the corners are drawn.
 MOST_BALLS = 400
-# Axis across the drawing, whether it runs to the left, and axis upwards, as seen from the end of the normal.
+# Axis across the drawing, whether it runs to the left, and axis upwards, as seen from the end of
+# the normal.
 VIEWS = {"x": ("y", False, "z"), "y": ("x", True, "z"), "z": ("x", False, "y")}
 
 
 def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
-    """A position seen against its plane's normal: the volume, the balls, filled where they are read, the first named.
+    """A position seen against its plane's normal: the volume, the balls, filled where they are
+    read, the first named.
 
     An artefact in a free pose is seen along the axis in which it is thinnest.
     """
@@ -29,7 +31,10 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     plane = candidate.plane or ("z" if d == 2 else "xyz"[int(np.ptp(balls, axis=0).argmin())])
     across, to_left, up = VIEWS[plane]
     columns = [AXIS_INDEX[across], AXIS_INDEX[up]]
-    lower, upper = experiment.machine.volume.lower[columns], experiment.machine.volume.upper[columns]
+    lower, upper = (
+        experiment.machine.volume.lower[columns],
+        experiment.machine.volume.upper[columns],
+    )
     scale = (SIZE - 2 * MARGIN) / float((upper - lower).max())
     width, height = scale * (upper - lower)
     left, top = (SIZE - width) / 2, (SIZE - height) / 2
@@ -40,33 +45,53 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     read = np.zeros(len(points), bool)
     for group in position.readings:
         read[group.ball_indices] = True
-    shown = np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
+    shown = (
+        np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
+    )
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
     parts = [
-        f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{_text(candidate.name)}" '
-        'font-family="sans-serif" font-size="10">',
-        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" fill="none" stroke="#999"/>',
-        f'<line x1="{first[0]:.1f}" y1="{first[1]:.1f}" x2="{second[0]:.1f}" y2="{second[1]:.1f}" stroke="#222"/>',
+        (
+            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{_text(candidate.name)}" '
+            'font-family="sans-serif" font-size="10">'
+        ),
+        (
+            f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
+            ' fill="none" stroke="#999"/>'
+        ),
+        (
+            f'<line x1="{first[0]:.1f}" y1="{first[1]:.1f}" x2="{second[0]:.1f}"'
+            f' y2="{second[1]:.1f}" stroke="#222"/>'
+        ),
     ]
     for i in shown:
         fill = "#222" if read[i] else "white"
         radius = 3.2 if i == 0 else 1.8
         parts.append(
-            f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}" stroke="#222"/>'
+            f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}"'
+            ' stroke="#222"/>'
         )
     # The name goes where there are no balls.
     y = first[1] + (13 if first[1] >= points[:, 1].mean() else -7)
     label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
-    parts.append(f'{label} stroke="white" stroke-width="3" paint-order="stroke">{_text(layout.names[0])}</text>')
+    parts.append(
+        f'{label} stroke="white" stroke-width="3"'
+        f' paint-order="stroke">{_text(layout.names[0])}</text>'
+    )
     arrow = f"← {across}" if to_left else f"{across} →"
-    parts.append(f'<text x="{SIZE / 2:g}" y="{top + height + 13:.1f}" text-anchor="middle" fill="#555">{arrow}</text>')
+    parts.append(
+        f'<text x="{SIZE / 2:g}" y="{top + height + 13:.1f}" text-anchor="middle"'
+        f' fill="#555">{arrow}</text>'
+    )
     x, y = left - 6, top + height / 2
     parts.append(
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#555" transform="rotate(-90 {x:.1f} {y:.1f})">'
-        f"{up} →</text>"
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#555" transform="rotate(-90'
+        f' {x:.1f} {y:.1f})">{up} →</text>'
     )
     seen = f"seen from +{plane}" if d == 3 else "seen from above"
-    parts.append(f'<text x="{SIZE / 2:g}" y="{top - 6:.1f}" text-anchor="middle" fill="#555">{seen}</text></svg>')
+    parts.append(
+        f'<text x="{SIZE / 2:g}" y="{top - 6:.1f}" text-anchor="middle"'
+        f' fill="#555">{seen}</text></svg>'
+    )
     return "".join(parts)
 
 

@@ -13,35 +13,54 @@ from .offer import Offer
 
 
 def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
-    """Indices of the candidates that an experiment consists of: its positions by name, calibration items by content.
+    """Indices of the candidates that an experiment consists of: its positions by name, calibration
+    items by content.
 
-    A position that was interrupted since stands for what completes it, or sets it up again, unless no more was to be
-    read of it than has been. Items of calibration that are no candidates belong to the experiment in any case.
+    A position that was interrupted since stands for what completes it, or sets it up again, unless
+    no more was to be read of it than has been. Items of calibration that are no candidates belong
+    to the experiment in any case.
 
     :raises ExperimentError: a position is no candidate.
     """
     candidates = offered.candidates
     rests = {one.rest for one in offered.interrupted}
-    places = {one.name: k for k, one in enumerate(candidates) if isinstance(one.item, Position) and k not in rests}
+    places = {
+        one.name: k
+        for k, one in enumerate(candidates)
+        if isinstance(one.item, Position) and k not in rests
+    }
     unknown = [position.name for position in chosen.positions if position.name not in places]
     if unknown:
         messages = [
             Message(
-                str(chosen.source), 0, 0, "positions", f'"{name}" is no candidate of the pool; {hint(name, places)}'
+                str(chosen.source),
+                0,
+                0,
+                "positions",
+                f'"{name}" is no candidate of the pool; {hint(name, places)}',
             )
             for name in unknown
         ]
         raise ExperimentError(messages)
-    moved = [one.name for one in chosen.positions if not _same_place(one, candidates[places[one.name]].item)]
+    moved = [
+        one.name
+        for one in chosen.positions
+        if not _same_place(one, candidates[places[one.name]].item)
+    ]
     if moved:
         texts = [
-            f'"{name}" stands elsewhere, or of another artefact, in the pool; give it another name' for name in moved
+            f'"{name}" stands elsewhere, or of another artefact, in the pool; give it another name'
+            for name in moved
         ]
-        raise ExperimentError([Message(str(chosen.source), 0, 0, "positions", text) for text in texts])
+        raise ExperimentError(
+            [Message(str(chosen.source), 0, 0, "positions", text) for text in texts]
+        )
     found = [_now(offered, places[position.name], position) for position in chosen.positions]
     for k, candidate in enumerate(candidates):
         item = candidate.item
-        if not isinstance(item, Position) and any(_equal(item, other) for other in chosen.calibration):
+        if not isinstance(item, Position) and any(
+            _equal(item, other) for other in chosen.calibration
+        ):
             found.append(k)
     return tuple(sorted(set(found)))
 
@@ -68,5 +87,6 @@ def _same_place(one: Position, other: object) -> bool:
 
 def _equal(one: Calibration, other: Calibration) -> bool:
     return type(one) is type(other) and all(
-        np.array_equal(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)
+        np.array_equal(getattr(one, field.name), getattr(other, field.name))
+        for field in fields(one)
     )

@@ -1,7 +1,9 @@
-"""The chosen design as an experiment file of its own: what its source says, with other positions and no pool.
+"""The chosen design as an experiment file of its own: what its source says, with other positions
+and no pool.
 
-Sections that stay as they are keep their text and comments. What is composed is read again and compared with what it
-should say, so that a file of unusual form is written anew as a whole, rather than wrongly.
+Sections that stay as they are keep their text and comments. What is composed is read again and
+compared with what it should say, so that a file of unusual form is written anew as a whole, rather
+than wrongly.
 """
 
 from __future__ import annotations
@@ -17,7 +19,13 @@ from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.experiment.variants import variant_trees
 from ballplate.simulator.inputs.messages import ExperimentError, format_path, in_one_line
 from ballplate.simulator.inputs.problems import Problems
-from ballplate.simulator.inputs.yamltree import LOADER, parse_tree, read_text, resolve_scalar, to_python
+from ballplate.simulator.inputs.yamltree import (
+    LOADER,
+    parse_tree,
+    read_text,
+    resolve_scalar,
+    to_python,
+)
 from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
 from ballplate.simulator.machines.custom import module_file
 
@@ -33,12 +41,13 @@ def experiment_text(
     title: str | None = None,
     expected_rank_deficiency: int | None = None,
 ) -> str:
-    """The text of an experiment file, to stand in a folder, with the chosen candidates, positions in their order.
+    """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
+    in their order.
 
-    `experiment` is the source, loaded for planning; of one with variants the overrides are applied. `header` becomes
-    comments at the top. Names of files lead from `folder` to the same files. A stated rank deficiency is left out
-    unless one is given, and so are artefacts that no chosen position places, what is known of them, and priors about
-    other positions.
+    `experiment` is the source, loaded for planning; of one with variants the overrides are applied.
+    `header` becomes comments at the top. Names of files lead from `folder` to the same files. A
+    stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
+    position places, what is known of them, and priors about other positions.
 
     :raises ExperimentError: the source cannot be read any more.
     """
@@ -57,16 +66,27 @@ def experiment_text(
         content = _moved(content, source.parent, folder)
     chunks = _chunks(text, root)
     is_same = {
-        key: tree.items.get(key) is root.items[key] and to_list(to_python(root.items[key])) == content.get(key)
+        key: (
+            tree.items.get(key) is root.items[key]
+            and to_list(to_python(root.items[key])) == content.get(key)
+        )
         for key in root.items
     }
     kept = {key: chunk for key, chunk in chunks.items() if is_same[key]}
     first = text.splitlines()[0]
-    head = [first] if first.startswith(SCHEMA_LINE) and folder.resolve() == source.parent.resolve() else []
+    head = (
+        [first]
+        if first.startswith(SCHEMA_LINE) and folder.resolve() == source.parent.resolve()
+        else []
+    )
     head += [f"# {in_one_line(line)}".rstrip() for line in header.splitlines()]
     for parts in (kept, {}):
         written = "\n".join(
-            ["\n".join(head), "", *(parts[key] if key in parts else _section(key, content[key]) for key in content)]
+            [
+                "\n".join(head),
+                "",
+                *(parts[key] if key in parts else _section(key, content[key]) for key in content),
+            ]
         )
         try:
             if to_list(to_python(parse_tree(written, "written"))) == content:
@@ -85,17 +105,25 @@ def to_list(value: Any) -> Any:
     return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
 
 
-def _content(tree: MappingNode, experiment: Experiment, chosen: Sequence[Candidate]) -> dict[str, Any]:
+def _content(
+    tree: MappingNode, experiment: Experiment, chosen: Sequence[Candidate]
+) -> dict[str, Any]:
     said: dict[str, Any] = to_list(to_python(tree))
     positions = [one for one in chosen if isinstance(one.item, Position)]
     placed = {one.item.artefact for one in positions}
     names = {one.name for one in positions}
-    others = {one.name for one in experiment.pool.candidates} - names if experiment.pool is not None else set()
+    others = (
+        {one.name for one in experiment.pool.candidates} - names
+        if experiment.pool is not None
+        else set()
+    )
     # Where there is one artefact, nothing says which.
     only = next(iter(said["artefacts"]))
     items = [one for one in said.get("calibration", []) if str(one.get("artefact", only)) in placed]
     items += [
-        to_list(one.settings) for one in chosen if not isinstance(one.item, Position) and one.item.artefact in placed
+        to_list(one.settings)
+        for one in chosen
+        if not isinstance(one.item, Position) and one.item.artefact in placed
     ]
     said["artefacts"] = {name: one for name, one in said["artefacts"].items() if name in placed}
     said["positions"] = [to_list(one.settings) for one in positions]
@@ -103,11 +131,21 @@ def _content(tree: MappingNode, experiment: Experiment, chosen: Sequence[Candida
     if "priors" in said:
         gone = {one.path for one in experiment.priors if one.position in others}
         paths = [format_path(("priors", i, "parameter")) for i in range(len(said["priors"]))]
-        said["priors"] = [one for one, path in zip(said["priors"], paths, strict=True) if path not in gone]
+        said["priors"] = [
+            one for one, path in zip(said["priors"], paths, strict=True) if path not in gone
+        ]
     # What a choice adds goes where it belongs.
     known = [key for key in ExperimentSettings.model_fields if key in said]
-    order = sorted(said, key=known.index) if {"positions", "calibration"} - set(tree.items) else list(said)
-    return {key: said[key] for key in order if key not in LEFT_OUT and (said[key] != [] or key == "positions")}
+    order = (
+        sorted(said, key=known.index)
+        if {"positions", "calibration"} - set(tree.items)
+        else list(said)
+    )
+    return {
+        key: said[key]
+        for key in order
+        if key not in LEFT_OUT and (said[key] != [] or key == "positions")
+    }
 
 
 def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, Any]:
@@ -138,11 +176,15 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
     truth = _with(truth, "files", lambda names: [there(name) for name in names])
     truth = _with(truth, "error_model", model)
     found |= {"true_machine": truth} if truth is not None else {}
-    found["artefacts"] = {name: _with(one, "file", there) for name, one in found["artefacts"].items()}
+    found["artefacts"] = {
+        name: _with(one, "file", there) for name, one in found["artefacts"].items()
+    }
     if "calibration" in found:
         found["calibration"] = [_with(one, "values", there) for one in found["calibration"]]
     if "evaluation" in found:
-        found["evaluation"] = _with(found["evaluation"], "points", lambda points: _with(points, "file", there))
+        found["evaluation"] = _with(
+            found["evaluation"], "points", lambda points: _with(points, "file", there)
+        )
     return found
 
 
@@ -153,7 +195,9 @@ def _with(settings: Any, key: str, change: Callable[[Any], Any]) -> Any:
 
 
 def _chunks(text: str, root: MappingNode) -> dict[str, str]:
-    """The text of each section with the comments above it, none where the file is not one of plain blocks."""
+    """The text of each section with the comments above it, none where the file is not one of plain
+    blocks.
+    """
     lines = text.lstrip("\ufeff").splitlines()
     starts = {mark.line - 1: key for key, mark in root.key_marks.items() if mark.column == 1}
     is_marked = any(line.startswith(("---", "...", "%")) for line in lines)
@@ -203,10 +247,14 @@ def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 _Dumper.add_representer(str, _represent_text)
 _Dumper.add_representer(
-    _Flow, lambda dumper, data: dumper.represent_mapping("tag:yaml.org,2002:map", data.items(), flow_style=True)
+    _Flow,
+    lambda dumper, data: dumper.represent_mapping(
+        "tag:yaml.org,2002:map", data.items(), flow_style=True
+    ),
 )
 _Dumper.add_representer(
-    _FlowList, lambda dumper, data: dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=True)
+    _FlowList,
+    lambda dumper, data: dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=True),
 )
 
 
@@ -217,10 +265,21 @@ def _section(key: str, value: Any) -> str:
     elif isinstance(value, list):
         value = [_in_line(one) for one in value]
     text = yaml.dump(
-        {key: value}, Dumper=_Dumper, default_flow_style=False, sort_keys=False, allow_unicode=True, width=200
+        {key: value},
+        Dumper=_Dumper,
+        default_flow_style=False,
+        sort_keys=False,
+        allow_unicode=True,
+        width=200,
     )
     return f"\n{text}".rstrip("\n") if isinstance(value, dict | list) else text.rstrip("\n")
 
 
 def _in_line(value: Any) -> Any:
-    return _Flow(value) if isinstance(value, dict) else _FlowList(value) if isinstance(value, list) else value
+    return (
+        _Flow(value)
+        if isinstance(value, dict)
+        else _FlowList(value)
+        if isinstance(value, list)
+        else value
+    )

@@ -1,10 +1,11 @@
 """The information of every candidate on what all positions share, as one fixed matrix each.
 
-Information adds: that of a selection is the sum of its candidates' matrices. Two changes of basis keep the matrices
-small and the sums accurate. The first leaves out combinations of balls that no position ties to machine errors: on a
-plate read as a whole some fifty combinations matter, however many balls there are. The second makes the information
-of the whole pool the identity, by a triangular factor obtained from orthogonal transformations, so that nothing is
-lost where products of rows are formed; what the pool does not determine at all is left out of it.
+Information adds: that of a selection is the sum of its candidates' matrices. Two changes of basis
+keep the matrices small and the sums accurate. The first leaves out combinations of balls that no
+position ties to machine errors: on a plate read as a whole some fifty combinations matter, however
+many balls there are. The second makes the information of the whole pool the identity, by a
+triangular factor obtained from orthogonal transformations, so that nothing is lost where products
+of rows are formed; what the pool does not determine at all is left out of it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,11 @@ from ballplate.simulator.estimation.covariance import EXACT
 from ballplate.simulator.estimation.elimination import ALIKE
 from ballplate.simulator.estimation.graded import Collected, Triangle
 from ballplate.simulator.estimation.graded import triangle as triangular
-from ballplate.simulator.estimation.observations import length_deviations, reading_weights, rotation_sensitivity
+from ballplate.simulator.estimation.observations import (
+    length_deviations,
+    reading_weights,
+    rotation_sensitivity,
+)
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
@@ -32,8 +37,8 @@ from .rows import STEP, Drawn, Rows, always, calibration_rows, draw, position_ro
 # Ball combinations below this fraction of the largest are rounding.
 ROUNDING = 1e-10
 
-# What an item on offer may outweigh readings by: in the information of the whole pool, beside which that without it
-# must not vanish, and at all, since more than this changes no other uncertainty.
+# What an item on offer may outweigh readings by: in the information of the whole pool, beside which
+# that without it must not vanish, and at all, since more than this changes no other uncertainty.
 MILDLY = 1e3
 EXACTLY = 1e8
 
@@ -48,9 +53,10 @@ MOST_BYTES = 800_000_000
 class Basis:
     """Coordinates z in which a plan computes.
 
-    `balls` (n, d, y) are the combinations of ball co-ordinates that count. In terms of their amounts u (y,) and of
-    shared columns s (c,): u = `ball_root` z - `ball_shared` s, where z starts with those of the balls, and s =
-    `shared_root` z for the rest of z. `ball_open` (y, open) are combinations that nothing in the pool shows.
+    `balls` (n, d, y) are the combinations of ball co-ordinates that count. In terms of their
+    amounts u (y,) and of shared columns s (c,): u = `ball_root` z - `ball_shared` s, where z starts
+    with those of the balls, and s = `shared_root` z for the rest of z. `ball_open` (y, open) are
+    combinations that nothing in the pool shows.
     """
 
     balls: Array
@@ -69,7 +75,9 @@ class Basis:
         return self.of_balls + int(self.shared_root.shape[1])
 
     def rows(self, by_amount: Array, by_shared: Array) -> Array:
-        """Rows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m, c)."""
+        """Rows in z (m, size) from derivatives by the amounts (m, y) and by shared columns (m,
+        c).
+        """
         shared = (by_shared - by_amount @ self.ball_shared) @ self.shared_root
         return np.concatenate([by_amount @ self.ball_root, shared], axis=1)
 
@@ -78,11 +86,12 @@ class Basis:
 class Information:
     """Matrices of candidates in the basis of a pool.
 
-    `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z) what each adds.
-    `deficiency` counts shared directions (c, deficiency), `open_` in micrometres, that even all candidates together
-    leave undetermined. `frames` (candidates that calibrate co-ordinates) hold what each fixes of its plate's frame.
-    `pose_ranks` tells how many parameters of its own pose each candidate determines, were all else known, and
-    `has_rows` whether it observes anything.
+    `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z)
+    what each adds. `deficiency` counts shared directions (c, deficiency), `open_` in micrometres,
+    that even all candidates together leave undetermined. `frames` (candidates that calibrate
+    co-ordinates) hold what each fixes of its plate's frame. `pose_ranks` tells how many parameters
+    of its own pose each candidate determines, were all else known, and `has_rows` whether it
+    observes anything.
     """
 
     drawn: Drawn
@@ -109,7 +118,9 @@ class Information:
         return _placing(self.candidates, artefact)
 
     def of(self, chosen: Collection[int]) -> Array:
-        """Information (z, z) of a selection; a frame that nothing fixes is held, which changes no distance."""
+        """Information (z, z) of a selection; a frame that nothing fixes is held, which changes no
+        distance.
+        """
         members = sorted(chosen)
         return self.base + self.matrices[members].sum(axis=0) + self.frames.held(members)
 
@@ -122,12 +133,14 @@ class Information:
 
 @dataclass(frozen=True)
 class Frames:
-    """What calibrated co-ordinates fix of the plates' frames, in which distances do not depend on the frame.
+    """What calibrated co-ordinates fix of the plates' frames, in which distances do not depend on
+    the frame.
 
-    `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the motions of the plates (m,
-    motions), `base` the same for the experiment's own certificates. `rows` (motions, z) are the motions' rows.
-    `artefacts` holds, for each artefact, which candidates place it and the information (z, z) that holds its balls or
-    its length; plates are not among them where balls themselves count.
+    `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the
+    motions of the plates (m, motions), `base` the same for the experiment's own certificates.
+    `rows` (motions, z) are the motions' rows. `artefacts` holds, for each artefact, which
+    candidates place it and the information (z, z) that holds its balls or its length; plates are
+    not among them where balls themselves count.
     """
 
     fixed: dict[int, Array]
@@ -136,7 +149,9 @@ class Frames:
     artefacts: tuple[tuple[frozenset[int], Array], ...] = ()
 
     def held(self, members: Sequence[int]) -> Array:
-        """Information (z, z) that holds the motions that no member fixes, and artefacts that no member places."""
+        """Information (z, z) that holds the motions that no member fixes, and artefacts that no
+        member places.
+        """
         total = self._held_motions(members)
         for placing, information in self.artefacts:
             if placing.isdisjoint(members):
@@ -165,12 +180,13 @@ def pool_information(
 ) -> Information:
     """Information of every candidate of a pool.
 
-    A candidate that completes another, of which it has the readings as well, is given under `completed`: its
-    information is what it adds to that of the other, in the same pose.
-    With `all_balls` no combination of balls is left out, for criteria that are about balls, and no plate is held that a
-    selection does not place.
+    A candidate that completes another, of which it has the readings as well, is given under
+    `completed`: its information is what it adds to that of the other, in the same pose. With
+    `all_balls` no combination of balls is left out, for criteria that are about balls, and no plate
+    is held that a selection does not place.
 
-    :raises ExperimentError: no candidate is a position, the matrices are too large, or what cannot be planned is asked.
+    :raises ExperimentError: no candidate is a position, the matrices are too large, or what cannot
+        be planned is asked.
     """
     positions = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
     if not positions:
@@ -184,14 +200,20 @@ def pool_information(
         if not isinstance(candidate.item, Position)
     }
     known = always(drawn)
-    # What is spanned and what is open does not depend on weights, but to see it these must not differ too much.
+    # What is spanned and what is open does not depend on weights, but to see it these must not
+    # differ too much.
     even_known, even_items, is_even = known, items, True
     weight = _position_weight(drawn)
     if any(_differs(rows, weight) for rows in [*known, *chain(*items.values())]):
         is_even = False
         even_known = [_weighted(rows, weight, weight) for rows in known]
-        even_items = {k: [_weighted(rows, weight, weight) for rows in item] for k, item in items.items()}
-        items = {k: [_weighted(rows, 0.0, EXACTLY * weight) for rows in item] for k, item in items.items()}
+        even_items = {
+            k: [_weighted(rows, weight, weight) for rows in item] for k, item in items.items()
+        }
+        items = {
+            k: [_weighted(rows, 0.0, EXACTLY * weight) for rows in item]
+            for k, item in items.items()
+        }
     certificates = [*even_known, *chain(*even_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
@@ -223,7 +245,9 @@ def pool_information(
         mild = [base, *own]
         for k, item in even_items.items():
             even[k + 1] = np.concatenate([_in_amounts(rows, balls) for rows in item])
-            mild[k + 1] = np.concatenate([_in_amounts(_weighted(r, 0.0, MILDLY * weight), balls) for r in items[k]])
+            mild[k + 1] = np.concatenate(
+                [_in_amounts(_weighted(r, 0.0, MILDLY * weight), balls) for r in items[k]]
+            )
         basis, open_ = _basis(balls, drawn.shared, mild, even)
 
     def in_basis(rows: Array) -> Array:
@@ -240,18 +264,32 @@ def pool_information(
     unplaced = _unplaced(drawn, candidates, basis, all_balls, has_rows)
     frames = replace(_frames(drawn, even_known, even_items, basis), artefacts=unplaced)
     own_base = transformed.T @ transformed
-    return Information(drawn, tuple(candidates), basis, own_base, matrices, open_, frames, tuple(pose_ranks), has_rows)
+    return Information(
+        drawn,
+        tuple(candidates),
+        basis,
+        own_base,
+        matrices,
+        open_,
+        frames,
+        tuple(pose_ranks),
+        has_rows,
+    )
 
 
 def _in_amounts(rows: Rows, balls: Array) -> Array:
-    """Rows (m, y + c) by amounts of ball combinations and shared columns, the pose projected out."""
+    """Rows (m, y + c) by amounts of ball combinations and shared columns, the pose projected
+    out.
+    """
     y = balls.shape[2]
     found = np.zeros((len(rows.ball), y + rows.by_shared.shape[1]))
     found[:, y:] = rows.by_shared
     for sign, ball in ((1.0, rows.ball), (-1.0, rows.other)):
         of_ball = np.flatnonzero(ball >= 0)
         if len(of_ball):
-            found[of_ball, :y] += sign * np.einsum("md,mdy->my", rows.by_ball[of_ball], balls[ball[of_ball]])
+            found[of_ball, :y] += sign * np.einsum(
+                "md,mdy->my", rows.by_ball[of_ball], balls[ball[of_ball]]
+            )
     if rows.by_pose.shape[1]:
         along = _range(rows.by_pose)
         found -= along @ (along.T @ found)
@@ -260,9 +298,13 @@ def _in_amounts(rows: Rows, balls: Array) -> Array:
 
 def _position_weight(drawn: Drawn) -> float:
     """The weight of the heaviest readings and lengths of positions, for a micrometre."""
-    of_readings = reading_weights(drawn.design, drawn.design.readings.select(drawn.design.plate_readings))
+    of_readings = reading_weights(
+        drawn.design, drawn.design.readings.select(drawn.design.plate_readings)
+    )
     of_lengths = (
-        1.0 / length_deviations(drawn.design, drawn.state, None)[1] if len(drawn.design.lengths) else of_readings
+        1.0 / length_deviations(drawn.design, drawn.state, None)[1]
+        if len(drawn.design.lengths)
+        else of_readings
     )
     return STEP * max(float(of_readings.max(initial=0.0)), float(of_lengths.max(initial=0.0)))
 
@@ -273,7 +315,9 @@ def _sizes(rows: Rows) -> Array:
 
 
 def _differs(rows: Rows, weight: float) -> bool:
-    """Whether any row's weight differs from `weight` by more than plain orthogonal transformations keep apart."""
+    """Whether any row's weight differs from `weight` by more than plain orthogonal transformations
+    keep apart.
+    """
     sizes = _sizes(rows)
     return bool((sizes > ALIKE * weight).any() or (ALIKE * sizes[sizes > 0.0] < weight).any())
 
@@ -314,15 +358,20 @@ def _motions(design: Design) -> Array:
 
 
 def _combinations(drawn: Drawn, certificates: list[Rows], all_balls: bool) -> Array:
-    """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything that is shared.
+    """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything
+    that is shared.
 
-    They span a space that the information of no position leads out of, so that what is left out of it has no bearing.
-    Motions of a plate as a whole, which only calibrated co-ordinates show, are part of it where there are any.
+    They span a space that the information of no position leads out of, so that what is left out of
+    it has no bearing. Motions of a plate as a whole, which only calibrated co-ordinates show, are
+    part of it where there are any.
     """
     n, d = drawn.design.balls.shape
     of_plates = np.repeat(np.isin(np.arange(n), drawn.design.plate_balls), d)
     every, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
-    found = _Span(_motions(drawn.design).reshape(n * d, -1), keeps=any(_is_framed(rows) for rows in certificates))
+    found = _Span(
+        _motions(drawn.design).reshape(n * d, -1),
+        keeps=any(_is_framed(rows) for rows in certificates),
+    )
     if all_balls:
         found.add(every)
     for rows in certificates:
@@ -340,7 +389,9 @@ def _combinations(drawn: Drawn, certificates: list[Rows], all_balls: bool) -> Ar
     while grown != found.rank and found.rank < most:
         grown = found.rank
         for kind in kinds.values():
-            found.add(np.einsum("nij,njy->niy", kind, found.vectors.reshape(n, d, -1)).reshape(n * d, -1))
+            found.add(
+                np.einsum("nij,njy->niy", kind, found.vectors.reshape(n, d, -1)).reshape(n * d, -1)
+            )
     return found.vectors.reshape(n, d, -1)
 
 
@@ -355,12 +406,18 @@ def _by_balls(rows: Rows, columns: Array, n: int) -> Array:
     total = np.zeros((n, d, columns.shape[1]))
     for sign, ball in ((1.0, rows.ball), (-1.0, rows.other)):
         chosen = np.flatnonzero(ball >= 0)
-        np.add.at(total, ball[chosen], sign * rows.by_ball[chosen][:, :, None] * columns[chosen][:, None, :])
+        np.add.at(
+            total,
+            ball[chosen],
+            sign * rows.by_ball[chosen][:, :, None] * columns[chosen][:, None, :],
+        )
     return total.reshape(n * d, -1)
 
 
 def _kind(rows: Rows, n: int) -> Array:
-    """Information (n, d, d) of readings on each ball, were all else known, the largest entry being 1."""
+    """Information (n, d, d) of readings on each ball, were all else known, the largest entry being
+    1.
+    """
     d = rows.by_ball.shape[1]
     total = np.zeros((n, d, d))
     chosen = np.flatnonzero(rows.ball >= 0)
@@ -384,7 +441,9 @@ class _Span:
         return int(self.vectors.shape[1] + self._without.shape[1])
 
     def add(self, columns: Array) -> None:
-        self._largest = max(self._largest, float(np.sqrt((columns**2).sum(axis=0)).max(initial=0.0)))
+        self._largest = max(
+            self._largest, float(np.sqrt((columns**2).sum(axis=0)).max(initial=0.0))
+        )
         columns = self._new(columns)
         size = np.sqrt((columns**2).sum(axis=0))
         columns = columns[:, size > ROUNDING * self._largest]
@@ -401,8 +460,11 @@ class _Span:
         return columns
 
 
-def _basis(balls: Array, shared: int, every: list[Array], even: list[Array] | None = None) -> tuple[Basis, Array]:
-    """Basis in which the information of all rows together is the identity, and what is left out (shared, open).
+def _basis(
+    balls: Array, shared: int, every: list[Array], even: list[Array] | None = None
+) -> tuple[Basis, Array]:
+    """Basis in which the information of all rows together is the identity, and what is left out
+    (shared, open).
 
     `even` are the same rows with weights that are much alike, where those of `every` are not.
     """
@@ -422,20 +484,34 @@ def _basis(balls: Array, shared: int, every: list[Array], even: list[Array] | No
     if even is None:
         ball_root = by_balls[kept].T / of_balls[kept]
         ball_shared = ball_root @ left[:, kept].T @ triangle[:y, y:]
-        return Basis(balls, ball_root, ball_shared, right[known].T / values[known], ball_open), open_
+        return (
+            Basis(balls, ball_root, ball_shared, right[known].T / values[known], ball_open),
+            open_,
+        )
     collected = Collected(int(kept.sum()), shared)
     for rows in every:
         collected.add(np.concatenate([rows[:, :y] @ by_balls[kept].T, rows[:, y:]], axis=1))
     found = collected.found()
     ball_root = by_balls[kept].T @ _inverse(found)
     of_shared = triangular(found.rest @ right[known].T, np.zeros((len(found.rest), 0)))
-    return Basis(balls, ball_root, ball_root @ found.side, right[known].T @ _inverse(of_shared), ball_open), open_
+    return (
+        Basis(
+            balls,
+            ball_root,
+            ball_root @ found.side,
+            right[known].T @ _inverse(of_shared),
+            ball_open,
+        ),
+        open_,
+    )
 
 
 def _inverse(found: Triangle) -> Array:
     """Inverse of a triangle, its rows in the order of the columns."""
     inverse = np.empty_like(found.root)
-    inverse[found.order] = scipy_linalg().solve_triangular(found.root, np.eye(len(found.root)), check_finite=False)
+    inverse[found.order] = scipy_linalg().solve_triangular(
+        found.root, np.eye(len(found.root)), check_finite=False
+    )
     return inverse
 
 
@@ -451,14 +527,22 @@ def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
 
 def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:
     return tuple(
-        k for k, one in enumerate(candidates) if isinstance(one.item, Position) and one.item.artefact == artefact
+        k
+        for k, one in enumerate(candidates)
+        if isinstance(one.item, Position) and one.item.artefact == artefact
     )
 
 
 def _unplaced(
-    drawn: Drawn, candidates: Sequence[Candidate], basis: Basis, all_balls: bool, has_rows: Sequence[bool]
+    drawn: Drawn,
+    candidates: Sequence[Candidate],
+    basis: Basis,
+    all_balls: bool,
+    has_rows: Sequence[bool],
 ) -> tuple[tuple[frozenset[int], Array], ...]:
-    """For each artefact, which candidates place it, and what holds the parameters that are its own."""
+    """For each artefact, which candidates place it, and what holds the parameters that are its
+    own.
+    """
     design, found = drawn.design, []
     n, d = design.balls.shape
     for number, name in enumerate(design.artefact_names):
@@ -468,10 +552,15 @@ def _unplaced(
         placing = frozenset(k for k in _placing(candidates, name) if has_rows[k])
         own = np.flatnonzero(design.ball_artefact == number)
         by_ball = basis.balls[own].reshape(len(own) * d, -1)
-        # Of balls that no combination moves there is nothing to hold, and rounding must not be taken for it.
+        # Of balls that no combination moves there is nothing to hold, and rounding must not be
+        # taken for it.
         by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
-        lengths = [k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name]
-        by_length = np.eye(drawn.shared)[[drawn.layout.lengths.start - drawn.own.start + k for k in lengths]]
+        lengths = [
+            k for k, length in enumerate(design.length_names) if length.rpartition(": ")[0] == name
+        ]
+        by_length = np.eye(drawn.shared)[
+            [drawn.layout.lengths.start - drawn.own.start + k for k in lengths]
+        ]
         rows = np.concatenate(
             [
                 basis.rows(by_ball, np.zeros((len(by_ball), drawn.shared))),

@@ -1,7 +1,9 @@
-"""What a plan may choose from when a campaign goes on: candidates, what is done, and interrupted positions.
+"""What a plan may choose from when a campaign goes on: candidates, what is done, and interrupted
+positions.
 
-A position that was interrupted is offered twice: for completion, as long as the artefact stands there, where neither
-its set-up is paid again nor what has been read; and to be set up anew in full. What was read of it counts in any case.
+A position that was interrupted is offered twice: for completion, as long as the artefact stands
+there, where neither its set-up is paid again nor what has been read; and to be set up anew in full.
+What was read of it counts in any case.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ from .information import Information
 class Interrupted:
     """A position that was read in part, by indices of an offer.
 
-    `part` is what has been read, `rest` completes it, None where the artefact does not stand there any more, and
-    `again` is a new set-up of the same position. `whole` is the position with all its readings.
+    `part` is what has been read, `rest` completes it, None where the artefact does not stand there
+    any more, and `again` is a new set-up of the same position. `whole` is the position with all its
+    readings.
     """
 
     part: int
@@ -33,8 +36,8 @@ class Interrupted:
 class Offer:
     """Candidates, those of the pool first, and limits on choosing them.
 
-    `done` in the order in which they were read; `must` and `at_least` (of each, one) have to be chosen. `replaced`
-    tells by what candidates of the pool that were interrupted may be chosen now.
+    `done` in the order in which they were read; `must` and `at_least` (of each, one) have to be
+    chosen. `replaced` tells by what candidates of the pool that were interrupted may be chosen now.
     """
 
     candidates: tuple[Candidate, ...]
@@ -55,7 +58,9 @@ class Offer:
 
     @property
     def weighed(self) -> tuple[list[Candidate], dict[int, int]]:
-        """Candidates as they are weighed: what completes another with all its readings, and which that is."""
+        """Candidates as they are weighed: what completes another with all its readings, and which
+        that is.
+        """
         candidates, completed = list(self.candidates), {}
         for one in self.interrupted:
             if one.rest is not None:
@@ -64,7 +69,9 @@ class Offer:
         return candidates, completed
 
     def together(self, chosen: Sequence[int]) -> list[Candidate]:
-        """Chosen candidates in order, a position that is completed as one, those left interrupted at the end."""
+        """Chosen candidates in order, a position that is completed as one, those left interrupted
+        at the end.
+        """
         found = {k: self.candidates[k] for k in chosen}
         for one in self.interrupted:
             part = found.pop(one.part)
@@ -76,12 +83,18 @@ class Offer:
         return [found[k] for k in sorted(found)]
 
     def begun(self, experiment: Experiment) -> dict[str, tuple[int, ...]]:
-        """Plates of which some balls alone have been read, and the candidates that read all the others."""
+        """Plates of which some balls alone have been read, and the candidates that read all the
+        others.
+        """
         balls: dict[str, set[int]] = {}
         for k in self.done:
-            balls.setdefault(self.candidates[k].item.artefact, set()).update(_balls(self.candidates[k]))
+            balls.setdefault(self.candidates[k].item.artefact, set()).update(
+                _balls(self.candidates[k])
+            )
         found = {}
-        for name in dict.fromkeys(self.candidates[one.part].item.artefact for one in self.interrupted):
+        for name in dict.fromkeys(
+            self.candidates[one.part].item.artefact for one in self.interrupted
+        ):
             unread = set(range(len(experiment.layouts[name].names))) - balls[name]
             if unread and experiment.artefacts[name].role == "plate":
                 found[name] = tuple(
@@ -96,7 +109,9 @@ class Offer:
         plates = self.begun(experiment)
         if not plates:
             return self
-        left = [one for one in self.taken if one.rest is None or one.read.item.artefact not in plates]
+        left = [
+            one for one in self.taken if one.rest is None or one.read.item.artefact not in plates
+        ]
         return offer(self.pool, left, self.is_standing)
 
     def find(self, names: Sequence[str]) -> list[int]:
@@ -117,7 +132,8 @@ class Offer:
 def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Offer:
     """What may be chosen from a pool after some set-ups have been read.
 
-    `standing` tells whether the artefact still is where it was read last, so that this position can be completed.
+    `standing` tells whether the artefact still is where it was read last, so that this position can
+    be completed.
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}
@@ -135,7 +151,11 @@ def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Off
         own = [one for one in taken if one.base == base]
         complete = [index[one.name] for one in own if one.rest is None]
         if complete:
-            replaced[base] = (complete[0],) if candidates[base] is not pool.candidates[base] else (complete[0], base)
+            replaced[base] = (
+                (complete[0],)
+                if candidates[base] is not pool.candidates[base]
+                else (complete[0], base)
+            )
             continue
         again = base
         if candidates[base] is not pool.candidates[base]:
@@ -157,7 +177,10 @@ def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Off
         tuple(candidates),
         done,
         tuple(one[0] for one in left if len(one) == 1),
-        tuple(AtMost(tuple(m for k in one.members for m in _now(k, replaced)), one.count) for one in pool.at_most),
+        tuple(
+            AtMost(tuple(m for k in one.members for m in _now(k, replaced)), one.count)
+            for one in pool.at_most
+        ),
         tuple(one for one in left if len(one) > 1),
         tuple(interrupted),
         replaced,
@@ -168,10 +191,11 @@ def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Off
 
 
 def open_directions(offered: Offer, information: Information, chosen: Collection[int]) -> int:
-    """What interrupted positions that are not completed leave undetermined of their own poses and lengths.
+    """What interrupted positions that are not completed leave undetermined of their own poses and
+    lengths.
 
-    These are parameters that nothing else depends on: of a pose that too few balls were read in, and the unknown length
-    of a standard of which no length was read.
+    These are parameters that nothing else depends on: of a pose that too few balls were read in,
+    and the unknown length of a standard of which no length was read.
     """
     left = [one for one in offered.interrupted if one.rest is None or one.rest not in chosen]
     ranks, design = information.pose_ranks, information.drawn.design

@@ -1,7 +1,9 @@
-"""Whitened rows that candidates contribute to what all positions share: balls, machine errors, offsets, lengths.
+"""Whitened rows that candidates contribute to what all positions share: balls, machine errors,
+offsets, lengths.
 
-The pose of a position belongs to it alone. Its columns are projected out of the position's rows, so that what is left
-concerns shared parameters only, and the information of several positions is the sum of theirs.
+The pose of a position belongs to it alone. Its columns are projected out of the position's rows, so
+that what is left concerns shared parameters only, and the information of several positions is the
+sum of theirs.
 """
 
 from __future__ import annotations
@@ -41,8 +43,9 @@ AT_ONCE = 10_000
 class Rows:
     """Whitened rows of one candidate, columns in micrometres.
 
-    `by_ball` (m, d) is the derivative by the ball `ball` (m,), -1 where there is none, and its negative that by the
-    ball `other` (m,) of a distance; `by_shared` (m, s) that by shared parameters; `by_pose` (m, q) that by the pose.
+    `by_ball` (m, d) is the derivative by the ball `ball` (m,), -1 where there is none, and its
+    negative that by the ball `other` (m,) of a distance; `by_shared` (m, s) that by shared
+    parameters; `by_pose` (m, q) that by the pose.
     """
 
     ball: Integers
@@ -54,10 +57,11 @@ class Rows:
 
 @dataclass(frozen=True)
 class Drawn:
-    """All positions that may be chosen, laid out as one design, and the columns of shared parameters.
+    """All positions that may be chosen, laid out as one design, and the columns of shared
+    parameters.
 
-    Shared columns are those of the layout less poses, then the error of each certificate of a length, in its standard
-    uncertainty.
+    Shared columns are those of the layout less poses, then the error of each certificate of a
+    length, in its standard uncertainty.
     """
 
     design: Design
@@ -87,10 +91,13 @@ class Drawn:
 def draw(experiment: Experiment, positions: Sequence[Position]) -> Drawn:
     """Lay out an experiment with all `positions` that may be chosen, in their order.
 
-    :raises ExperimentError: a prior is about a pose; what it means depends on the position that holds the frame.
+    :raises ExperimentError: a prior is about a pose; what it means depends on the position that
+        holds the frame.
     """
     messages = [
-        prior.mark.message(prior.path, f'"{prior.name}" is of a pose, which a plan cannot weigh; remove it to plan')
+        prior.mark.message(
+            prior.path, f'"{prior.name}" is of a pose, which a plan cannot weigh; remove it to plan'
+        )
         for prior in experiment.priors
         if prior.position is not None
     ]
@@ -153,18 +160,29 @@ def _length_rows(drawn: Drawn) -> dict[int, Rows]:
     found = {}
     for k in np.unique(place).tolist():
         chosen, columns = np.flatnonzero(place == k), layout.pose_columns[k]
-        found[k] = replace(_of_shared(drawn, shared[chosen]), by_pose=derivative[np.ix_(chosen, columns[columns >= 0])])
+        found[k] = replace(
+            _of_shared(drawn, shared[chosen]),
+            by_pose=derivative[np.ix_(chosen, columns[columns >= 0])],
+        )
     return found
 
 
 def _of_shared(drawn: Drawn, shared: Array) -> Rows:
     """Rows (m, s) that no ball takes part in."""
     none = np.full(len(shared), -1)
-    return Rows(none, none, np.zeros((len(shared), drawn.design.dimension)), shared, np.zeros((len(shared), 0)))
+    return Rows(
+        none,
+        none,
+        np.zeros((len(shared), drawn.design.dimension)),
+        shared,
+        np.zeros((len(shared), 0)),
+    )
 
 
 def always(drawn: Drawn) -> list[Rows]:
-    """Rows of what is known in any case: calibrations and priors of the experiment, and errors of certificates."""
+    """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
+    certificates.
+    """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
     found = [*_of_calibration(drawn, drawn.design), _of_shared(drawn, unit)]
     if len(drawn.design.priors):
@@ -176,18 +194,30 @@ def always(drawn: Drawn) -> list[Rows]:
     return found
 
 
-def calibration_rows(drawn: Drawn, experiment: Experiment, item: Calibration, name: str) -> list[Rows]:
+def calibration_rows(
+    drawn: Drawn, experiment: Experiment, item: Calibration, name: str
+) -> list[Rows]:
     """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
     `experiment` has some position, whichever.
 
-    :raises ExperimentError: it is of a length standard that has a certificate already, or more than one length.
+    :raises ExperimentError: it is of a length standard that has a certificate already, or more than
+        one length.
     """
-    if experiment.artefacts[item.artefact].role == "plate" and not isinstance(item, RadiusCalibration):
+    if experiment.artefacts[item.artefact].role == "plate" and not isinstance(
+        item, RadiusCalibration
+    ):
         return _of_calibration(drawn, lay_out(replace(experiment, calibration=(item,), priors=())))
-    named = [k for k, length in enumerate(drawn.design.length_names) if length.rpartition(": ")[0] == item.artefact]
+    named = [
+        k
+        for k, length in enumerate(drawn.design.length_names)
+        if length.rpartition(": ")[0] == item.artefact
+    ]
     if len(named) != 1 or isinstance(item, CoordinateCalibration):
-        text = f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of its certificates'
+        text = (
+            f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
+            " its certificates"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool.calibration", text)])
     if isinstance(item, RadiusCalibration):
         uncertainty = item.standard_uncertainty

@@ -1,4 +1,6 @@
-"""Times of a campaign: the order that costs least change-over, and the run sheet that says what is done when."""
+"""Times of a campaign: the order that costs least change-over, and the run sheet that says what is
+done when.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +14,23 @@ from ballplate.simulator.inputs.settings import listing
 
 from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of
 
-__all__ = ["Completion", "Kind", "RunSheet", "Step", "changeover", "kind_of", "ordered", "run_sheet"]
+__all__ = [
+    "Completion",
+    "Kind",
+    "RunSheet",
+    "Step",
+    "changeover",
+    "kind_of",
+    "ordered",
+    "run_sheet",
+]
 
 
 @dataclass(frozen=True)
 class Completion:
-    """What is missing of a position whose artefact still stands, and the position with all its readings."""
+    """What is missing of a position whose artefact still stands, and the position with all its
+    readings.
+    """
 
     rest: Candidate
     whole: Candidate
@@ -25,12 +38,14 @@ class Completion:
 
 @dataclass(frozen=True)
 class Step:
-    """A position of a run sheet: what to set up, in words, and what to read, with the probes in order.
+    """A position of a run sheet: what to set up, in words, and what to read, with the probes in
+    order.
 
-    `change` says what is changed before it, in `change_seconds`; `seconds` is what it takes by itself, and `start` when
-    its change-over begins, in seconds from the first position that is to be read. What is `done` has neither. Of a
-    position that is completed, `whole` has all readings and `candidate` those still to be taken. One that was
-    interrupted and is not completed is `left` so.
+    `change` says what is changed before it, in `change_seconds`; `seconds` is what it takes by
+    itself, and `start` when its change-over begins, in seconds from the first position that is to
+    be read. What is `done` has neither. Of a position that is completed, `whole` has all readings
+    and `candidate` those still to be taken. One that was interrupted and is not completed is `left`
+    so.
     """
 
     candidate: Candidate
@@ -64,23 +79,29 @@ class Step:
 
 @dataclass(frozen=True)
 class RunSheet:
-    """Positions in the order to read them, those done first, and items of calibration with their price in seconds."""
+    """Positions in the order to read them, those done first, and items of calibration with their
+    price in seconds.
+    """
 
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
-        """All candidates, positions in the order of the sheet, those left interrupted after the others.
+        """All candidates, positions in the order of the sheet, those left interrupted after the
+        others.
 
-        The first position holds the frame of its artefact, which one that was only begun may do badly.
+        The first position holds the frame of its artefact, which one that was only begun may do
+        badly.
         """
         steps = sorted(self.steps, key=lambda step: step.left)
         return (*(step.whole or step.candidate for step in steps), *self.calibration)
 
     @property
     def seconds(self) -> float:
-        """What is yet to be spent: on positions that are not done, changes between them, and calibration."""
+        """What is yet to be spent: on positions that are not done, changes between them, and
+        calibration.
+        """
         of_positions = sum(step.seconds + step.change_seconds for step in self.steps)
         return of_positions + sum(one.seconds for one in self.calibration)
 
@@ -97,11 +118,13 @@ def run_sheet(
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
 ) -> RunSheet:
-    """The run sheet of chosen candidates: the order that costs least, what is done already first and as it was.
+    """The run sheet of chosen candidates: the order that costs least, what is done already first
+    and as it was.
 
-    Candidates that are `done` may be among the chosen ones too. They take no time any more, and as before any first
-    position nothing is changed before the first that is left. A position that is `completed` is that first one, as long
-    as its artefact stands; only its rest takes time. What else is `interrupted` stays as it is.
+    Candidates that are `done` may be among the chosen ones too. They take no time any more, and as
+    before any first position nothing is changed before the first that is left. A position that is
+    `completed` is that first one, as long as its artefact stands; only its rest takes time. What
+    else is `interrupted` stays as it is.
     """
     again = set() if completed is None else {completed.whole.name}
     before = [one for one in done if isinstance(one.item, Position) and one.name not in again]
@@ -124,13 +147,31 @@ def run_sheet(
             balls = f"the rest, {candidate.readings} of {whole.readings} readings: {balls}"
         is_left = is_done and candidate.name in left
         balls += "; left so" if is_left else ""
-        steps.append(Step(candidate, place, probes, balls, words, change, seconds, elapsed, is_done, whole, is_left))
+        steps.append(
+            Step(
+                candidate,
+                place,
+                probes,
+                balls,
+                words,
+                change,
+                seconds,
+                elapsed,
+                is_done,
+                whole,
+                is_left,
+            )
+        )
         elapsed += change + seconds
-    return RunSheet(tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position)))
+    return RunSheet(
+        tuple(steps), tuple(one for one in chosen if not isinstance(one.item, Position))
+    )
 
 
 def _change(
-    one: tuple[Candidate, tuple[str, ...]], other: tuple[Candidate, tuple[str, ...]], changes: ChangeTimes
+    one: tuple[Candidate, tuple[str, ...]],
+    other: tuple[Candidate, tuple[str, ...]],
+    changes: ChangeTimes,
 ) -> tuple[float, str]:
     before, after = kind_of(one[0]), kind_of(other[0])
     words = []
@@ -154,16 +195,27 @@ def _place(candidate: Candidate) -> str:
         turned = "not turned"
         if rotation is not None:
             one = isinstance(rotation, str)
-            turned = f"turned by {rotation}" if one else f"turned by {', '.join(rotation)} about x, y, z"
-        return f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))}, {turned}"
+            turned = (
+                f"turned by {rotation}" if one else f"turned by {', '.join(rotation)} about x, y, z"
+            )
+        return (
+            f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))},"
+            f" {turned}"
+        )
     plane = said.get("plane")
     words = []
     if plane is not None:
-        words.append(f"{'flat' if plane == 'z' else 'upright'}, across {plane} at {plane} = {said['level']}")
+        words.append(
+            f"{'flat' if plane == 'z' else 'upright'}, across {plane} at {plane} = {said['level']}"
+        )
     anchor = "corner" if said.get("corner") is not None else "centre"
     words.append(f"{'lower corner' if anchor == 'corner' else 'centre'} at {_at(said[anchor])}")
     turns = int(said.get("quarter_turns") or 0) % 4
-    words.append(f"turned {90 * turns} deg counter-clockwise seen from +{plane or 'z'}" if turns else "not turned")
+    words.append(
+        f"turned {90 * turns} deg counter-clockwise seen from +{plane or 'z'}"
+        if turns
+        else "not turned"
+    )
     return "; ".join(words)
 
 
@@ -192,9 +244,11 @@ def ordered(
     done: Sequence[Candidate] = (),
     first: Candidate | None = None,
 ) -> tuple[tuple[Candidate, tuple[str, ...]], ...]:
-    """Positions, those `done` first, in the order that costs least change-over, each with the order of its probes.
+    """Positions, those `done` first, in the order that costs least change-over, each with the order
+    of its probes.
 
-    Positions of equal kind keep the order they are given in. Of those that are not done, one may have to be `first`.
+    Positions of equal kind keep the order they are given in. Of those that are not done, one may
+    have to be `first`.
     """
     own = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
     after = first if first is not None else done[-1] if done else None
@@ -211,14 +265,18 @@ def ordered(
         members = [candidate for candidate in own if kind_of(candidate) == visit.kind]
         begun = visit.first
         for k, candidate in enumerate(members):
-            last = visit.last if k == len(members) - 1 else _handed_on(visit, begun, len(members) - k)
+            last = (
+                visit.last if k == len(members) - 1 else _handed_on(visit, begun, len(members) - k)
+            )
             found.append((candidate, _sequence(candidate, begun, last)))
             begun = last
     return tuple(found)
 
 
 def _handed_on(visit: Visit, first: str, left: int) -> str:
-    """The last probe of a position, which the next of the same kind begins with; `left` positions are to come."""
+    """The last probe of a position, which the next of the same kind begins with; `left` positions
+    are to come.
+    """
     others = sorted(visit.kind.probes - {first}) or [first]
     # The last position must not begin with the probe that it is to end with.
     suited = [probe for probe in others if probe != visit.last] if left == 2 else others

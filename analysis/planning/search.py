@@ -1,9 +1,10 @@
 """Selections by local search: a greedy start, then exchanges while any makes the criterion smaller.
 
-An exchange adds one matrix to that of the remaining selection and factors the sum. A position read with a whole plate
-changes about half of the directions that count, and an update of that rank costs as much as the factor anew. What
-keeps a step cheap are small matrices and a sieve: of all candidates that could come in, those are evaluated in full
-that do best by the tangent of the criterion at the present selection.
+An exchange adds one matrix to that of the remaining selection and factors the sum. A position read
+with a whole plate changes about half of the directions that count, and an update of that rank costs
+as much as the factor anew. What keeps a step cheap are small matrices and a sieve: of all
+candidates that could come in, those are evaluated in full that do best by the tangent of the
+criterion at the present selection.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from .information import Information
 # Below this fraction of the whole pool's information a direction counts as undetermined.
 UNDETERMINED = 1e-10
 
-# What is added to the information of selections while they are compared, so that deficient ones compare as well, and
-# what counts in place of the information of undetermined directions.
+# What is added to the information of selections while they are compared, so that deficient ones
+# compare as well, and what counts in place of the information of undetermined directions.
 RIDGE = 1e-13
 
 # Above every criterion.
 LARGE = 1e12
 
-# Candidates that are left at each exchange by the slope of the criterion, and of these by its tangent; all of them are
-# evaluated in full in pools no larger than this.
+# Candidates that are left at each exchange by the slope of the criterion, and of these by its
+# tangent; all of them are evaluated in full in pools no larger than this.
 SLOPED = 64
 SIEVED = 5
 SMALL_POOL = 24
@@ -43,7 +44,8 @@ AT_ONCE = 64
 # A relative gain below this is rounding.
 GAIN = 1e-9
 
-# Binary digits, of the order of that gain, in which criteria are compared: of equal selections the first is taken.
+# Binary digits, of the order of that gain, in which criteria are compared: of equal selections the
+# first is taken.
 COMPARED = 33
 
 
@@ -70,7 +72,9 @@ class Problem:
 
 @dataclass(frozen=True)
 class Found:
-    """A selection: indices of candidates, sorted, and the criterion, infinite where the selection is deficient."""
+    """A selection: indices of candidates, sorted, and the criterion, infinite where the selection
+    is deficient.
+    """
 
     chosen: tuple[int, ...]
     value: float
@@ -82,7 +86,9 @@ class Found:
 
 
 def full_root(information: Array) -> Array | None:
-    """Root R of the covariance R R' of all z, upper triangular, from their information (z, z); None if deficient."""
+    """Root R of the covariance R R' of all z, upper triangular, from their information (z, z); None
+    if deficient.
+    """
     try:
         factor = np.asarray(np.linalg.cholesky(information), float)
     except np.linalg.LinAlgError:
@@ -94,7 +100,9 @@ def full_root(information: Array) -> Array | None:
 
 
 def counted_root(problem: Problem, root: Array) -> Array:
-    """The part of a root of all z that the criterion is about: what is left of the last z when balls are eliminated."""
+    """The part of a root of all z that the criterion is about: what is left of the last z when
+    balls are eliminated.
+    """
     if problem.criterion.about_balls:
         return root
     own = problem.information.shared
@@ -102,7 +110,9 @@ def counted_root(problem: Problem, root: Array) -> Array:
 
 
 def value(problem: Problem, chosen: Collection[int]) -> float:
-    """Criterion of a selection, infinite if it leaves something undetermined, or lacks what every choice needs."""
+    """Criterion of a selection, infinite if it leaves something undetermined, or lacks what every
+    choice needs.
+    """
     if problem.lacking(chosen):
         return np.inf
     root = full_root(problem.information.of(chosen))
@@ -121,20 +131,23 @@ def _inverse(triangle: Array) -> Array:
 
 
 def _is_deficient(inverse: Array) -> bool:
-    """Whether something is undetermined, by the inverse (z, z) of a Cholesky factor: by the sum of all variances.
+    """Whether something is undetermined, by the inverse (z, z) of a Cholesky factor: by the sum of
+    all variances.
 
-    A small pivot is a sure sign as well, but often there is none: of a null vector whose last components are small,
-    rounding or the ridge is divided by their squares, and spread over several pivots.
+    A small pivot is a sure sign as well, but often there is none: of a null vector whose last
+    components are small, rounding or the ridge is divided by their squares, and spread over several
+    pivots.
     """
     return bool(np.vdot(inverse, inverse) > 1.0 / UNDETERMINED)
 
 
 class Losses:
-    """What is made small, of selections, each computed once: the criterion, or for deficient ones something larger.
+    """What is made small, of selections, each computed once: the criterion, or for deficient ones
+    something larger.
 
-    With `by_pivots` a selection counts as deficient by a small pivot alone. Some that are deficient then count as if
-    they were not, with the criterion that the ridge leaves them: no verdict, but it leads from selections that are
-    just enough to others.
+    With `by_pivots` a selection counts as deficient by a small pivot alone. Some that are deficient
+    then count as if they were not, with the criterion that the ridge leaves them: no verdict, but
+    it leads from selections that are just enough to others.
     """
 
     def __init__(self, problem: Problem, by_pivots: bool = False) -> None:
@@ -159,15 +172,19 @@ class Losses:
 
 
 def _ridged_root(information: Array) -> Array | None:
-    """Square root of the inverse of information (z, z) with the ridge; None where a pivot is small."""
+    """Square root of the inverse of information (z, z) with the ridge; None where a pivot is
+    small.
+    """
     factor = np.asarray(np.linalg.cholesky(_ridged(information)), float)
     return None if (np.diagonal(factor) ** 2).min() < UNDETERMINED else _inverse(factor).T
 
 
 def _in_place(information: Array) -> float:
-    """What is made small in place of the criterion, of information (z, z) that leaves something undetermined.
+    """What is made small in place of the criterion, of information (z, z) that leaves something
+    undetermined.
 
-    It falls with the determinant, so that what determines most directions, and those best, is chosen first.
+    It falls with the determinant, so that what determines most directions, and those best, is
+    chosen first.
     """
     scale = _scale(information)
     root = np.sqrt(scale)
@@ -178,20 +195,27 @@ def _in_place(information: Array) -> float:
 
 
 def _scale(information: Array) -> Array:
-    """What rounding is relative to in each of the z of information (..., z, z): 1, or more beside what is exact."""
+    """What rounding is relative to in each of the z of information (..., z, z): 1, or more beside
+    what is exact.
+    """
     return np.maximum(np.diagonal(information, axis1=-2, axis2=-1), 1.0)
 
 
 def _ridged(information: Array) -> Array:
-    """Information (..., z, z) with the ridge, which makes it positive definite whatever is undetermined."""
+    """Information (..., z, z) with the ridge, which makes it positive definite whatever is
+    undetermined.
+    """
     return information + RIDGE * _scale(information)[..., None] * np.eye(information.shape[-1])
 
 
-def _sieve(problem: Problem, information: Array, added: Integers, by_pivots: bool = False) -> tuple[Integers, Array]:
-    """Candidates that may be the best to add to `information`, and the criterion's tangent with each of them.
+def _sieve(
+    problem: Problem, information: Array, added: Integers, by_pivots: bool = False
+) -> tuple[Integers, Array]:
+    """Candidates that may be the best to add to `information`, and the criterion's tangent with
+    each of them.
 
-    The first sieve is the slope of the criterion where something of every candidate is added, the second its tangent
-    there with each candidate added by itself.
+    The first sieve is the slope of the criterion where something of every candidate is added, the
+    second its tangent there with each candidate added by itself.
     """
     whole, matrices = np.eye(len(information)), problem.information.matrices
     # All candidates together have the identity, up to what the base has.
@@ -245,18 +269,25 @@ def best_addition(
     return int(added[best]), float(after[best])
 
 
-def fill(problem: Problem, chosen: Collection[int], losses: Losses, thorough: bool = True) -> frozenset[int]:
+def fill(
+    problem: Problem, chosen: Collection[int], losses: Losses, thorough: bool = True
+) -> frozenset[int]:
     """Add candidates, the best first, as long as the limits allow one and it gains anything.
 
-    Where time is limited and the filling `thorough`, what is best may also be what gains most for the time it takes,
-    whichever ends better.
+    Where time is limited and the filling `thorough`, what is best may also be what gains most for
+    the time it takes, whichever ends better.
     """
     timed = thorough and problem.constraints.budget.seconds is not None
     ways = (False, True) if timed else (False,)
-    return min((_filled(problem, frozenset(chosen), losses, per_second) for per_second in ways), key=losses.of)
+    return min(
+        (_filled(problem, frozenset(chosen), losses, per_second) for per_second in ways),
+        key=losses.of,
+    )
 
 
-def _filled(problem: Problem, members: frozenset[int], losses: Losses, per_second: bool) -> frozenset[int]:
+def _filled(
+    problem: Problem, members: frozenset[int], losses: Losses, per_second: bool
+) -> frozenset[int]:
     while (found := best_addition(problem, members, losses, per_second)) is not None:
         addition, after = found
         if after >= losses.of(members) * (1 - GAIN):
@@ -266,12 +297,14 @@ def _filled(problem: Problem, members: frozenset[int], losses: Losses, per_secon
 
 
 @single_threaded
-def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: int, thorough: bool = False) -> Found:
+def improve(
+    problem: Problem, start: Collection[int], losses: Losses, at_once: int, thorough: bool = False
+) -> Found:
     """The best selection that exchanges lead to from a start within the limits.
 
-    One candidate is taken out at a time and the gap filled anew until that gains nothing, then two, and so on up to
-    `at_once`. Where it is `thorough`, the gap is filled beginning with each candidate in turn, which gets out of traps
-    that tight limits set.
+    One candidate is taken out at a time and the gap filled anew until that gains nothing, then two,
+    and so on up to `at_once`. Where it is `thorough`, the gap is filled beginning with each
+    candidate in turn, which gets out of traps that tight limits set.
     """
     members = fill(problem, start, losses)
     size = 1
@@ -282,7 +315,10 @@ def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: i
                 left = members.difference(gone)
                 found = fill(problem, left, losses, thorough)
                 if thorough:
-                    begun = [fill(problem, left | {int(k)}, losses) for k in problem.constraints.additions(left)]
+                    begun = [
+                        fill(problem, left | {int(k)}, losses)
+                        for k in problem.constraints.additions(left)
+                    ]
                     found = min([found, *begun], key=losses.of)
                 if losses.of(found) < losses.of(members) * (1 - GAIN):
                     members = found
@@ -291,18 +327,25 @@ def improve(problem: Problem, start: Collection[int], losses: Losses, at_once: i
 
 
 def ranked_additions(problem: Problem, chosen: Collection[int]) -> list[tuple[int, float]]:
-    """Candidates that may be added to a selection, with the criterion that each would give, smallest first."""
+    """Candidates that may be added to a selection, with the criterion that each would give,
+    smallest first.
+    """
     added = problem.constraints.additions(chosen)
     losses = [(int(k), value(problem, {*chosen, int(k)})) for k in added]
     return sorted(losses, key=lambda item: (float(comparable(item[1], COMPARED)), item[0]))
 
 
 def starts(problem: Problem, ranked: Sequence[int], count: int, seed: int) -> list[frozenset[int]]:
-    """Selections to start from: what has to be chosen alone, filled by rank, and `count` filled in random order."""
+    """Selections to start from: what has to be chosen alone, filled by rank, and `count` filled in
+    random order.
+    """
     must = problem.constraints.must
     found = [must]
     generator = np.random.default_rng(np.random.SeedSequence(seed))
-    orders = [list(ranked), *(generator.permutation(problem.constraints.count).tolist() for _ in range(count))]
+    orders = [
+        list(ranked),
+        *(generator.permutation(problem.constraints.count).tolist() for _ in range(count)),
+    ]
     for order in orders:
         members = must
         for k in order:

@@ -42,11 +42,15 @@ class Campaign(Selection, Result):
     @property
     def sheet(self) -> RunSheet:
         """The choice in the order in which it is to be read."""
-        return run_sheet(self.chosen, self.pool.changes, self.done, self.completed, self.interrupted)
+        return run_sheet(
+            self.chosen, self.pool.changes, self.done, self.completed, self.interrupted
+        )
 
     @property
     def chosen_experiment(self) -> Experiment:
-        """The experiment with the chosen positions and certificates alone, in the order of the run sheet."""
+        """The experiment with the chosen positions and certificates alone, in the order of the run
+        sheet.
+        """
         return with_chosen(self.experiment, self.sheet.chosen)
 
     def headline(self) -> str:
@@ -67,7 +71,8 @@ class Campaign(Selection, Result):
         return list(sheet_data(self.sheet)["steps"])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """The criterion against the budget, what each position gains, and the positions in the volume.
+        """The criterion against the budget, what each position gains, and the positions in the
+        volume.
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
@@ -78,7 +83,9 @@ class Campaign(Selection, Result):
 
 
 def _lines(found: Campaign) -> list[str]:
-    """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the run sheet."""
+    """A campaign as lines of text: the choice beside its bound, gains, the curve, U1 to U6 and the
+    run sheet.
+    """
     lines = [
         f"{found.plan.label}: {found.plan.title}",
         f"{len(found.pool.candidates)} candidates{_dropped(found)}; no more than {found.budget}",
@@ -87,13 +94,21 @@ def _lines(found: Campaign) -> list[str]:
         *_comparison(found),
     ]
     if not found.is_determined:
-        lines.append("no choice was found that determines everything; below is what the nearest one leaves open")
+        lines.append(
+            "no choice was found that determines everything; below is what the nearest one leaves"
+            " open"
+        )
     elif math.isnan(found.bound):
         lines.append(f"there is no bound of {found.criterion}")
     else:
-        lines.append(f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}")
+        lines.append(
+            f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}"
+        )
     if found.excluded:
-        lines.append(f"left out of {found.criterion}: {found.excluded} that no choice from this pool determines")
+        lines.append(
+            f"left out of {found.criterion}: {found.excluded} that no choice from this pool"
+            " determines"
+        )
     lines += _interrupted(found)
     if found.gains:
         lines += ["", *_gain_table(found)]
@@ -107,27 +122,38 @@ def _interrupted(found: Campaign) -> list[str]:
     names = {one.name for one in found.chosen}
     lines = []
     for one in found.interrupted:
-        text = f"{one.name} was interrupted after {one.readings} reading{'' if one.readings == 1 else 's'}"
+        text = (
+            f"{one.name} was interrupted after {one.readings}"
+            f" reading{'' if one.readings == 1 else 's'}"
+        )
         if found.completed is not None and found.completed.whole.name == one.name:
             text += f"; {found.completed.rest.readings} more complete it"
-        elif again := [name for name in names if name != one.name and base_name(name) == base_name(one.name)]:
+        elif again := [
+            name for name in names if name != one.name and base_name(name) == base_name(one.name)
+        ]:
             text += f'; it is set up again as "{again[0]}"'
         else:
             text += "; it is left so"
         lines.append(text)
     if found.left_open:
         count = "one direction" if found.left_open == 1 else f"{found.left_open} directions"
-        lines.append(f"too little was read there to determine {count} of where it stood; nothing else depends on that")
+        lines.append(
+            f"too little was read there to determine {count} of where it stood; nothing else"
+            " depends on that"
+        )
     for one in found.ignored:
         lines.append(
-            f"{one.name} is left out: nothing else worth its time reads the other balls of {one.item.artefact}; "
-            "take its readings out of the file"
+            f"{one.name} is left out: nothing else worth its time reads the other balls of"
+            f" {one.item.artefact}; take its readings out of the file"
         )
     return lines
 
 
 def _dropped(found: Campaign) -> str:
-    words = [f"{count} {reason}" for reason, count in sorted(found.pool.dropped.items(), key=lambda item: -item[1])]
+    words = [
+        f"{count} {reason}"
+        for reason, count in sorted(found.pool.dropped.items(), key=lambda item: -item[1])
+    ]
     if not words:
         return ""
     more = [f"{len(words) - TOLD} reasons more"] if len(words) > TOLD else []
@@ -164,12 +190,16 @@ def _percent(ratio: float) -> str:
 def _gain_table(found: Campaign) -> list[str]:
     rows = [["", f"{found.criterion} without it", "with it", "minutes"]]
     rows += [["chosen: " + gain.candidate.name, *_gain(found, gain)] for gain in found.gains]
-    rows += [["left out: " + gain.candidate.name, *_gain(found, gain)] for gain in found.left_out[:TOLD]]
+    rows += [
+        ["left out: " + gain.candidate.name, *_gain(found, gain)] for gain in found.left_out[:TOLD]
+    ]
     return aligned(rows, [False, True, True, True])
 
 
 def _gain(found: Campaign, gain: Gain) -> list[str]:
-    without, with_ = (" ".join(_value(found, value)).strip("- ").strip() for value in (gain.without, gain.with_))
+    without, with_ = (
+        " ".join(_value(found, value)).strip("- ").strip() for value in (gain.without, gain.with_)
+    )
     return [without, with_, f"{gain.candidate.seconds / 60:.0f}"]
 
 

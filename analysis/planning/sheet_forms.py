@@ -33,11 +33,14 @@ COLUMNS = (
 )
 
 STYLE = """
-body { font: 15px/1.4 system-ui, sans-serif; color: #222; max-width: 60em; margin: 2em auto; padding: 0 1em; }
+body { font: 15px/1.4 system-ui, sans-serif; color: #222; max-width: 60em;
+  margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.4em; margin-bottom: 0.2em; }
-.step { display: flex; gap: 1em; border-top: 1px solid #999; padding: 0.7em 0; break-inside: avoid; }
+.step { display: flex; gap: 1em; border-top: 1px solid #999; padding: 0.7em 0;
+  break-inside: avoid; }
 .step.done { color: #777; }
-.tick { flex: none; width: 1.3em; height: 1.3em; border: 1.5px solid #222; margin-top: 0.15em; appearance: none; }
+.tick { flex: none; width: 1.3em; height: 1.3em; border: 1.5px solid #222;
+  margin-top: 0.15em; appearance: none; }
 .tick:checked { background: #222; }
 .words { flex: 1; min-width: 0; overflow-wrap: anywhere; }
 .words h2 { font-size: 1.05em; margin: 0; }
@@ -62,7 +65,9 @@ def summary(sheet: RunSheet) -> str:
     todo = [step for step in sheet.steps if not step.done]
     done = len(sheet.steps) - len(todo)
     words = [_count(len(todo), "position"), _count(sum(step.readings for step in todo), "reading")]
-    words += [_count(len(sheet.calibration), "item") + " of calibration"] if sheet.calibration else []
+    words += (
+        [_count(len(sheet.calibration), "item") + " of calibration"] if sheet.calibration else []
+    )
     text = f"{', '.join(words)}: {sheet.hours:.2f} h"
     change = sum(step.change_seconds for step in todo)
     text += f", of which change-over {change / 3600.0:.2f} h" if change else ""
@@ -75,15 +80,31 @@ def sheet_lines(sheet: RunSheet) -> list[str]:
     for number, step in enumerate(sheet.steps, 1):
         start = "done" if step.done else _clock(step.start)
         minutes = "" if step.done else f"{(step.seconds + step.change_seconds) / 60.0:.0f}"
-        rows.append([str(number), start, minutes, step.name, ", ".join(step.probes), step.balls, str(step.readings)])
+        rows.append(
+            [
+                str(number),
+                start,
+                minutes,
+                step.name,
+                ", ".join(step.probes),
+                step.balls,
+                str(step.readings),
+            ]
+        )
     lines = aligned(rows, [True, True, True, False, False, False, True]) if sheet.steps else []
-    lines += [f"{number} {step.name}: {_words(step)}" for number, step in enumerate(sheet.steps, 1) if not step.done]
+    lines += [
+        f"{number} {step.name}: {_words(step)}"
+        for number, step in enumerate(sheet.steps, 1)
+        if not step.done
+    ]
     lines += [f"calibration {one.name}: {_price(one.seconds)}" for one in sheet.calibration]
     return [in_one_line(line) for line in (*lines, summary(sheet))]
 
 
 def sheet_csv(sheet: RunSheet) -> str:
-    """The run sheet as CSV with a header; minutes are decimal numbers, of items of calibration their price."""
+    """The run sheet as CSV with a header; minutes are decimal numbers, of items of calibration
+    their price.
+    """
     out = io.StringIO()
     writer = CsvWriter(out)
     writer.writerow(COLUMNS)
@@ -91,14 +112,19 @@ def sheet_csv(sheet: RunSheet) -> str:
         writer.writerow(_row(number, step))
     for one in sheet.calibration:
         minutes = f"{one.seconds / 60.0:.10g}"
-        writer.writerow(["", "", one.name, one.item.artefact, "", "calibration", "", "", 0, "", 0, minutes, ""])
+        writer.writerow(
+            ["", "", one.name, one.item.artefact, "", "calibration", "", "", 0, "", 0, minutes, ""]
+        )
     return out.getvalue()
 
 
 def sheet_markdown(sheet: RunSheet, title: str) -> str:
     """The run sheet as Markdown, a table under a heading."""
     lines = [f"# {_cell(title)}", "", _cell(summary(sheet)), ""]
-    lines += ["| | start | min | position | set up | probes | balls | readings | before |", "|" + "---|" * 9]
+    lines += [
+        "| | start | min | position | set up | probes | balls | readings | before |",
+        "|" + "---|" * 9,
+    ]
     for number, step in enumerate(sheet.steps, 1):
         cells = [
             str(number),
@@ -144,7 +170,8 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
 
 
 def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
-    """The run sheet as a page of HTML that needs no other file: to print and to tick off, with a drawing of each place.
+    """The run sheet as a page of HTML that needs no other file: to print and to tick off, with a
+    drawing of each place.
 
     `experiment` has the artefacts and the volume.
     """
@@ -152,22 +179,35 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
     for number, step in enumerate(sheet.steps, 1):
         parts.append(_step(number, step, experiment))
     if sheet.calibration:
-        items = [f"<td>{_text(one.name)}</td><td>{_price(one.seconds)}</td>" for one in sheet.calibration]
+        items = [
+            f"<td>{_text(one.name)}</td><td>{_price(one.seconds)}</td>" for one in sheet.calibration
+        ]
         rows = "".join(f"<tr>{item}</tr>" for item in items)
-        parts.append(f"<h2>Calibration</h2><table><tr><th>item</th><th>price</th></tr>{rows}</table>")
+        parts.append(
+            f"<h2>Calibration</h2><table><tr><th>item</th><th>price</th></tr>{rows}</table>"
+        )
     return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{_text(title)}</title>'
-        f"<style>{STYLE}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n"
+        '<!DOCTYPE html>\n<html lang="en"><head><meta'
+        f' charset="utf-8"><title>{_text(title)}</title><style>{STYLE}</style></head>\n<body>\n'
+        + "\n".join(parts)
+        + "\n</body></html>\n"
     )
 
 
 def _step(number: int, step: Step, experiment: Experiment) -> str:
     probes = "".join(
-        f'<li><input type="checkbox" class="tick" aria-label="{_text(probe)} read"> {_text(probe)}</li>'
+        f'<li><input type="checkbox" class="tick" aria-label="{_text(probe)} read">'
+        f" {_text(probe)}</li>"
         for probe in step.probes
     )
-    change = f'<p class="change">First change {_text(step.change)} ({_price(step.change_seconds)})</p>'
-    times = "done" if step.done else f"{_clock(step.start)}<br>{(step.seconds + step.change_seconds) / 60.0:.0f} min"
+    change = (
+        f'<p class="change">First change {_text(step.change)} ({_price(step.change_seconds)})</p>'
+    )
+    times = (
+        "done"
+        if step.done
+        else f"{_clock(step.start)}<br>{(step.seconds + step.change_seconds) / 60.0:.0f} min"
+    )
     rows = [
         ("artefact", _text(step.artefact)),
         ("set up", _text(step.place)),
@@ -179,7 +219,8 @@ def _step(number: int, step: Step, experiment: Experiment) -> str:
     checked = " checked" if step.done else ""
     return (
         f'<section class="step{" done" if step.done else ""}">'
-        f'<input type="checkbox" class="tick" aria-label="position {number} done"{checked}><div class="words">'
+        f'<input type="checkbox" class="tick" aria-label="position {number} done"{checked}><div'
+        ' class="words">'
         f"<h2>{number}. {_text(step.name)}</h2>{change if step.change else ''}"
         f"<dl>{''.join(f'<dt>{key}</dt><dd>{value}</dd>' for key, value in rows)}</dl></div>"
         f"{place_drawing(step.candidate, experiment)}"
@@ -224,7 +265,13 @@ def _count(number: int, word: str) -> str:
 
 
 def _cell(text: str) -> str:
-    return in_one_line(text).replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+    return (
+        in_one_line(text)
+        .replace("\\", "\\\\")
+        .replace("|", "\\|")
+        .replace("<", "&lt;")
+        .replace("*", "\\*")
+    )
 
 
 def _text(text: str) -> str:

@@ -1,9 +1,10 @@
 """One description of a space of directions, whatever basis of it a decomposition gave.
 
-Any mixture of the directions that observations leave open is open as well, and a decomposition returns one basis or
-another as rounding falls. Told are elementary directions: each has a parameter of its own that the others do not
-touch, so that none involves all that another does. Which parameters these are follows from the space alone, those first
-that have most freedom in it, and of equal ones the first by the order of names.
+Any mixture of the directions that observations leave open is open as well, and a decomposition
+returns one basis or another as rounding falls. Told are elementary directions: each has a parameter
+of its own that the others do not touch, so that none involves all that another does. Which
+parameters these are follows from the space alone, those first that have most freedom in it, and of
+equal ones the first by the order of names.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from ballplate.simulator.numerics.rounding import comparable
 
 
 def elementary_mixture(directions: Array) -> Array:
-    """Mixtures (k, k) that make elementary directions of linearly independent ones (s, k), in comparable units.
+    """Mixtures (k, k) that make elementary directions of linearly independent ones (s, k), in
+    comparable units.
 
     >>> mixed = np.array([[1.0, 1.0], [1.0, -1.0], [0.5, 0.5]])
     >>> (mixed @ elementary_mixture(mixed)).tolist()
@@ -23,7 +25,8 @@ def elementary_mixture(directions: Array) -> Array:
     left = np.linalg.qr(directions)[0]
     own = []
     for _ in range(directions.shape[1]):
-        # What is left of a parameter's row is how far the space can change it without those chosen before.
+        # What is left of a parameter's row is how far the space can change it without those chosen
+        # before.
         row = int(comparable((left**2).sum(axis=1)).argmax())
         unit = left[row] / np.linalg.norm(left[row])
         left = left - np.outer(left @ unit, unit)
@@ -31,12 +34,16 @@ def elementary_mixture(directions: Array) -> Array:
     return np.asarray(np.linalg.inv(directions[own]))
 
 
-def principal_directions(values: Array, root: Array, effect: Array, scale: Array) -> tuple[Array, Array]:
-    """Directions (s, r) and the lengths (r,) of their effects, in one basis also where singular values are equal.
+def principal_directions(
+    values: Array, root: Array, effect: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Directions (s, r) and the lengths (r,) of their effects, in one basis also where singular
+    values are equal.
 
-    `root` (s, r) holds right singular vectors over their `values` (r,), largest first, and `effect` (m, r) what each
-    does. Those of equal values are turned until their effects are orthogonal, the largest last; of those whose effects
-    are equal, too, the elementary ones are taken, in units of `scale` (s,).
+    `root` (s, r) holds right singular vectors over their `values` (r,), largest first, and `effect`
+    (m, r) what each does. Those of equal values are turned until their effects are orthogonal, the
+    largest last; of those whose effects are equal, too, the elementary ones are taken, in units of
+    `scale` (s,).
     """
     root, size = root.copy(), np.sqrt((effect**2).sum(axis=0))
     for group in _equal(values):

@@ -1,8 +1,9 @@
-"""Why bars and gauges leave a machine's scales or squareness open: directions that are missing, lengths not known.
+"""Why bars and gauges leave a machine's scales or squareness open: directions that are missing,
+lengths not known.
 
-A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S u: a sum of the six
-products of its direction cosines. From a Bryan gauge comes the same less what a shift of its pivot would do. What is
-open of the six is told as what bars have in common.
+A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S
+u: a sum of the six products of its direction cosines. From a Bryan gauge comes the same less what a
+shift of its pivot would do. What is open of the six is told as what bars have in common.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     if is_free:
         names = " and ".join(design.length_names)
         found.append(
-            f"no length is known ({names}): the overall scale of the machine stays open until one is calibrated"
+            f"no length is known ({names}): the overall scale of the machine stays open until one"
+            " is calibrated"
         )
     left = _less(strains, overall) if is_free else strains
     missing = _what_is_missing(design, strains, left) if left.shape[1] else ""
@@ -47,11 +49,16 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
 
 
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
-    """Strains (products, k), orthonormal columns, that some open change of the machine's errors amounts to."""
+    """Strains (products, k), orthonormal columns, that some open change of the machine's errors
+    amounts to.
+    """
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
     fields = without_rigid_motion(design.points, jacobian @ open_[layout.model])
-    basis = np.stack([design.points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))], 2)
+    basis = np.stack(
+        [design.points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
+        2,
+    )
     wanted = without_rigid_motion(design.points, basis - basis.mean(axis=0))
     flat = fields.reshape(-1, fields.shape[2])
     flat = flat[:, (flat**2).sum(axis=0) > 0.0]
@@ -65,9 +72,11 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
 
 
 def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
-    """What all directions have in common that leaves strains open; empty where another reason must do.
+    """What all directions have in common that leaves strains open; empty where another reason must
+    do.
 
-    `left` is what remains of the open strains without the overall scale of a machine whose lengths are all unknown.
+    `left` is what remains of the open strains without the overall scale of a machine whose lengths
+    are all unknown.
     """
     given, d = design.lengths, design.dimension
     position = design.readings.position[given.first]
@@ -112,7 +121,9 @@ def _quadric(form: Array) -> str:
     if small.sum() == 1 and len(values) == 3:
         high, low = np.argmax(values), np.argmin(values)
         parts = [np.sqrt(values[high]) * vectors[:, high], np.sqrt(-values[low]) * vectors[:, low]]
-        planes = sorted(_plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1]))
+        planes = sorted(
+            _plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1])
+        )
         return f"lies parallel to {planes[0]} or {planes[1]}"
     for i in range(len(values)):
         others = np.delete(values, i)
@@ -123,9 +134,15 @@ def _quadric(form: Array) -> str:
 
 
 def _told(strains: Array, d: int, without_one: bool) -> str:
-    """Scales and squareness that are open by themselves, in words; others as mixtures of them, one of them left out."""
+    """Scales and squareness that are open by themselves, in words; others as mixtures of them, one
+    of them left out.
+    """
     pairs = list(combinations_with_replacement(range(d), 2))
-    pure = [pair for pair, unit in zip(pairs, np.eye(len(pairs)), strict=True) if _is_among(unit, strains)]
+    pure = [
+        pair
+        for pair, unit in zip(pairs, np.eye(len(pairs)), strict=True)
+        if _is_among(unit, strains)
+    ]
     scales = [AXES[i].upper() for i, j in pure if i == j]
     square = [(AXES[i].upper(), AXES[j].upper()) for i, j in pure if i < j]
     words = []
@@ -143,11 +160,17 @@ def _told(strains: Array, d: int, without_one: bool) -> str:
         for pair in pure:
             touched[pairs.index(pair)] = False
         names = [
-            f"the scale of {AXES[i].upper()}" if i == j else f"the squareness of {AXES[j].upper()} to {AXES[i].upper()}"
+            (
+                f"the scale of {AXES[i].upper()}"
+                if i == j
+                else f"the squareness of {AXES[j].upper()} to {AXES[i].upper()}"
+            )
             for (i, j), one in zip(pairs, touched, strict=True)
             if one
         ]
-        words.append(f"{'a combination' if more == 1 else f'{more} combinations'} of {listed(names)}")
+        words.append(
+            f"{'a combination' if more == 1 else f'{more} combinations'} of {listed(names)}"
+        )
     return " nor ".join(words)
 
 
@@ -162,7 +185,11 @@ def _axis(vector: Array) -> str:
 
 def _plane(normal: Array) -> str:
     axis = _axis(normal)
-    return f"the {AXES.replace(axis, '')} plane" if len(axis) == 1 else f"the plane perpendicular to {axis}"
+    return (
+        f"the {AXES.replace(axis, '')} plane"
+        if len(axis) == 1
+        else f"the plane perpendicular to {axis}"
+    )
 
 
 def _size(d: int) -> int:

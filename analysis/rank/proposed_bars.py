@@ -1,4 +1,6 @@
-"""Bars, and places of a Bryan gauge, that would tell what others leave open: the smallest set of natural ones."""
+"""Bars, and places of a Bryan gauge, that would tell what others leave open: the smallest set of
+natural ones.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,14 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.geometry.directions import directions
 from ballplate.simulator.machines.protocol import Array
 
-# Singular values below this fraction of the largest: what readings tell of a direction through their own scatter only.
+# Singular values below this fraction of the largest: what readings tell of a direction through
+# their own scatter only.
 MISSING = 1e-3
 # What is added is to tell more than that.
 CLEARLY = 1e-2
 
-# Elevations that a gauge on a table can reach come first, and those all round are easier read than upright planes.
+# Elevations that a gauge on a table can reach come first, and those all round are easier read than
+# upright planes.
 ELEVATIONS = (60, 30, 45, 15, 75)
 AZIMUTHS = (0, 90, 45, 135)
 
@@ -26,9 +30,11 @@ def products(u: Array) -> Array:
 
 
 def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
-    """In words what would leave nothing open of strains (products, k) but the `overall` one; empty if nothing simple.
+    """In words what would leave nothing open of strains (products, k) but the `overall` one; empty
+    if nothing simple.
 
-    Every proposal is verified by the rank of what all lengths together tell of strains, pivots and unknown lengths.
+    Every proposal is verified by the rank of what all lengths together tell of strains, pivots and
+    unknown lengths.
     """
     given = design.lengths
     gauge_only = bool(given.to_pivot.all())
@@ -41,13 +47,18 @@ def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
     wanted = strains.shape[1] - (overall is not None)
     for size in range(1 if gauge_only else wanted, (3 if gauge_only else wanted) + 1):
         for chosen in combinations(range(len(pool)), size):
-            if _leave_open(np.concatenate([rows, *(more[k] for k in chosen)]), strains) == strains.shape[1] - wanted:
+            if (
+                _leave_open(np.concatenate([rows, *(more[k] for k in chosen)]), strains)
+                == strains.shape[1] - wanted
+            ):
                 return _in_words([pool[k][:2] for k in chosen], gauge_only)
     return ""
 
 
 def _rows(design: Design, u: Array, like: np.ndarray) -> Array:
-    """Derivatives (m, products + pivots + lengths) of lengths in directions u (m, d) that are otherwise as others."""
+    """Derivatives (m, products + pivots + lengths) of lengths in directions u (m, d) that are
+    otherwise as others.
+    """
     given, d = design.lengths, design.dimension
     position = design.readings.position[given.first[like]]
     pivots = np.zeros((len(u), len(design.position_names), d))
@@ -82,22 +93,38 @@ def bar_directions(d: int) -> Iterator[tuple[str, str, Array]]:
             plane = f"in the {'xyz'[i]}{'xyz'[j]} plane at {angle} deg"
             yield "", plane, (axes[i : i + 1] + sign * axes[j : j + 1]) / np.sqrt(2.0)
     for signs in ((1, 1), (-1, 1), (1, -1), (-1, -1)) if d == 3 else ():
-        yield "", f"along the diagonal ({signs[0]}, {signs[1]}, 1)", np.array([[*signs, 1.0]]) / np.sqrt(3.0)
+        yield (
+            "",
+            f"along the diagonal ({signs[0]}, {signs[1]}, 1)",
+            np.array([[*signs, 1.0]]) / np.sqrt(3.0),
+        )
 
 
 def _places() -> Iterator[tuple[str, str, Array]]:
-    """Kind, words and directions (m, 3): rings around the pivot, and upright half circles through the top."""
+    """Kind, words and directions (m, 3): rings around the pivot, and upright half circles through
+    the top.
+    """
     for up in ELEVATIONS:
-        yield "elevation", f"{up}", directions(tuple((np.radians(30.0 * k), np.radians(up)) for k in range(12)))
+        yield (
+            "elevation",
+            f"{up}",
+            directions(tuple((np.radians(30.0 * k), np.radians(up)) for k in range(12))),
+        )
     for azimuth in AZIMUTHS:
-        sides = [(np.radians(azimuth + side), np.radians(up)) for side in (0, 180) for up in (15, 30, 45, 60, 75)]
+        sides = [
+            (np.radians(azimuth + side), np.radians(up))
+            for side in (0, 180)
+            for up in (15, 30, 45, 60, 75)
+        ]
         yield "azimuth", f"{azimuth} and {azimuth + 180}", directions(tuple(sides))
 
 
 def _in_words(chosen: list[tuple[str, str]], gauge_only: bool) -> str:
     if not gauge_only:
         words = [f"{kind} {what}".strip() for kind, what in chosen]
-        return "add for example " + listed([f"{'one' if k else 'a bar'} {one}" for k, one in enumerate(words)])
+        return "add for example " + listed(
+            [f"{'one' if k else 'a bar'} {one}" for k, one in enumerate(words)]
+        )
     rings = [what for kind, what in chosen if kind == "elevation"]
     sides = [what for kind, what in chosen if kind == "azimuth"]
     height = "an elevation" if len(rings) == 1 else "elevations"

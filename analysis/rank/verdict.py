@@ -1,7 +1,8 @@
 """What a design cannot determine, in the names of errors, balls and positions.
 
-A null direction is a change of parameters that no observation notices. It is told as what trades against
-what: error functions with their size and shape, the deformation of the artefact, the motion of positions.
+A null direction is a change of parameters that no observation notices. It is told as what trades
+against what: error functions with their size and shape, the deformation of the artefact, the motion
+of positions.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ ROUNDING = 1e-9
 # A gap beyond this is one to mere rounding, and counts as this.
 GREAT = 1e9
 
-# A direction is weak when one standard deviation along it moves corrected points, relative to one another, by more
-# than the target accuracy at half the volume's diagonal or, without a target, this many times the repeatability.
+# A direction is weak when one standard deviation along it moves corrected points, relative to one
+# another, by more than the target accuracy at half the volume's diagonal or, without a target, this
+# many times the repeatability.
 WEAK = 10.0
 
 # Curves that no polynomial of this degree describes are called irregular.
@@ -40,7 +42,9 @@ SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 @dataclass(frozen=True)
 class FunctionPart:
-    """An error function's share of a direction: its largest value along the axis, in `unit`, and its shape."""
+    """An error function's share of a direction: its largest value along the axis, in `unit`, and
+    its shape.
+    """
 
     name: str
     meaning: str
@@ -51,7 +55,9 @@ class FunctionPart:
 
 @dataclass(frozen=True)
 class ArtefactPart:
-    """An artefact's share: the largest displacement of a ball in metres, and the deformation in words."""
+    """An artefact's share: the largest displacement of a ball in metres, and the deformation in
+    words.
+    """
 
     name: str
     peak: float
@@ -61,7 +67,9 @@ class ArtefactPart:
 
 @dataclass(frozen=True)
 class PositionPart:
-    """A position's or a probe's share: its shift in metres, its turn in radians, and their axes in words if any."""
+    """A position's or a probe's share: its shift in metres, its turn in radians, and their axes in
+    words if any.
+    """
 
     name: str
     shift: float
@@ -82,10 +90,11 @@ class LengthPart:
 class Direction:
     """A change of parameters that observations do not show, or show too weakly.
 
-    Null directions are scaled so that the part that moves points most moves them by one micrometre; weak ones are
-    as long as their standard deviation. `standard_deviation` is what a weak one adds to corrected points, relative
-    to one another, in metres, as the root mean square over the evaluation `points`; it adds more than `limit`, beyond
-    which a direction is weak, at `beyond` of them. It is infinite for a null direction.
+    Null directions are scaled so that the part that moves points most moves them by one micrometre;
+    weak ones are as long as their standard deviation. `standard_deviation` is what a weak one adds
+    to corrected points, relative to one another, in metres, as the root mean square over the
+    evaluation `points`; it adds more than `limit`, beyond which a direction is weak, at `beyond` of
+    them. It is infinite for a null direction.
     """
 
     functions: tuple[FunctionPart, ...]
@@ -113,15 +122,19 @@ def rank_complaint(deficiency: int, expected: int | None) -> str:
     found = f"rank deficiency {deficiency}" if deficiency else "full rank"
     if expected is None:
         return f"{found}, and the file does not say expected_rank_deficiency: {deficiency}"
-    return f"{found} where the file expects {f'rank deficiency {expected}' if expected else 'full rank'}"
+    return (
+        f"{found} where the file expects"
+        f" {f'rank deficiency {expected}' if expected else 'full rank'}"
+    )
 
 
 @dataclass(frozen=True)
 class Verdict:
     """Whether a design determines its parameters.
 
-    `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`; `gap` is the ratio
-    across the border between determined and undetermined, `GREAT` at most. `reasons` tell what bars and gauges lack.
+    `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`;
+    `gap` is the ratio across the border between determined and undetermined, `GREAT` at most.
+    `reasons` tell what bars and gauges lack.
     """
 
     parameters: int
@@ -136,7 +149,9 @@ class Verdict:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the deficiency is the one the file states; a file that states none expects full rank."""
+        """Whether the deficiency is the one the file states; a file that states none expects full
+        rank.
+        """
         return self.deficiency == (self.expected or 0)
 
     @property
@@ -145,9 +160,11 @@ class Verdict:
         return "" if self.as_expected else rank_complaint(self.deficiency, self.expected)
 
 
-def verdict(at: Linearisation, expected: int | None = None, target: Target | None = None) -> Verdict:
-    """Judge a design from its spectrum; how the balls follow the undetermined directions is asked for where there are
-    any.
+def verdict(
+    at: Linearisation, expected: int | None = None, target: Target | None = None
+) -> Verdict:
+    """Judge a design from its spectrum; how the balls follow the undetermined directions is asked
+    for where there are any.
     """
     design, layout, found = at.design, at.layout, at.spectrum
     weak, effect = _weak_roots(at, target)
@@ -178,38 +195,49 @@ def null_directions(at: Linearisation) -> tuple[Direction, ...]:
 
 
 def independent_mixture(at: Linearisation) -> Array:
-    """Mixtures (k, k) of the null directions in which they are told: each involves as little as possible."""
+    """Mixtures (k, k) of the null directions in which they are told: each involves as little as
+    possible.
+    """
     return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])
 
 
 def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
-    """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to corrected points."""
+    """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to
+    corrected points.
+    """
     root, effect = _principal(at)
     columns = np.flatnonzero(above(effect, weak_limit(at.design, target)))[::-1]
     return root[:, columns], effect[columns]
 
 
 def effects(at: Linearisation) -> Array:
-    """What one standard deviation along each determined direction adds to corrected points, in metres, (rank,).
+    """What one standard deviation along each determined direction adds to corrected points, in
+    metres, (rank,).
 
-    Relative to one another, that is, as the root mean square over the points; empty where the design has none.
+    Relative to one another, that is, as the root mean square over the points; empty where the
+    design has none.
     """
     return _principal(at)[1]
 
 
 def _principal(at: Linearisation) -> tuple[Array, Array]:
-    """Determined directions (s, rank), one standard deviation long, and the effect of each on corrected points."""
+    """Determined directions (s, rank), one standard deviation long, and the effect of each on
+    corrected points.
+    """
     design, layout, found = at.design, at.layout, at.spectrum
     if not len(design.points) or found.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
     change = _changes(design, layout, at.shared)
-    # Two points whose errors are independent differ by the root of two times the error of one, per co-ordinate.
+    # Two points whose errors are independent differ by the root of two times the error of one, per
+    # co-ordinate.
     effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
     return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
 
 
 def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:
-    """How directions (s, k) move the corrected points relative to one another, (points, d, k) metres."""
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
+    metres.
+    """
     offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
     jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
     return without_rigid_motion(design.points, jacobian @ roots[layout.model])
@@ -232,7 +260,9 @@ def _weak_directions(
     beyond = above(of_points, limit).sum(axis=0)
     for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
         description = _describe(design, layout, root, np.zeros_like(design.balls))
-        weak = replace(description, artefacts=(), standard_deviation=size, points=len(design.points))
+        weak = replace(
+            description, artefacts=(), standard_deviation=size, points=len(design.points)
+        )
         directions.append(replace(weak, beyond=count, limit=limit))
     return tuple(directions)
 
@@ -270,7 +300,9 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
         if above(effect[columns[columns >= 0]].max(initial=0.0), NEGLIGIBLE * largest):
             shift, turn = np.linalg.norm(values[:d]), np.linalg.norm(values[d:])
             along, about = _single_axis(values[:d], " along "), _single_axis(values[d:], " about ")
-            positions.append(PositionPart(design.position_names[k], float(shift), float(turn), along, about))
+            positions.append(
+                PositionPart(design.position_names[k], float(shift), float(turn), along, about)
+            )
     artefacts = []
     for artefact in np.flatnonzero(design.is_plate):
         members = np.flatnonzero(design.ball_artefact == artefact)
@@ -278,7 +310,9 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
         if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
             touched = tuple(design.ball_names[b] for b in members[above(moved, 0.1 * moved.max())])
             words = deformation(design.balls[members], balls[members])
-            artefacts.append(ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched))
+            artefacts.append(
+                ArtefactPart(design.artefact_names[artefact], float(moved.max()), words, touched)
+            )
     probes = []
     for k, columns in enumerate(layout.offset_columns):
         values = np.where(columns >= 0, shared[np.maximum(columns, 0)], 0.0)
@@ -289,7 +323,9 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
         for name, change in zip(design.length_names, shared[layout.lengths], strict=True)
         if above(abs(change), NEGLIGIBLE * largest)
     )
-    return Direction(functions, tuple(artefacts), tuple(positions), probes=tuple(probes), lengths=lengths)
+    return Direction(
+        functions, tuple(artefacts), tuple(positions), probes=tuple(probes), lengths=lengths
+    )
 
 
 def _single_axis(vector: Array, word: str) -> str:
@@ -300,7 +336,9 @@ def _single_axis(vector: Array, word: str) -> str:
     return f"{word}{'xyz'[axis]}" if abs(vector[axis]) > 0.999 * np.linalg.norm(vector) else ""
 
 
-def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tuple[FunctionPart, ...]:
+def _function_parts(
+    design: Design, layout: SharedLayout, shared: Array
+) -> tuple[FunctionPart, ...]:
     a, parameters = shared[layout.model], layout.parameters[layout.model]
     effect = np.abs(a / layout.scale[layout.model])
     largest = float(np.abs(shared / layout.scale).max(initial=0.0))
@@ -318,15 +356,27 @@ def _function_parts(design: Design, layout: SharedLayout, shared: Array) -> tupl
             peak = float(values.flat[comparable(np.abs(values)).argmax()])
             k = int(comparable(np.ptp(values, axis=1)).argmax())
             form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
-            parts.append((effect[members].max(), name, parameter.meaning, peak, parameter.unit, form))
+            parts.append(
+                (effect[members].max(), name, parameter.meaning, peak, parameter.unit, form)
+            )
         else:
-            parts.append((effect[members].max(), name, parameter.meaning, float(a[members[0]]), parameter.unit, ""))
+            parts.append(
+                (
+                    effect[members].max(),
+                    name,
+                    parameter.meaning,
+                    float(a[members[0]]),
+                    parameter.unit,
+                    "",
+                )
+            )
     order = np.argsort(-comparable([part[0] for part in parts]), kind="stable")
     return tuple(FunctionPart(*parts[k][1:]) for k in order)
 
 
 def shape(t: Array, values: Array) -> str:
-    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it; none for a constant.
+    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it; none
+    for a constant.
 
     >>> t = np.linspace(0, 1, 50)
     >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5), shape(t, 0 * t + 2)
@@ -370,16 +420,29 @@ def deformation(places: Array, displacement: Array) -> str:
         if len(used) > 1 and np.ptp(stretch[used]) < 0.02 * largest and len(used) == len(flat):
             words.append("changes its size as a whole")
         else:
-            grow = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] > 0)
-            shrink = " and ".join(f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] < 0)
+            grow = " and ".join(
+                f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] > 0
+            )
+            shrink = " and ".join(
+                f"its {names[i]}" for i in used if stretch[i] * stretch[used[0]] < 0
+            )
             if grow:
-                words.append(f"stretches along {grow}" + (f" and shrinks along {shrink}" if shrink else ""))
+                words.append(
+                    f"stretches along {grow}" + (f" and shrinks along {shrink}" if shrink else "")
+                )
         sheared = [
-            (i, j) for i in flat for j in flat if i < j and above(abs(linear[i, j] + linear[j, i]), 0.1 * largest)
+            (i, j)
+            for i in flat
+            for j in flat
+            if i < j and above(abs(linear[i, j] + linear[j, i]), 0.1 * largest)
         ]
         words += [f"shears in its {names[i]}{names[j]} plane" for i, j in sheared]
     if above((rest**2).sum(), 0.02 * total):
-        out_of_plane = d == 3 and extent[2] == 0 and above((rest[:, 2] ** 2).sum(), 0.5 * float((rest**2).sum()))
+        out_of_plane = (
+            d == 3
+            and extent[2] == 0
+            and above((rest[:, 2] ** 2).sum(), 0.5 * float((rest**2).sum()))
+        )
         words.append("bends out of its plane" if out_of_plane else "distorts unevenly")
     return ", ".join(words) if words else "deforms"
 
@@ -396,18 +459,29 @@ def in_words(direction: Direction) -> str:
     if direction.positions:
         told = [_position_words(part) for part in direction.positions[:6]]
         more = len(direction.positions) - len(told)
-        parts.append("moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else ""))
+        parts.append(
+            "moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else "")
+        )
     if direction.probes:
-        parts.append("offsets of probes: " + ", ".join(_position_words(part) for part in direction.probes[:6]))
+        parts.append(
+            "offsets of probes: "
+            + ", ".join(_position_words(part) for part in direction.probes[:6])
+        )
     if direction.lengths:
-        parts.append(", ".join(f"{part.name} ({length(part.change)})" for part in direction.lengths))
+        parts.append(
+            ", ".join(f"{part.name} ({length(part.change)})" for part in direction.lengths)
+        )
     if np.isinf(direction.standard_deviation):
-        end = "change together without changing any observation" if len(parts) > 1 else "changes no observation"
+        end = (
+            "change together without changing any observation"
+            if len(parts) > 1
+            else "changes no observation"
+        )
     else:
         end = (
-            f"known only to {length(direction.standard_deviation)} in corrected points, relative to one another "
-            f"(root mean square over {direction.points} points; more than {length(direction.limit)} at "
-            f"{direction.beyond} of them)"
+            f"known only to {length(direction.standard_deviation)} in corrected points, relative to"
+            f" one another (root mean square over {direction.points} points; more than"
+            f" {length(direction.limit)} at {direction.beyond} of them)"
         )
     return "; ".join(parts) + f": {end}"
 

@@ -1,4 +1,6 @@
-"""Drawing of a planned campaign: criterion against budget, gains of the candidates, the chosen positions."""
+"""Drawing of a planned campaign: criterion against budget, gains of the candidates, the chosen
+positions.
+"""
 
 from __future__ import annotations
 
@@ -36,12 +38,14 @@ CHOSEN, BOUND, TARGET = "chosen", "bound of any choice", "target"
 # Candidates that are drawn, of the chosen ones and of those left out, and the letters of a name.
 MOST_CHOSEN, MOST_LEFT_OUT, MOST_LETTERS = 24, 5, 66
 
-# Values further apart than this are drawn on a logarithmic axis; a target further off than this is told in words.
+# Values further apart than this are drawn on a logarithmic axis; a target further off than this is
+# told in words.
 WIDE, FAR = 5.0, 4.0
 
 
 def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
-    """A picture of the criterion against the budget, of the gain of each candidate, and of the positions.
+    """A picture of the criterion against the budget, of the gain of each candidate, and of the
+    positions.
 
     It is written to the path, if there is one.
 
@@ -54,14 +58,29 @@ def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
     top = CURVE + LEGEND if found.curve else STRIP * len(marks)
     total = SCENE + UNDER + bars + ABOVE + BELOW + top + ABOVE
     with drawing(total, WIDTH) as figure:
-        _title(figure, total - 14.0, f"{DESCRIPTIONS[found.criterion]}{'' if found.unit == '1' else ', µm'}")
+        _title(
+            figure,
+            total - 14.0,
+            f"{DESCRIPTIONS[found.criterion]}{'' if found.unit == '1' else ', µm'}",
+        )
         if found.curve:
-            _curve(placed_axes(figure, LEFT, total - ABOVE - top, WIDTH - LEFT - RIGHT, CURVE), found, marks)
+            _curve(
+                placed_axes(figure, LEFT, total - ABOVE - top, WIDTH - LEFT - RIGHT, CURVE),
+                found,
+                marks,
+            )
         else:
-            _strip(placed_axes(figure, LABELS, total - ABOVE - top, WIDTH - LABELS - VALUES, top), marks)
+            _strip(
+                placed_axes(figure, LABELS, total - ABOVE - top, WIDTH - LABELS - VALUES, top),
+                marks,
+            )
         bottom = SCENE + UNDER
         axes = placed_axes(figure, NUMBERS, bottom, WIDTH - NUMBERS - VALUES, bars)
-        _title(figure, bottom + bars + 14.0, f"how much larger {found.criterion} is without each of the chosen ones")
+        _title(
+            figure,
+            bottom + bars + 14.0,
+            f"how much larger {found.criterion} is without each of the chosen ones",
+        )
         _bars(axes, rows)
         axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
         axes.set_axis_off()
@@ -79,7 +98,9 @@ def words(found: Selection) -> str:
         told.append(f"{found.drawn_words} {_told(found, found.drawn)}")
     if found.target is not None:
         told.append(f"target {_told(found, found.target)}")
-    return f"{', '.join(told)}; {len(found.chosen)} chosen of {len(found.pool.candidates)} candidates"
+    return (
+        f"{', '.join(told)}; {len(found.chosen)} chosen of {len(found.pool.candidates)} candidates"
+    )
 
 
 def _told(found: Selection, value: float) -> str:
@@ -161,11 +182,25 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
         # What does not fit is beyond the end that its triangle points to.
         marker = mark.marker if is_inside else "<" if mark.value < low else ">"
         axes.plot(
-            min(max(mark.value, low), high), k, color=mark.colour, linestyle="none", marker=marker, markersize=9.0,
-            markeredgewidth=2.0 if is_inside and marker == "|" else 1.0, clip_on=False,
-        )  # fmt: skip
-        axes.annotate(mark.told, (1.0, k), (VALUES - RIGHT + 2.0, 0.0), xycoords=("axes fraction", "data"),
-                      textcoords="offset points", ha="right", va="center", fontsize=9.0)  # fmt: skip
+            min(max(mark.value, low), high),
+            k,
+            color=mark.colour,
+            linestyle="none",
+            marker=marker,
+            markersize=9.0,
+            markeredgewidth=2.0 if is_inside and marker == "|" else 1.0,
+            clip_on=False,
+        )
+        axes.annotate(
+            mark.told,
+            (1.0, k),
+            (VALUES - RIGHT + 2.0, 0.0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=9.0,
+        )
     _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
@@ -191,12 +226,20 @@ def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
     margin = 0.06 * float(np.ptp(ends)) or 0.5
     axes.set_xlim(max(ends.min() - margin, 0.0), ends.max() + margin)
     if not np.isnan(bounds).all():
-        # What bounds a budget bounds smaller ones as well: between two of them the bound of the larger holds.
+        # What bounds a budget bounds smaller ones as well: between two of them the bound of the
+        # larger holds.
         at, step = np.repeat(x, 2)[:-1], np.repeat(bounds, 2)[1:]
         axes.fill_between(at, low, step, color=MUTED, alpha=0.2, linewidth=0)
         axes.plot(at, step, color=MUTED, linestyle=DASHES[1], linewidth=1.0, label=BOUND)
         axes.plot(x, bounds, color=MUTED, linestyle="none", marker="_", markersize=9.0)
-    axes.plot(x, values, color=SERIES[0], marker=MARKERS[0], markerfacecolor=PAPER, label="best choice found")
+    axes.plot(
+        x,
+        values,
+        color=SERIES[0],
+        marker=MARKERS[0],
+        markerfacecolor=PAPER,
+        label="best choice found",
+    )
     if BOUND in by_name and found.is_determined:
         ends_of_gap = [by_name[BOUND].value, by_name[CHOSEN].value]
         axes.plot([here, here], ends_of_gap, color=SERIES[0], linewidth=0.8, linestyle=DASHES[2])
@@ -205,22 +248,41 @@ def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
             mark = by_name[name]
             is_known = math.isfinite(mark.value)
             axes.plot(
-                at_budget, mark.value if is_known else high, color=mark.colour, linestyle="none", clip_on=False,
-                marker=mark.marker if is_known else "^", markersize=9.0, zorder=4, label=f"{name}: {mark.told}",
-            )  # fmt: skip
+                at_budget,
+                mark.value if is_known else high,
+                color=mark.colour,
+                linestyle="none",
+                clip_on=False,
+                marker=mark.marker if is_known else "^",
+                markersize=9.0,
+                zorder=4,
+                label=f"{name}: {mark.told}",
+            )
     if target is not None:
         if low <= target.value <= high:
             axes.axhline(target.value, color=INK, linewidth=1.2)
-        beyond = "" if low <= target.value <= high else f" ({'above' if target.value > high else 'below'})"
+        beyond = (
+            ""
+            if low <= target.value <= high
+            else f" ({'above' if target.value > high else 'below'})"
+        )
         axes.plot([], [], color=INK, linewidth=1.2, label=f"{TARGET}: {target.told}{beyond}")
     axes.set_xlabel(f"{extent.name} allowed")
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=extent.name != "hours", steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(
+        MaxNLocator(nbins=8, integer=extent.name != "hours", steps=[1, 2, 5, 10])
+    )
     _plain_numbers(axes.yaxis, axes.get_yscale() == "log")
     axes.grid(True)
     axes.legend(
-        loc="lower left", bbox_to_anchor=(-0.09, 1.04), ncols=3, borderaxespad=0.2, borderpad=0.2, columnspacing=1.2,
-        handlelength=2.0, handletextpad=0.5,
-    )  # fmt: skip
+        loc="lower left",
+        bbox_to_anchor=(-0.09, 1.04),
+        ncols=3,
+        borderaxespad=0.2,
+        borderpad=0.2,
+        columnspacing=1.2,
+        handlelength=2.0,
+        handletextpad=0.5,
+    )
 
 
 def _limits(values: Sequence[float], target: float | None) -> tuple[float, float]:
@@ -258,18 +320,30 @@ class _Row:
 
 
 def _rows(found: Selection) -> list[_Row]:
-    """The chosen ones with their numbers in the drawing, those first that gain most, then the best of the others."""
+    """The chosen ones with their numbers in the drawing, those first that gain most, then the best
+    of the others.
+    """
     numbers = {name: k + 1 for k, name in enumerate(found.plan.design.position_names)}
     rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in found.gains[:MOST_CHOSEN]]
     if len(found.gains) > MOST_CHOSEN:
-        rows.append(_Row("", f"… and {len(found.gains) - MOST_CHOSEN} chosen ones more", "", None, MUTED))
+        rows.append(
+            _Row("", f"… and {len(found.gains) - MOST_CHOSEN} chosen ones more", "", None, MUTED)
+        )
     rows += [
-        _Row(_shown(numbers.get(one.name)), one.name, "read already", None, _colour(numbers.get(one.name)))
+        _Row(
+            _shown(numbers.get(one.name)),
+            one.name,
+            "read already",
+            None,
+            _colour(numbers.get(one.name)),
+        )
         for one in found.done[: max(MOST_CHOSEN - len(found.gains), 0)]
     ]
     left_out = [gain for gain in found.left_out if not math.isnan(gain.relative)]
     if left_out:
-        rows.append(_Row("", "left out; how much larger it is without each of these", "", None, MUTED))
+        rows.append(
+            _Row("", "left out; how much larger it is without each of these", "", None, MUTED)
+        )
     return rows + [_row(gain, None) for gain in left_out[:MOST_LEFT_OUT]]
 
 
@@ -299,13 +373,34 @@ def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
         if row.size is not None:
             is_needed = math.isinf(row.size)
             axes.barh(
-                k, 1.0 if is_needed else max(row.size, 0.0) / full, height=0.78, color=row.colour, alpha=0.3,
-                hatch="//" if is_needed else None, linewidth=0,
-            )  # fmt: skip
+                k,
+                1.0 if is_needed else max(row.size, 0.0) / full,
+                height=0.78,
+                color=row.colour,
+                alpha=0.3,
+                hatch="//" if is_needed else None,
+                linewidth=0,
+            )
         is_candidate = bool(row.told)
         name = row.name if len(row.name) <= MOST_LETTERS else row.name[: MOST_LETTERS - 1] + "…"
         axes.text(0.008, k, name, va="center", fontsize=9.0, color=INK if is_candidate else MUTED)
-        axes.annotate(row.told, (1.0, k), (VALUES - RIGHT + 2.0, 0.0), textcoords="offset points", ha="right",
-                      va="center", fontsize=9.0, annotation_clip=False)  # fmt: skip
-        axes.annotate(row.mark, (0.0, k), (-6.0, 0.0), textcoords="offset points", ha="right", va="center",
-                      fontsize=9.0, annotation_clip=False)  # fmt: skip
+        axes.annotate(
+            row.told,
+            (1.0, k),
+            (VALUES - RIGHT + 2.0, 0.0),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=9.0,
+            annotation_clip=False,
+        )
+        axes.annotate(
+            row.mark,
+            (0.0, k),
+            (-6.0, 0.0),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=9.0,
+            annotation_clip=False,
+        )

@@ -21,15 +21,18 @@ class NoExperimentError(Exception):
     """A cell's experiment cannot be had; the text says why."""
 
 
-def experiments(store: Store, results: Results, cells: Sequence[int], run_modules: bool = False) -> list[Experiment]:
+def experiments(
+    store: Store, results: Results, cells: Sequence[int], run_modules: bool = False
+) -> list[Experiment]:
     """Experiments of cells.
 
-    Error models of a user's own are Python code, which a store from elsewhere must not run unasked: only with
-    `run_modules` are they loaded.
+    Error models of a user's own are Python code, which a store from elsewhere must not run unasked:
+    only with `run_modules` are they loaded.
 
     Files outside the store are not read, whatever the experiment names.
 
-    :raises NoExperimentError: the files are not there, have changed their meaning, name others, or would run code.
+    :raises NoExperimentError: the files are not there, have changed their meaning, name others, or
+        would run code.
     """
     try:
         kept = files(store, results.number)
@@ -45,12 +48,17 @@ def experiments(store: Store, results: Results, cells: Sequence[int], run_module
         except ValueError as error:
             raise NoExperimentError(f"the store is not to be trusted: {error}") from None
         except OSError as error:
-            raise NoExperimentError(f"the store's files cannot be unpacked ({error.strerror})") from None
+            raise NoExperimentError(
+                f"the store's files cannot be unpacked ({error.strerror})"
+            ) from None
         try:
             if _leads_out(bundle, Path(folder)):
                 raise NoExperimentError("the experiment names files that are not in the store")
             if not run_modules and _has_code(bundle, Path(folder)):
-                text = "the experiment has an error model in Python, which is run only with --run-modules"
+                text = (
+                    "the experiment has an error model in Python, which is run only with"
+                    " --run-modules"
+                )
                 raise NoExperimentError(text)
             # The stored file, whichever the sweep file names.
             sweep = load_sweep(source, Path(folder) / PurePosixPath(bundle.base), (Path(folder),))
@@ -67,9 +75,16 @@ def _leads_out(bundle: Bundle, folder: Path) -> bool:
     axes = axis_paths(read_tree(folder / PurePosixPath(bundle.source)))
     if leads_out(axes, base.parent, folder):
         return True
-    paths = [base, *(folder / PurePosixPath(name) for name, _ in bundle.files if name.lower().endswith(YAML))]
+    paths = [
+        base,
+        *(folder / PurePosixPath(name) for name, _ in bundle.files if name.lower().endswith(YAML)),
+    ]
     source = folder / PurePosixPath(bundle.source)
-    return any(leads_out(path_scalars(read_tree(path), ""), path.parent, folder) for path in paths if path != source)
+    return any(
+        leads_out(path_scalars(read_tree(path), ""), path.parent, folder)
+        for path in paths
+        if path != source
+    )
 
 
 def _has_code(bundle: Bundle, folder: Path) -> bool:

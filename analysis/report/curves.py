@@ -29,8 +29,13 @@ def plot(curve: Curve, path: Path) -> None:
     """
     fitted, x, y = curve.fit, curve.points.x_column, curve.points.y_column
     lower, upper = fitted.space.lower, fitted.space.upper
-    places = np.unique(np.concatenate([np.linspace(lower, upper, 501), fitted.x, fitted.space.breaks]))
-    values, spread = fitted.values(places), curve.coverage_factor * curve.standard_uncertainty(places)
+    places = np.unique(
+        np.concatenate([np.linspace(lower, upper, 501), fitted.x, fitted.space.breaks])
+    )
+    values, spread = (
+        fitted.values(places),
+        curve.coverage_factor * curve.standard_uncertainty(places),
+    )
     with drawing(HEIGHT, WIDTH) as figure:
         axes = placed_axes(figure, 54.0, 42.0, WIDTH - 68.0, HEIGHT - 92.0)
         axes.grid(True)
@@ -47,18 +52,33 @@ def plot(curve: Curve, path: Path) -> None:
         axes.plot(places / x.factor, values / y.factor, color=SERIES[0], label="spline")
         bars = fitted.uncertainties * curve.sigma / y.factor if curve.has_uncertainties else None
         axes.errorbar(
-            fitted.x / x.factor, fitted.y / y.factor, bars, color=INK, marker="o", markersize=4.0, linestyle="none",
-            markerfacecolor=PAPER, elinewidth=1.0, label="measured",
-        )  # fmt: skip
+            fitted.x / x.factor,
+            fitted.y / y.factor,
+            bars,
+            color=INK,
+            marker="o",
+            markersize=4.0,
+            linestyle="none",
+            markerfacecolor=PAPER,
+            elinewidth=1.0,
+            label="measured",
+        )
         knots = np.array([knot for knot in fitted.space.knots if knot not in curve.boundaries])
         if len(knots):
             axes.plot(
-                knots / x.factor, fitted.values(knots) / y.factor, color=SERIES[1], marker="|", markersize=14.0,
-                linestyle="none", label="knots",
-            )  # fmt: skip
+                knots / x.factor,
+                fitted.values(knots) / y.factor,
+                color=SERIES[1],
+                marker="|",
+                markersize=14.0,
+                linestyle="none",
+                label="knots",
+            )
         for k, boundary in enumerate(curve.boundaries):
             label = "boundary of features" if k == 0 else None
-            axes.axvline(boundary / x.factor, color=SERIES[1], linestyle="--", linewidth=1.0, label=label)
+            axes.axvline(
+                boundary / x.factor, color=SERIES[1], linestyle="--", linewidth=1.0, label=label
+            )
         axes.set_xlabel(f"{x.words}, {micro(x.unit)}")
         axes.set_ylabel(f"{y.words}, {micro(y.unit)}")
         handles, labels = axes.get_legend_handles_labels()
@@ -74,14 +94,16 @@ def words(curve: Curve) -> str:
     high, low = int(np.argmax(values)), int(np.argmin(values))
     slope = fitted.values(places[:1], 1)[0] / y.factor * x.factor
     return (
-        f"{y.words} against {x.words}: {len(fitted.x)} points and a spline from {shown(values[low], y, 3)} at "
-        f"{shown(places[low], x, 3)} to {shown(values[high], y, 3)} at {shown(places[high], x, 3)}; slope at the start "
-        f"{slope:.2g} {derivative_unit(curve, 1)}"
+        f"{y.words} against {x.words}: {len(fitted.x)} points and a spline from"
+        f" {shown(values[low], y, 3)} at {shown(places[low], x, 3)} to {shown(values[high], y, 3)}"
+        f" at {shown(places[high], x, 3)}; slope at the start {slope:.2g}"
+        f" {derivative_unit(curve, 1)}"
     )
 
 
 def whiskers(curve: Curve, points: Points, path: Path, magnification: float | None = None) -> None:
-    """Draw the errors of all points of the file as bars normal to the profile, those of the fit in front, to a file.
+    """Draw the errors of all points of the file as bars normal to the profile, those of the fit in
+    front, to a file.
 
     :raises SplineError: neighbouring points that stand at the same place.
     :raises OSError: the file cannot be written.
@@ -111,11 +133,22 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
         axes.set_aspect("equal")
         axes.set_xlim((low[0] - margin) / factor, (high[0] + margin) / factor)
         axes.set_ylim((low[1] - margin) / factor, (high[1] + margin) / factor)
-        axes.plot(*(_outline(profile.places, profile.features).T / factor), color=MUTED, linewidth=1.2, label="profile")
+        axes.plot(
+            *(_outline(profile.places, profile.features).T / factor),
+            color=MUTED,
+            linewidth=1.2,
+            label="profile",
+        )
         fitted = set(curve.points.names)
         inside = np.array([name in fitted for name in points.names])
         for chosen, colour, label in ((inside, SERIES[0], "fitted"), (~inside, INK, "not fitted")):
-            _bars(axes, start[chosen] / factor, tips[chosen] / factor, colour, label if not inside.all() else "error")
+            _bars(
+                axes,
+                start[chosen] / factor,
+                tips[chosen] / factor,
+                colour,
+                label if not inside.all() else "error",
+            )
         _scale(axes, scale * magnification / factor, f"{scale * 1e6:g} µm")
         axes.set_xlabel(f"axial co-ordinate, {unit}")
         axes.set_ylabel(f"radius, {unit}")
@@ -129,7 +162,9 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
 
 
 def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.ndarray:
-    """Axial co-ordinate and radius of the profile's line, with gaps between features that share no place."""
+    """Axial co-ordinate and radius of the profile's line, with gaps between features that share no
+    place.
+    """
     parts = []
     for first, last in features:
         parts += [places[first : last + 1, ::-1], np.full((1, 2), np.nan)]

@@ -20,7 +20,8 @@ MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
 
 @dataclass(frozen=True)
 class Heat:
-    """A measure over two axes; `shades` from 0, the smallest, to SHADES - 1, or -1 where there is none.
+    """A measure over two axes; `shades` from 0, the smallest, to SHADES - 1, or -1 where there is
+    none.
 
     What is undetermined even in part has none.
     """
@@ -36,15 +37,21 @@ class Heat:
 
 
 def heat_maps(results: Results) -> list[Heat]:
-    """A map of the averages that cells are judged by, for each pair of axes with few or with ordered values."""
+    """A map of the averages that cells are judged by, for each pair of axes with few or with
+    ordered values.
+    """
     judged = criterion(results)
-    measures = [m for m in uncertainty_measures(results) if judged is not None and m.figure == judged[0]]
+    measures = [
+        m for m in uncertainty_measures(results) if judged is not None and m.figure == judged[0]
+    ]
     if not measures:
         return []
     pairs = [
         (i, j)
         for i, j in combinations(range(len(results.axes)), 2)
-        if all(len(results.axes[k].labels) <= MOST_VALUES or results.axes[k].numbers for k in (i, j))
+        if all(
+            len(results.axes[k].labels) <= MOST_VALUES or results.axes[k].numbers for k in (i, j)
+        )
         and min(len(results.axes[k].labels) for k in (i, j)) > 1
     ]
     return [_heat(results, i, j, measures[0]) for i, j in pairs[:MOST_PAIRS]]
@@ -61,13 +68,21 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
     any_open = False
     place = row_of[results.chosen[:, i]] * shape[1] + column_of[results.chosen[:, j]]
     members = _members(place, shape[0] * shape[1])
-    planned = np.bincount(row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members))
+    planned = np.bincount(
+        row_of[results.cells[:, i]] * shape[1] + column_of[results.cells[:, j]], None, len(members)
+    )
     entries, medians = [], np.full(len(members), np.nan)
     for k, rows_here in enumerate(members):
         known = rows_here[np.isfinite(values[rows_here])]
         if len(known):
             medians[k] = np.median(values[known])
-        text = number(measure.factor * medians[k], DIGITS) if len(known) else "-" if len(rows_here) else NOT_DONE
+        text = (
+            number(measure.factor * medians[k], DIGITS)
+            if len(known)
+            else "-"
+            if len(rows_here)
+            else NOT_DONE
+        )
         is_open = bool((open_ & results.done)[rows_here].any())
         any_open |= is_open
         if is_open and len(rows_here) == 1 and np.isfinite(figures[rows_here[0]]):
@@ -83,7 +98,11 @@ def _heat(results: Results, i: int, j: int, measure: Measure) -> Heat:
         else:
             entries.append(Entry(text if planned[k] else ""))
     notes = [] if planned.max() <= 1 else ["Medians over all cells that share the two values."]
-    notes += [f"{STAR} marks what is undetermined, in part at least; it has no shade."] if any_open else []
+    notes += (
+        [f"{STAR} marks what is undetermined, in part at least; it has no shade."]
+        if any_open
+        else []
+    )
     return Heat(
         rows,
         columns,
@@ -103,7 +122,9 @@ def _members(place: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
 
 
 def _grouped(axis: Axis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
-    """Place of each value in the map, and the labels there: neighbouring values together where there are many."""
+    """Place of each value in the map, and the labels there: neighbouring values together where
+    there are many.
+    """
     count = len(axis.labels)
     if count <= MOST_VALUES:
         return np.arange(count), axis.short_labels
@@ -111,7 +132,9 @@ def _grouped(axis: Axis) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     order = np.argsort(np.argsort(numbers, kind="stable"), kind="stable")
     group = order * MOST_VALUES // count
     ends = [(numbers[group == k].min(), numbers[group == k].max()) for k in range(MOST_VALUES)]
-    return group, tuple(f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends)
+    return group, tuple(
+        f"{low:.5g} to {high:.5g}" if high > low else f"{low:.5g}" for low, high in ends
+    )
 
 
 def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -1,4 +1,6 @@
-"""Drawings of lengths against a target: slices through the volume, and uncertainties over the length."""
+"""Drawings of lengths against a target: slices through the volume, and uncertainties over the
+length.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +24,14 @@ WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
 CURVES = 200.0
 # Room for the numbers and names below the slices.
 UNDER = 54.0
-# Slices that are drawn of a grid, in rows of three, and the room between them and for the scale of colours.
+# Slices that are drawn of a grid, in rows of three, and the room between them and for the scale of
+# colours.
 MOST_SLICES, IN_A_ROW, BETWEEN, SCALE = 6, 3, 10.0, 62.0
 
 
 def draw_lengths(found: LengthMap, path: Path) -> None:
-    """Write a picture of the largest ratio of u to the target at each point, and of u over the length.
+    """Write a picture of the largest ratio of u to the target at each point, and of u over the
+    length.
 
     :raises OSError: the file cannot be written.
     """
@@ -37,7 +41,9 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
     marked, meaning = marks(ratios)
     levels = np.zeros(1, np.int64)
     if len(counts) == 3:
-        levels = np.unique(np.linspace(0, counts[2] - 1, min(counts[2], MOST_SLICES)).round().astype(int))
+        levels = np.unique(
+            np.linspace(0, counts[2] - 1, min(counts[2], MOST_SLICES)).round().astype(int)
+        )
     columns = min(len(levels), IN_A_ROW) if len(levels) != 4 else 2
     rows = -(-len(levels) // columns)
     span = found.design.upper - found.design.lower
@@ -60,11 +66,15 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
             if len(counts) == 3:
                 axes.set_title(f"z = {_millimetres(found, 2, int(level))} mm", loc="left")
             is_lowest = place + columns >= len(levels)
-            axes.tick_params(bottom=is_lowest, labelbottom=is_lowest, left=column == 0, labelleft=column == 0)
+            axes.tick_params(
+                bottom=is_lowest, labelbottom=is_lowest, left=column == 0, labelleft=column == 0
+            )
             axes.set_xlabel("x, mm" if is_lowest else "")
             axes.set_ylabel("y, mm" if column == 0 else "")
         u = "u" if factor == 1.0 else f"{factor:g} u"
-        head = f"largest {u} / target of the lengths from or to a point" + _mark_words(found, meaning)
+        head = f"largest {u} / target of the lengths from or to a point" + _mark_words(
+            found, meaning
+        )
         figure.text(LEFT / WIDTH, 1.0 - 14.0 / total, head, fontsize=10.5, va="center")
         if image is not None and len(known):
             bar = placed_axes(figure, LEFT + columns * (side + BETWEEN) + 4.0, under, 10.0, maps)
@@ -73,12 +83,16 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
         _curves(axes, found)
         shares = [percent(float(found.whole.share(expanded)[0])) for expanded in (False, True)]
         k = f"{found.settings.coverage_factor:g}"
-        words = f"target {micro(target_words(found.settings.target))}: u within it for {shares[0]} of the lengths, "
+        words = (
+            f"target {micro(target_words(found.settings.target))}: u within it for {shares[0]} of"
+            " the lengths, "
+        )
         save(figure, path, f"{words}{k} u for {shares[1]} of them")
 
 
 def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
-    """Which points are marked, by their ratios to the target, and what the marks mean: the fewer of both kinds are.
+    """Which points are marked, by their ratios to the target, and what the marks mean: the fewer of
+    both kinds are.
 
     >>> marks(np.array([0.5, 0.6, 1.2]))
     (array([False, False,  True]), 'crosses: above 1')
@@ -93,7 +107,9 @@ def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
         return missed, ""
     if not met.any():
         return met, "above 1 everywhere"
-    return (missed, "crosses: above 1") if missed.sum() <= met.sum() else (met, "crosses: 1 or below")
+    return (
+        (missed, "crosses: above 1") if missed.sum() <= met.sum() else (met, "crosses: 1 or below")
+    )
 
 
 def _mark_words(found: LengthMap, meaning: str) -> str:
@@ -102,18 +118,28 @@ def _mark_words(found: LengthMap, meaning: str) -> str:
 
 
 def _slice(  # type: ignore[no-untyped-def]
-    axes: Axes, found: LengthMap, ratios: Array, marked: NDArray[np.bool_], limits: tuple[float, float]
+    axes: Axes,
+    found: LengthMap,
+    ratios: Array,
+    marked: NDArray[np.bool_],
+    limits: tuple[float, float],
 ):
     """Ratios (x, y) as colours, crosses where `marked`, dashes where nothing is determined."""
     sides = [_centres(found, axis) for axis in (0, 1)]
     image = axes.pcolormesh(
-        *(_borders(side) for side in sides), np.ma.masked_invalid(ratios.T),
-        cmap="viridis", vmin=limits[0], vmax=limits[1], rasterized=False,
-    )  # fmt: skip
+        *(_borders(side) for side in sides),
+        np.ma.masked_invalid(ratios.T),
+        cmap="viridis",
+        vmin=limits[0],
+        vmax=limits[1],
+        rasterized=False,
+    )
     x, y = np.meshgrid(*sides, indexing="ij")
     for chosen, marker in ((marked, "x"), (np.isnan(ratios), "_")):
         colour = PAPER if marker == "x" else MUTED
-        axes.plot(x[chosen], y[chosen], linestyle="none", marker=marker, color=colour, markersize=4.0)
+        axes.plot(
+            x[chosen], y[chosen], linestyle="none", marker=marker, color=colour, markersize=4.0
+        )
     for spine in axes.spines.values():
         spine.set_visible(False)
     axes.set_xticks([sides[0][0], sides[0][-1]])
@@ -143,20 +169,36 @@ def _curves(axes: Axes, found: LengthMap) -> None:
     groups, edges = found.by_length, 1e3 * found.edges
     middle = 0.5 * (edges[1:] + edges[:-1])
     k = f"{found.settings.coverage_factor:g}"
-    axes.plot(edges, 1e6 * found.settings.target.at(found.edges), color=INK, linewidth=1.2, label="target")
+    axes.plot(
+        edges, 1e6 * found.settings.target.at(found.edges), color=INK, linewidth=1.2, label="target"
+    )
     curves = [("u, average", groups.average), ("u, largest", groups.maximum)]
     curves.append((f"{k} u, largest", found.settings.coverage_factor * groups.maximum))
     for j, (label, values) in enumerate(curves):
         axes.plot(
-            middle, 1e6 * values, color=SERIES[j], linestyle=DASHES[j], marker=MARKERS[j], markersize=3.5,
-            markerfacecolor=PAPER, label=label, clip_on=False, zorder=3,
-        )  # fmt: skip
+            middle,
+            1e6 * values,
+            color=SERIES[j],
+            linestyle=DASHES[j],
+            marker=MARKERS[j],
+            markersize=3.5,
+            markerfacecolor=PAPER,
+            label=label,
+            clip_on=False,
+            zorder=3,
+        )
     axes.set_ylim(0.0)
     axes.set_xlim(0.0, edges[-1])
     axes.grid(True)
     axes.set_xlabel("length, mm")
     axes.set_ylabel("µm")
     axes.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.3, borderpad=0.2, columnspacing=1.2,
-        handlelength=2.4, handletextpad=0.5,
-    )  # fmt: skip
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=4,
+        borderaxespad=0.3,
+        borderpad=0.2,
+        columnspacing=1.2,
+        handlelength=2.4,
+        handletextpad=0.5,
+    )

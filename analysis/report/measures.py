@@ -15,7 +15,9 @@ STATISTICS = ("maximum", "average")
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure: column `figure` of the frame times `factor` in `unit`, with the column of its standard error if any."""
+    """A figure: column `figure` of the frame times `factor` in `unit`, with the column of its
+    standard error if any.
+    """
 
     symbol: str
     statistic: str
@@ -45,7 +47,8 @@ class Measure:
 
 
 def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measure]:
-    """Maximum and average of all recorded uncertainties, what is open, and shares within the target accuracy.
+    """Maximum and average of all recorded uncertainties, what is open, and shares within the target
+    accuracy.
 
     Without `of_parts` the lengths and angles of U2 and U3 are left out, and how much is open.
     """
@@ -56,16 +59,26 @@ def uncertainty_measures(results: Results, of_parts: bool = True) -> list[Measur
         name = symbol_column(symbol)
         for statistic in STATISTICS:
             found += [
-                Measure(symbol, statistic, unit, column) for column, unit in _columns(results, f"{name}_{statistic}_")
+                Measure(symbol, statistic, unit, column)
+                for column, unit in _columns(results, f"{name}_{statistic}_")
             ]
         for statistic, unit, factor in (("undetermined", "", 1.0), ("within_target", "%", 100.0)):
             column = f"{name}_{statistic}"
             if column not in results.frame:
                 continue
-            if statistic == "undetermined" and not (of_parts and (results.figure(column) > 0).any()):
+            if statistic == "undetermined" and not (
+                of_parts and (results.figure(column) > 0).any()
+            ):
                 continue
             found.append(
-                Measure(symbol, statistic.replace("_", " "), unit, column, factor, is_count=statistic == "undetermined")
+                Measure(
+                    symbol,
+                    statistic.replace("_", " "),
+                    unit,
+                    column,
+                    factor,
+                    is_count=statistic == "undetermined",
+                )
             )
     return found
 
@@ -95,7 +108,9 @@ def trial_measures(results: Results, of_parts: bool = True) -> list[Measure]:
             ("covered", "coverage_sigma_given", "%", 100.0),
         ):
             figure = f"{name}_{column}"
-            found.append(Measure(symbol, statistic, unit, figure, factor, f"{figure}_standard_error"))
+            found.append(
+                Measure(symbol, statistic, unit, figure, factor, f"{figure}_standard_error")
+            )
     return found
 
 
@@ -117,7 +132,9 @@ def descriptions(measures: Sequence[Measure]) -> list[str]:
     for symbol in dict.fromkeys(measure.symbol for measure in measures):
         known = DESCRIPTIONS.get(symbol.rstrip("'"))
         if known is not None:
-            found.append(f"{symbol}: {known}" + (" of a further artefact" if symbol.endswith("'") else ""))
+            found.append(
+                f"{symbol}: {known}" + (" of a further artefact" if symbol.endswith("'") else "")
+            )
     return found
 
 

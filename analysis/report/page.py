@@ -1,4 +1,6 @@
-"""A sweep's results as one page that needs nothing else: no network, no script, no file beside it."""
+"""A sweep's results as one page that needs nothing else: no network, no script, no file beside
+it.
+"""
 
 from __future__ import annotations
 
@@ -63,18 +65,25 @@ class DrawnMap:
     figures: tuple[Drawn, ...]
 
 
-def page(store: Store, results: Results, run_modules: bool = False, report: Report = unreported) -> str:
-    """The page. Experiments with code of their own are drawn only with `run_modules`; `report` is told what is drawn.
+def page(
+    store: Store, results: Results, run_modules: bool = False, report: Report = unreported
+) -> str:
+    """The page. Experiments with code of their own are drawn only with `run_modules`; `report` is
+    told what is drawn.
 
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     environment.filters.update(micro=micro, full=repr)
     package = resources.files(__package__)
-    template = environment.from_string(package.joinpath("template.html").read_text(encoding="utf-8"))
+    template = environment.from_string(
+        package.joinpath("template.html").read_text(encoding="utf-8")
+    )
     drawn = plots(results)
     context: dict[str, Any] = {
         "title": one_line(results.title),
@@ -130,19 +139,26 @@ def _facts(results: Results) -> list[tuple[str, str]]:
         if len(labels) > LISTED:
             labels = [*labels[: LISTED - 1], f"… {labels[-1]} ({len(labels)} values)"]
         facts.append((f"Axis {axis.name}", ", ".join(labels)))
+    cells = f"{len(results.cells)}: {results.count('done')} done, "
+    cells += f"{results.count('failed')} failed, {results.left} left"
+    if results.found.unreadable:
+        cells += f", {len(results.found.unreadable)} could not be read: {_unreadable(results)}"
     facts += [
-        ("Cells", f"{len(results.cells)}: {results.count('done')} done, {results.count('failed')} failed, "
-                  f"{results.left} left"
-                  + (f", {len(results.found.unreadable)} could not be read: {_unreadable(results)}"
-                     if results.found.unreadable else "")),
+        ("Cells", cells),
         ("Recorded", ", ".join(stored["record"])),
-        ("Monte Carlo", f"{stored['trials']} data sets of each cell" if stored["trials"] else "none"),
-    ]  # fmt: skip
+        (
+            "Monte Carlo",
+            f"{stored['trials']} data sets of each cell" if stored["trials"] else "none",
+        ),
+    ]
     facts += [("Seed", str(stored["seed"]))] if stored["trials"] else []
     names = [name for name in results.frame.columns if name.endswith("_version")]
     counts = Counter(zip(*(results.frame[name].tolist() for name in names), strict=True))
     for versions, count in counts.items():
-        words = ", ".join(f"{name.removesuffix('_version')} {one}" for name, one in zip(names, versions, strict=True))
+        words = ", ".join(
+            f"{name.removesuffix('_version')} {one}"
+            for name, one in zip(names, versions, strict=True)
+        )
         facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cells)"))
     return facts
 
@@ -156,12 +172,15 @@ def _unreadable(results: Results) -> str:
 def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawn]]]:
     found = []
     number_of = 0
-    for axis, some in groupby(counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name):
+    for axis, some in groupby(
+        counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name
+    ):
         figures = []
         for plot in some:
             number_of += 1
-            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}. {plot.note}".strip()
-            figures.append(Drawn(plot_svg(plot, f"plot{number_of}"), caption))
+            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}."
+            picture = plot_svg(plot, f"plot{number_of}")
+            figures.append(Drawn(picture, f"{caption} {plot.note}".strip()))
         found.append((axis, figures))
     return found
 
@@ -178,15 +197,23 @@ def _designs(store: Store, results: Results, run_modules: bool, report: Report) 
         return {**empty, "no_designs": str(error)}
     symbol = judged[1].replace("_", " ")
     designs = []
-    for k, (cell, experiment) in enumerate(counted(zip(cells, found, strict=True), "designs", len(cells), report)):
+    for k, (cell, experiment) in enumerate(
+        counted(zip(cells, found, strict=True), "designs", len(cells), report)
+    ):
         which = ("Smallest", "Largest")[k] if len(cells) > 1 else "The only"
         row = int(np.flatnonzero(results.frame["cell"] == cell)[0])
-        value, open_ = (results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined"))
+        value, open_ = (
+            results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined")
+        )
         told = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
         told += f", {open_:.0f} undetermined" if open_ else ""
         heading = f"{which} average of {symbol}{told}: cell {cell}, {results.label(cell)}"
         designs.append(_drawn_design(experiment, cell, heading, k))
-    return {"designs": designs, "no_designs": "", "error_map": _drawn_map(found[0], results, cells[0])}
+    return {
+        "designs": designs,
+        "no_designs": "",
+        "error_map": _drawn_map(found[0], results, cells[0]),
+    }
 
 
 def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> DrawnDesign:
@@ -194,20 +221,37 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
     drawn = scene(design)
     sizes = " x ".join(f"{1000 * size:.6g}" for size in design.upper - design.lower)
     words = f"Volume of {sizes} mm with {len(drawn.places)} positions, which the table below lists."
-    caption = "Positions in the volume: balls that are read (circles), and from one ball the styli to the machine's "
+    caption = (
+        "Positions in the volume: balls that are read (circles), and from one ball the styli to the"
+        " machine's "
+    )
     caption += "reference point (squares)."
     if len(drawn.places) > MOST_NAMES:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
         caption += " Of many balls only some are drawn."
     has_offsets = any(tip.any() for _, tip in drawn.tips)
-    probes = probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}") if has_offsets else ""
-    return DrawnDesign(cell, heading, scene_svg(drawn, f"scene{k}", words), probes, caption, _positions(drawn, cell))
+    probes = (
+        probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}")
+        if has_offsets
+        else ""
+    )
+    return DrawnDesign(
+        cell,
+        heading,
+        scene_svg(drawn, f"scene{k}", words),
+        probes,
+        caption,
+        _positions(drawn, cell),
+    )
 
 
 def _positions(drawn: Scene, cell: int) -> Table:
     rows = [
-        Row((str(place.number), place.name, place.artefact, ", ".join(place.probes)), (Entry(str(place.read)),))
+        Row(
+            (str(place.number), place.name, place.artefact, ", ".join(place.probes)),
+            (Entry(str(place.read)),),
+        )
         for place in sorted(drawn.places, key=lambda place: place.number)
     ]
     headings = ("number", "position", "artefact", "probes")
@@ -218,19 +262,26 @@ def _positions(drawn: Scene, cell: int) -> Table:
 def _drawn_map(experiment: Experiment, results: Results, cell: int) -> DrawnMap:
     found = error_map(experiment)
     words = (
-        f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the root mean square "
-        f"over the co-ordinates of a point, with the probe {experiment.evaluation.probe}, in µm."
+        f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the"
+        " root mean square over the co-ordinates of a point, with the probe"
+        f" {experiment.evaluation.probe}, in µm."
     )
     if any(np.isnan(one.values).any() for one in found.slices):
         words += " Hatched regions are undetermined."
     if found.within is not None:
         words += (
-            f" Of the distances between all points of this grid {percent(found.within)} are known to within "
-            f"the target accuracy, by the {uncertainty_words(experiment.coverage_factor)}."
+            f" Of the distances between all points of this grid {percent(found.within)} are known"
+            " to within the target accuracy, by the"
+            f" {uncertainty_words(experiment.coverage_factor)}."
         )
     figures = []
     for k, one in enumerate(found.slices):
         told = slice_words(one)
         caption = told[0].upper() + told[1:] + "."
-        figures.append(Drawn(slice_svg(found, one, f"slice{k}", f"Map of standard uncertainties, {told}"), caption))
+        figures.append(
+            Drawn(
+                slice_svg(found, one, f"slice{k}", f"Map of standard uncertainties, {told}"),
+                caption,
+            )
+        )
     return DrawnMap(words, tuple(figures))

@@ -11,7 +11,19 @@ from ballplate.simulator.machines.protocol import Array
 
 from ..results.formatting import number
 from .scene import Place, Scene, scene
-from .svg import DASHES, INK, MUTED, PAPER, SERIES, WIDTH, as_svg, blank_axes, drawing, placed_axes, save
+from .svg import (
+    DASHES,
+    INK,
+    MUTED,
+    PAPER,
+    SERIES,
+    WIDTH,
+    as_svg,
+    blank_axes,
+    drawing,
+    placed_axes,
+    save,
+)
 from .volume import ErrorMap, Slice
 
 if TYPE_CHECKING:
@@ -24,8 +36,8 @@ LEFT, RIGHT, BELOW, ABOVE = 50.0, 18.0, 40.0, 10.0
 # Positions whose names fit into the drawing; more are numbered.
 MOST_NAMES = 8
 
-# Bands between lines of the error map at most, from the first of these colours to the second: light enough for dark
-# letters everywhere.
+# Bands between lines of the error map at most, from the first of these colours to the second: light
+# enough for dark letters everywhere.
 MOST_BANDS = 10
 LIGHT = ("#f6f9fc", "#79a4cb")
 DARK = "#101010"
@@ -39,7 +51,8 @@ def scene_svg(drawn: Scene, name: str, words: str) -> str:
 
 
 def draw_design(design: Design, words: str, path: str | Path | None = None) -> Figure:
-    """The positions of a design in the volume as a picture of its own, which is written to the path if there is one.
+    """The positions of a design in the volume as a picture of its own, which is written to the path
+    if there is one.
 
     :raises ImportError: matplotlib is missing.
     :raises ValueError: the name ends in none of the kinds of pictures.
@@ -52,7 +65,9 @@ def draw_design(design: Design, words: str, path: str | Path | None = None) -> F
 
 
 def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:
-    """The volume with the positions in it, which are told by their names or numbers, on axes without a frame."""
+    """The volume with the positions in it, which are told by their names or numbers, on axes
+    without a frame.
+    """
     for edge, is_hidden in zip(drawn.edges, drawn.hidden, strict=True):
         axes.plot(*edge.T, color=MUTED, linewidth=0.8, linestyle=":" if is_hidden else "-")
     taken = [at for axis in drawn.axes for at in _write_axis(axes, drawn, *axis)]
@@ -62,13 +77,17 @@ def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:
     for place in drawn.places:
         _name(axes, place, taken, size, by_number)
     # Room for what is written around the volume and for plates that stand out of it.
-    drawn_points = np.concatenate([drawn.edges.reshape(-1, 2), *(place.outline for place in drawn.places)])
+    drawn_points = np.concatenate(
+        [drawn.edges.reshape(-1, 2), *(place.outline for place in drawn.places)]
+    )
     low, high = drawn_points.min(axis=0) - 0.11 * size, drawn_points.max(axis=0) + 0.11 * size
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
 
 
-def _write_axis(axes: Axes, drawn: Scene, name: str, ends: Array, low: float, high: float) -> list[Array]:
+def _write_axis(
+    axes: Axes, drawn: Scene, name: str, ends: Array, low: float, high: float
+) -> list[Array]:
     """Write the axis's name and ends beside its edge, away from the middle; where they stand."""
     middle = drawn.edges.reshape(-1, 2).mean(axis=0)
     centre = ends.mean(axis=0)
@@ -77,7 +96,11 @@ def _write_axis(axes: Axes, drawn: Scene, name: str, ends: Array, low: float, hi
     out = out if out @ (centre - middle) > 0 else -out
     size = float(np.ptp(drawn.edges.reshape(-1, 2), axis=0).max())
     written: list[Array] = []
-    for place, text in ((centre, f"{name}, mm"), (ends[0], _millimetres(low)), (ends[1], _millimetres(high))):
+    for place, text in (
+        (centre, f"{name}, mm"),
+        (ends[0], _millimetres(low)),
+        (ends[1], _millimetres(high)),
+    ):
         # Ends are drawn in, so that those of two axes keep apart.
         inward = 0.05 * size * np.sign((centre - place) @ along) * along
         at = place + inward + (0.06 * size) * out
@@ -100,8 +123,15 @@ def _place(axes: Axes, place: Place) -> None:
     else:
         axes.plot(*place.outline.T, color=colour, linestyle=dash, linewidth=1.3)
     size = 3.0 if len(place.balls) <= 50 else 2.0
-    axes.plot(*place.balls.T, color=colour, linestyle="none", marker="o", markersize=size, markeredgewidth=0.6,
-              markerfacecolor=PAPER)  # fmt: skip
+    axes.plot(
+        *place.balls.T,
+        color=colour,
+        linestyle="none",
+        marker="o",
+        markersize=size,
+        markeredgewidth=0.6,
+        markerfacecolor=PAPER,
+    )
     for stylus in place.styli:
         axes.plot(*stylus.T, color=INK, linewidth=1.4)
         axes.plot(*stylus[1], color=INK, marker="s", markersize=3.2)
@@ -116,7 +146,10 @@ def _name(axes: Axes, place: Place, taken: list[Array], size: float, by_number: 
     places = np.concatenate([corners, between])
     places = places + 0.05 * size * _unit(places - centre)
     # Names are wide and low: a difference in height counts for more.
-    apart = [min((float(np.hypot(*((at - other) * [1.0, 3.0]))) for other in taken), default=0.0) for at in places]
+    apart = [
+        min((float(np.hypot(*((at - other) * [1.0, 3.0]))) for other in taken), default=0.0)
+        for at in places
+    ]
     at = places[int(np.argmax(apart))]
     taken.append(at)
     edge = SERIES[(place.number - 1) % len(SERIES)] if by_number else "none"
@@ -137,7 +170,9 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
         axes.plot(0.0, 0.0, color=INK, marker="s", markersize=6.0)
         groups: list[tuple[Array, list[str]]] = []
         for probe, tip in drawn.tips:
-            same = next((names for at, names in groups if np.abs(at - tip).max() < 0.02 * size), None)
+            same = next(
+                (names for at, names in groups if np.abs(at - tip).max() < 0.02 * size), None
+            )
             if same is None:
                 groups.append((tip, [probe]))
             else:
@@ -150,7 +185,12 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
             height = "bottom" if away[1] > 0.5 else "top" if away[1] < -0.5 else "center"
             text = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
             axes.annotate(
-                text, (tip[0], tip[1]), (9.0 * away[0], 9.0 * away[1]), textcoords="offset points", ha=side, va=height
+                text,
+                (tip[0], tip[1]),
+                (9.0 * away[0], 9.0 * away[1]),
+                textcoords="offset points",
+                ha=side,
+                va=height,
             )
         axes.set_xlim(-2.2 * size, 2.2 * size)
         axes.set_ylim(-1.5 * size, 1.3 * size)
@@ -158,7 +198,9 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
 
 
 def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
-    """A level of the error map: shades with the same limits in all levels, and lines with their values."""
+    """A level of the error map: shades with the same limits in all levels, and lines with their
+    values.
+    """
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.ticker import MaxNLocator
 
@@ -166,7 +208,9 @@ def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
     every = 1e6 * np.concatenate([level.values.ravel() for level in drawn.slices])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 1.0)
-    levels = MaxNLocator(nbins=MOST_BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, max(high, low + 1e-9))
+    levels = MaxNLocator(nbins=MOST_BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(
+        low, max(high, low + 1e-9)
+    )
     span = np.array([np.ptp(drawn.x), np.ptp(drawn.y)])
     width = WIDTH - LEFT - RIGHT
     height = min(max(width * float(span[1] / span[0]), 150.0), 450.0)
@@ -180,12 +224,18 @@ def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
         axes.set_ylim(y[0], y[-1])
         hatched = np.isnan(values)
         if hatched.any():
-            axes.contourf(x, y, hatched.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
+            axes.contourf(
+                x, y, hatched.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"]
+            )
         if not hatched.all():
-            colours = LinearSegmentedColormap.from_list("light", LIGHT)(np.linspace(0.0, 1.0, len(levels) - 1))
+            colours = LinearSegmentedColormap.from_list("light", LIGHT)(
+                np.linspace(0.0, 1.0, len(levels) - 1)
+            )
             axes.contourf(x, y, np.ma.masked_invalid(values), levels=levels, colors=colours)
             if ((np.nanmin(values) < levels) & (levels < np.nanmax(values))).any():
-                lines = axes.contour(x, y, np.ma.masked_invalid(values), levels=levels, colors=DARK, linewidths=0.8)
+                lines = axes.contour(
+                    x, y, np.ma.masked_invalid(values), levels=levels, colors=DARK, linewidths=0.8
+                )
                 axes.clabel(lines, fmt=lambda value: f"{value:.3g}", fontsize=9.5, colors=DARK)
         return as_svg(figure, name, words)
 

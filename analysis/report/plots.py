@@ -14,7 +14,8 @@ from .svg import DASHES, INK, MARKERS, PAPER, SERIES, WIDTH, as_svg, drawing, mi
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Ratio of the largest to the smallest value above which an axis is logarithmic, unless its values are evenly spaced.
+# Ratio of the largest to the smallest value above which an axis is logarithmic, unless its values
+# are evenly spaced.
 WIDE = 30.0
 
 # Letters of a legend's line.
@@ -65,7 +66,11 @@ def _panel(axes: Axes, plot: Plot, panel: Panel) -> None:
     else:
         axes.set_ylim(0, 1.06 * float(finite.max(initial=0.0)) or 1.0)
     numbers = np.unique(plot.axis.numbers)
-    if numbers.min() > 0 and numbers.max() > WIDE * numbers.min() and np.median(numbers) < 0.3 * numbers.max():
+    if (
+        numbers.min() > 0
+        and numbers.max() > WIDE * numbers.min()
+        and np.median(numbers) < 0.3 * numbers.max()
+    ):
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_locator(NullLocator())
@@ -77,16 +82,40 @@ def _line(axes: Axes, line: Line, k: int) -> None:
     colour, marker = SERIES[k], MARKERS[k]
     if len(line.low):
         bars = np.stack([line.y - line.low, line.high - line.y])
-        axes.errorbar(line.x, line.y, bars, color=colour, marker=marker, markersize=3.5, elinewidth=1.0, capsize=2.5)
+        axes.errorbar(
+            line.x,
+            line.y,
+            bars,
+            color=colour,
+            marker=marker,
+            markersize=3.5,
+            elinewidth=1.0,
+            capsize=2.5,
+        )
         return
     label = _wrapped(line.label) or "linearised"
-    axes.plot(line.x, line.y, color=colour, linestyle=DASHES[k], marker=marker, markerfacecolor=PAPER, label=label)
+    axes.plot(
+        line.x,
+        line.y,
+        color=colour,
+        linestyle=DASHES[k],
+        marker=marker,
+        markerfacecolor=PAPER,
+        label=label,
+    )
     if len(line.actual):
         told = "Monte Carlo, ± one standard error" if k == 0 else None
         axes.errorbar(
-            line.x, line.actual, line.error, color=INK, linestyle="none", elinewidth=1.2, capsize=5.0, capthick=1.2,
+            line.x,
+            line.actual,
+            line.error,
+            color=INK,
+            linestyle="none",
+            elinewidth=1.2,
+            capsize=5.0,
+            capthick=1.2,
             label=told,
-        )  # fmt: skip
+        )
 
 
 def _wrapped(text: str) -> str:
@@ -102,8 +131,11 @@ def words(plot: Plot) -> str:
             if not len(known):
                 continue
             ends = [
-                f"{number(line.y[k], 3)} {micro(plot.unit)} at {line.x[k]:.6g} {micro(plot.axis.unit)}".rstrip()
+                f"{number(line.y[k], 3)} {micro(plot.unit)} at {line.x[k]:.6g}"
+                f" {micro(plot.axis.unit)}".rstrip()
                 for k in sorted({known[0], known[-1]})
             ]
-            told.append(" ".join([panel.measure.statistic, line.label]).rstrip() + ": " + ", ".join(ends))
+            told.append(
+                " ".join([panel.measure.statistic, line.label]).rstrip() + ": " + ", ".join(ends)
+            )
     return f"{plot.symbol} against {plot.axis.name}. " + "; ".join(told)

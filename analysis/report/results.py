@@ -23,14 +23,17 @@ if TYPE_CHECKING:
 
 Integers = NDArray[np.int64]
 
-# The quantities whose average makes one cell better than another; the first of these that is recorded.
+# The quantities whose average makes one cell better than another; the first of these that is
+# recorded.
 PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
 CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERRED))
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of the sweep; `numbers` are its values in `unit` as the file writes them, none where they are texts."""
+    """An axis of the sweep; `numbers` are its values in `unit` as the file writes them, none where
+    they are texts.
+    """
 
     name: str
     column: str
@@ -57,9 +60,9 @@ class Axis:
 class Results:
     """A sweep and what has come of it.
 
-    `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows of those that are
-    done or have failed, `chosen` (rows, axes) their indices, and `texts` what was told of them, by cell. `found` is
-    what the store holds of them.
+    `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows
+    of those that are done or have failed, `chosen` (rows, axes) their indices, and `texts` what was
+    told of them, by cell. `found` is what the store holds of them.
     """
 
     number: int
@@ -86,7 +89,8 @@ class Results:
     def label(self, cell: int) -> str:
         """A cell in words."""
         return ", ".join(
-            f"{axis.name} {axis.labels[k]}" for axis, k in zip(self.axes, self.cells[cell].tolist(), strict=True)
+            f"{axis.name} {axis.labels[k]}"
+            for axis, k in zip(self.axes, self.cells[cell].tolist(), strict=True)
         )
 
     def value(self, name: str, row: int) -> float:
@@ -105,7 +109,11 @@ class Results:
 
     def figure(self, name: str) -> NDArray[np.float64]:
         """A column of the frame (rows,); NaN where none was recorded."""
-        return np.asarray(self.frame[name], float) if name in self.frame else np.full(len(self.frame), np.nan)
+        return (
+            np.asarray(self.frame[name], float)
+            if name in self.frame
+            else np.full(len(self.frame), np.nan)
+        )
 
 
 def read_results(store: Store, sweep: int | None) -> Results:
@@ -119,7 +127,16 @@ def read_results(store: Store, sweep: int | None) -> Results:
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = results(store, number, len(cells))
     texts = dict(zip(found.cells.tolist(), found.details, strict=True))
-    return Results(number, definition, axes, cells, frame_of(found, definition), cells[found.cells], texts, found)
+    return Results(
+        number,
+        definition,
+        axes,
+        cells,
+        frame_of(found, definition),
+        cells[found.cells],
+        texts,
+        found,
+    )
 
 
 def _axis(stored: dict[str, Any]) -> Axis:
@@ -138,7 +155,9 @@ def _axis(stored: dict[str, Any]) -> Axis:
 
 
 def partly_open(results: Results, symbol: str) -> NDArray[np.bool_]:
-    """Rows of the frame (rows,) in which some of a quantity's values are undetermined, so that others stand for all."""
+    """Rows of the frame (rows,) in which some of a quantity's values are undetermined, so that
+    others stand for all.
+    """
     column = f"{symbol_column(symbol.rstrip(MORE))}_undetermined"
     if column not in results.frame:
         return np.zeros(len(results.frame), bool)
@@ -151,7 +170,9 @@ def one_line(text: object) -> str:
 
 
 def criterion(results: Results) -> tuple[str, str] | None:
-    """Column of the average that cells are judged by, and its quantity; None where none is recorded."""
+    """Column of the average that cells are judged by, and its quantity; None where none is
+    recorded.
+    """
     for name in CRITERIA:
         for column in results.frame.columns:
             if column.startswith(f"{name}_average_"):
@@ -160,7 +181,8 @@ def criterion(results: Results) -> tuple[str, str] | None:
 
 
 def best_and_worst(results: Results) -> tuple[int, ...]:
-    """The cell with the smallest average uncertainty, and that with the largest; those that leave less open come first.
+    """The cell with the smallest average uncertainty, and that with the largest; those that leave
+    less open come first.
 
     One cell if there is only one, none if none is done or nothing is recorded.
     """
@@ -170,7 +192,9 @@ def best_and_worst(results: Results) -> tuple[int, ...]:
 
 
 def ranked(results: Results) -> Integers:
-    """Rows of the cells that are done, best first: those that leave less open, then of smaller average uncertainty."""
+    """Rows of the cells that are done, best first: those that leave less open, then of smaller
+    average uncertainty.
+    """
     judged = criterion(results)
     done = np.flatnonzero(results.done)
     if judged is None:
@@ -199,12 +223,17 @@ def cell_list(cells: Iterable[int], most: int = 12) -> str:
 
 
 def common_values(results: Results, cells: Sequence[int]) -> str:
-    """Values of axes that a set of cells has and no other cell: what tells it from the others, if anything does."""
+    """Values of axes that a set of cells has and no other cell: what tells it from the others, if
+    anything does.
+    """
     inside = np.zeros(len(results.cells), bool)
     inside[list(cells)] = True
     words = []
     for k, axis in enumerate(results.axes):
-        mine, others = set(results.cells[inside, k].tolist()), set(results.cells[~inside, k].tolist())
+        mine, others = (
+            set(results.cells[inside, k].tolist()),
+            set(results.cells[~inside, k].tolist()),
+        )
         if len(others) and not mine & others and len(mine) <= 6:
             words.append(f"{axis.name} " + " or ".join(axis.labels[i] for i in sorted(mine)))
     return ", ".join(words)

@@ -18,7 +18,8 @@ MOST_BALLS = 200
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A position on the paper: outline (k, 2), balls that are read (m, 2), styli (n, 2, 2) from tip to reference point.
+    """A position on the paper: outline (k, 2), balls that are read (m, 2), styli (n, 2, 2) from tip
+    to reference point.
 
     `number` counts from 1 in the order of the file; `depth` is larger for what stands further back.
     """
@@ -36,10 +37,11 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A design on the paper, in metres: edges (k, 2, 2) of the volume, hidden ones marked, and positions, rear first.
+    """A design on the paper, in metres: edges (k, 2, 2) of the volume, hidden ones marked, and
+    positions, rear first.
 
-    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, `tips` the probes' tips
-    about the reference point.
+    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, `tips`
+    the probes' tips about the reference point.
     """
 
     edges: Array
@@ -80,7 +82,10 @@ def scene(design: Design) -> Scene:
             )
         )
     places.sort(key=lambda place: -place.depth)
-    tips = tuple((name, view @ offset) for name, offset in zip(design.probe_names, design.probes, strict=True))
+    tips = tuple(
+        (name, view @ offset)
+        for name, offset in zip(design.probe_names, design.probes, strict=True)
+    )
     return Scene(edges @ view.T, hidden, tuple(places), _axes(design, view), tips)
 
 
@@ -99,7 +104,12 @@ def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[n
     """Edges of the volume, and which are behind it."""
     d = len(lower)
     corners = np.array(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij")).reshape(d, -1).T
-    edges = [(one, other) for k, one in enumerate(corners) for other in corners[k + 1 :] if (one != other).sum() == 1]
+    edges = [
+        (one, other)
+        for k, one in enumerate(corners)
+        for other in corners[k + 1 :]
+        if (one != other).sum() == 1
+    ]
     if d == 2:
         return np.array(edges), np.zeros(len(edges), bool)
     rear = corners[(corners @ away).argmax()]
@@ -126,7 +136,9 @@ def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float],
     for k, start in enumerate(starts):
         end = start.copy()
         start[k], end[k] = lower[k], upper[k]
-        found.append(("xyz"[k], np.stack([view @ start, view @ end]), float(lower[k]), float(upper[k])))
+        found.append(
+            ("xyz"[k], np.stack([view @ start, view @ end]), float(lower[k]), float(upper[k]))
+        )
     return tuple(found)
 
 

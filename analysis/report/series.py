@@ -1,4 +1,6 @@
-"""What the plots of a report show: an uncertainty along a swept axis, for each setting of the other axes."""
+"""What the plots of a report show: an uncertainty along a swept axis, for each setting of the other
+axes.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ MOST_LINES, MOST_PLACES = 6, 24
 class Line:
     """Values along an axis; `low` and `high` their range where they are medians over several cells.
 
-    `actual` and `error` are what Monte Carlo makes of it and its standard error, empty where no trials were made.
+    `actual` and `error` are what Monte Carlo makes of it and its standard error, empty where no
+    trials were made.
     """
 
     label: str
@@ -55,7 +58,11 @@ class Plot:
 
 def plots(results: Results) -> list[Plot]:
     """A plot for each axis with numbers and each quantity of one unit."""
-    measures = [m for m in uncertainty_measures(results) if not m.is_count and m.statistic in ("average", "maximum")]
+    measures = [
+        m
+        for m in uncertainty_measures(results)
+        if not m.is_count and m.statistic in ("average", "maximum")
+    ]
     measures = [m for m in measures if " or " not in m.unit]
     found = []
     for k, axis in enumerate(results.axes):
@@ -93,7 +100,8 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
                 chosen = chosen[np.argsort(np.array(axis.numbers)[places[chosen]], kind="stable")]
                 x, y = np.array(axis.numbers)[places[chosen]], values[chosen]
                 words = ", ".join(
-                    f"{results.axes[i].name} {results.axes[i].labels[j]}" for i, j in zip(others, setting, strict=True)
+                    f"{results.axes[i].name} {results.axes[i].labels[j]}"
+                    for i, j in zip(others, setting, strict=True)
                 )
                 empty = np.zeros(0)
                 here = (actual[chosen], error[chosen]) if len(actual) else (empty, empty)
@@ -102,7 +110,11 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
             lines.append(_median(axis, places, groups, values))
         panels.append(Panel(measure, tuple(lines)))
     if not is_apart:
-        over = f"the {len(settings)} settings of the other axes" if len(settings) > 1 else "these values"
+        over = (
+            f"the {len(settings)} settings of the other axes"
+            if len(settings) > 1
+            else "these values"
+        )
         note = f"Median, with bars from the smallest to the largest, over {over}{note}."
     if left_out.any():
         note = f"{note} Cells in which some of it is undetermined are left out.".strip()
@@ -110,23 +122,37 @@ def _plot(results: Results, k: int, symbol: str, measures: Sequence[Measure]) ->
 
 
 def _places(axis: Axis, places: NDArray[np.int64]) -> tuple[NDArray[np.int64] | None, str]:
-    """Groups of neighbouring values by index, where there are too many to show each; None where there are not."""
+    """Groups of neighbouring values by index, where there are too many to show each; None where
+    there are not.
+    """
     count = len(axis.numbers)
     if count <= MOST_PLACES or not len(places):
         return None, ""
     order = np.argsort(np.argsort(np.array(axis.numbers), kind="stable"), kind="stable")
-    return order * MOST_PLACES // count, f", and over groups of neighbouring ones of the {count} values"
+    return (
+        order * MOST_PLACES // count,
+        f", and over groups of neighbouring ones of the {count} values",
+    )
 
 
-def _median(axis: Axis, places: NDArray[np.int64], groups: NDArray[np.int64] | None, values: Floats) -> Line:
+def _median(
+    axis: Axis, places: NDArray[np.int64], groups: NDArray[np.int64] | None, values: Floats
+) -> Line:
     """Median and range at each place."""
     import pandas
 
     numbers = np.array(axis.numbers)
     key = places if groups is None else groups[places]
-    table = pandas.DataFrame({"key": key, "x": numbers[places], "y": values}).dropna().groupby("key")
+    table = (
+        pandas.DataFrame({"key": key, "x": numbers[places], "y": values}).dropna().groupby("key")
+    )
     found = pandas.DataFrame(
-        {"x": table["x"].median(), "y": table["y"].median(), "low": table["y"].min(), "high": table["y"].max()}
+        {
+            "x": table["x"].median(),
+            "y": table["y"].median(),
+            "low": table["y"].min(),
+            "high": table["y"].max(),
+        }
     ).sort_values("x")
     x, y, low, high = (found[name].to_numpy(float) for name in ("x", "y", "low", "high"))
     return Line("median", x, y, low, high, np.zeros(0), np.zeros(0))
@@ -135,12 +161,15 @@ def _median(axis: Axis, places: NDArray[np.int64], groups: NDArray[np.int64] | N
 def _actual(results: Results, measure: Measure, done: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """What Monte Carlo makes of an average, and its standard error; nothing where there is none.
 
-    It is the average times the ratio of actual to linearised errors: where Monte Carlo follows a sample of the
-    distances only, the average of these may differ from that of all, the ratio does not.
+    It is the average times the ratio of actual to linearised errors: where Monte Carlo follows a
+    sample of the distances only, the average of these may differ from that of all, the ratio does
+    not.
     """
     name = symbol_column(measure.symbol)
     if measure.statistic != "average" or measure.symbol not in trial_symbols(results):
         return np.zeros(0), np.zeros(0)
     average = measure.factor * results.figure(measure.figure)[done]
-    ratio, error = (results.figure(f"{name}_actual_ratio{end}")[done] for end in ("", "_standard_error"))
+    ratio, error = (
+        results.figure(f"{name}_actual_ratio{end}")[done] for end in ("", "_standard_error")
+    )
     return average * ratio, average * error

@@ -1,4 +1,6 @@
-"""Drawings as SVG that stands inside a page: the same bytes each time, in the page's own colours."""
+"""Drawings as SVG that stands inside a page: the same bytes each time, in the page's own
+colours.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,8 @@ SETTINGS: Any = {
 
 
 def round_number(value: float) -> float:
-    """The largest of 1, 2, 5, 10, … and of 0.5, 0.2, 0.1, … that is not larger than a positive value.
+    """The largest of 1, 2, 5, 10, … and of 0.5, 0.2, 0.1, … that is not larger than a positive
+    value.
 
     >>> round_number(730.0), round_number(0.0021), round_number(1e6)
     (500.0, 0.002, 1000000.0)
@@ -76,14 +79,17 @@ def round_number(value: float) -> float:
 
 @contextmanager
 def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
-    """A figure of a size in points. Its parts are placed by hand, which takes half the time of a layout found.
+    """A figure of a size in points. Its parts are placed by hand, which takes half the time of a
+    layout found.
 
     :raises ImportError: matplotlib is missing; the text has the command that installs it.
     """
     try:
         import matplotlib
     except ImportError as error:
-        text = "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
+        text = (
+            "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
+        )
         raise ImportError(text, name="matplotlib") from error
     from .figures import Picture
 
@@ -122,9 +128,16 @@ def micro(text: str) -> str:
 
 
 def as_svg(figure: Figure, name: str, words: str) -> str:
-    """The figure as an element of a page, with `name` in front of its ids and a text for those who do not see it."""
+    """The figure as an element of a page, with `name` in front of its ids and a text for those who
+    do not see it.
+    """
     found = io.StringIO()
-    figure.savefig(found, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    figure.savefig(
+        found,
+        format="svg",
+        transparent=True,
+        metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")),
+    )
     body = found.getvalue()
     body = body[body.index("<svg") :]
     size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', body)
@@ -136,14 +149,19 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
     inner = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", inner, flags=re.DOTALL)
     # Groups that nothing refers to need no id.
     used = set(re.findall(r'(?:xlink:href="#|url\(#)([^")]+)', inner))
-    inner = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", inner)
+    inner = re.sub(
+        r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", inner
+    )
     inner = re.sub(r'xlink:href="#([^"]+)"', rf'href="#{name}-\1"', inner)
     inner = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", inner)
     for colour, variable in COLOURS.items():
         inner = inner.replace(colour, f"var({variable})")
     inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font: \1px sans-serif", inner)
     inner = re.sub(r"\n\s*", "\n", inner)
-    start = f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img" aria-label="{escape(words, quote=True)}">'
+    start = (
+        f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img"'
+        f' aria-label="{escape(words, quote=True)}">'
+    )
     return start + inner.strip()
 
 
@@ -151,7 +169,8 @@ PICTURES = (".svg", ".png", ".pdf")
 
 
 def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
-    """Write the figure to a file of its own, of the kind its name ends in, with words for those who do not see it.
+    """Write the figure to a file of its own, of the kind its name ends in, with words for those who
+    do not see it.
 
     The figure is given back, with the words as its label; without a path nothing is written.
 
@@ -177,7 +196,8 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
     else:
         metadata = {"Title": words, "Software": None}
     with matplotlib.rc_context({"svg.fonttype": "path"}):
-        # Not to the file itself: where a disk is full, errors of the compression hide that of the file.
+        # Not to the file itself: where a disk is full, errors of the compression hide that of the
+        # file.
         whole = io.BytesIO()
         figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
     path.write_bytes(whole.getvalue())

@@ -33,22 +33,29 @@ STAR = "*"
 
 
 def report_tables(results: Results) -> tuple[Table, ...]:
-    """All tables of figures: the uncertainties and, where trials were made, those of Monte Carlo."""
+    """All tables of figures: the uncertainties and, where trials were made, those of Monte
+    Carlo.
+    """
     beside = _is_beside(results)
     measures = [*rank_measures(results), *uncertainty_measures(results, beside)]
     open_ = f"Maxima and averages leave out what is undetermined; {STAR} marks those that do."
     notes = (open_,) if rank_measures(results) else ()
-    found = [_table(results, "uncertainties", "Standard uncertainties", measures, beside, notes)] if measures else []
+    found = (
+        [_table(results, "uncertainties", "Standard uncertainties", measures, beside, notes)]
+        if measures
+        else []
+    )
     if not beside and len(results.frame) > 1:
         found = [*_best(results), *found]
     of_trials = trial_measures(results, beside)
     if of_trials:
         caption = "Monte Carlo beside the uncertainties"
         note = (
-            "In parentheses the standard error in units of the last digit; actual is the root mean square of the "
-            "errors, averaged as U is; covered is the share of true values within the expanded uncertainty for 95 %. "
-            "U5 and U6 are followed over 1000 distances where there are more, of which actual is the average and which "
-            "spread / U compares with their own U."
+            "In parentheses the standard error in units of the last digit; actual is the root mean"
+            " square of the errors, averaged as U is; covered is the share of true values within"
+            " the expanded uncertainty for 95 %. U5 and U6 are followed over 1000 distances where"
+            " there are more, of which actual is the average and which spread / U compares with"
+            " their own U."
         )
         found.append(_table(results, "monte-carlo", caption, of_trials, beside, (note, *notes)))
     return tuple(found)
@@ -90,8 +97,12 @@ def _table(
     return build(results, name, caption, measures, words)
 
 
-def _beside(results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]) -> Table:
-    """A column for each value of the last axis, a block for each of the first where there are two."""
+def _beside(
+    results: Results, name: str, caption: str, measures: Sequence[Measure], notes: tuple[str, ...]
+) -> Table:
+    """A column for each value of the last axis, a block for each of the first where there are
+    two.
+    """
     cells = {tuple(choice): cell for cell, choice in enumerate(results.cells.tolist())}
     rows = {int(cell): row for row, cell in enumerate(results.frame["cell"])}
     axis = results.axes[-1]
@@ -103,7 +114,9 @@ def _beside(results: Results, name: str, caption: str, measures: Sequence[Measur
             entries = []
             for last in range(len(axis.labels)):
                 cell = cells.get((last,) if first is None else (first, last))
-                entries.append(Entry("") if cell is None else _entry(results, measure, cell, rows.get(cell)))
+                entries.append(
+                    Entry("") if cell is None else _entry(results, measure, cell, rows.get(cell))
+                )
             found.append(Row((measure.name, measure.unit), tuple(entries)))
         title = "" if first is None else f"{results.axes[0].name} {results.axes[0].labels[first]}"
         if any(entry.text for row in found for entry in row.entries):
@@ -124,7 +137,10 @@ def _below(
     found = []
     for row in range(min(len(results.frame), MOST_ROWS)) if rows is None else rows:
         cell = int(results.frame["cell"].to_numpy()[row])
-        labels = tuple(axis.labels[k] for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True))
+        labels = tuple(
+            axis.labels[k]
+            for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True)
+        )
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
         found.append(Row((str(cell), *labels), entries))
     more = len(results.frame) - len(found)
@@ -154,7 +170,11 @@ def _entry(results: Results, measure: Measure, cell: int, row: int | None) -> En
         text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
     else:
         text = number(measure.factor * value, DIGITS)
-    if measure.stands_for_all and partly_open(results, measure.symbol)[row] and not math.isnan(value):
+    if (
+        measure.stands_for_all
+        and partly_open(results, measure.symbol)[row]
+        and not math.isnan(value)
+    ):
         text += STAR
     return Entry(text, value, cell, measure.figure)
 

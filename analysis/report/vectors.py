@@ -1,4 +1,6 @@
-"""Residuals of a plate's readings in two dimensions, as magnified vectors where the balls were read."""
+"""Residuals of a plate's readings in two dimensions, as magnified vectors where the balls were
+read.
+"""
 
 from __future__ import annotations
 
@@ -37,20 +39,24 @@ class Vectors:
 
 
 def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
-    """The largest of 1, 2, 5, 10, ... with which the longest vector takes no more than its part of `extent` metres.
+    """The largest of 1, 2, 5, 10, ... with which the longest vector takes no more than its part of
+    `extent` metres.
 
     >>> one = Vectors("", np.zeros((1, 2)), np.array([[3e-7, 4e-7]]))
     >>> magnification((one,), 0.5)
     200000.0
     """
-    longest = max((float(np.sqrt((g.residuals**2).sum(axis=1)).max(initial=0.0)) for g in groups), default=0.0)
+    longest = max(
+        (float(np.sqrt((g.residuals**2).sum(axis=1)).max(initial=0.0)) for g in groups), default=0.0
+    )
     if longest == 0.0 or extent == 0.0:
         return 1.0
     return round_number(LONGEST * extent / longest)
 
 
 def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | None = None) -> Figure:
-    """Residual vectors as a picture, each from the place that was read, with a bar of known length below.
+    """Residual vectors as a picture, each from the place that was read, with a bar of known length
+    below.
 
     It is written to the path, if there is one.
 
@@ -82,9 +88,17 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | Non
         for k, group in enumerate(groups):
             colour, marker = _style(k)
             ends = group.places + times * group.residuals
-            segments = np.stack([group.places, ends, np.full_like(ends, np.nan)], axis=1).reshape(-1, 2)
+            segments = np.stack([group.places, ends, np.full_like(ends, np.nan)], axis=1).reshape(
+                -1, 2
+            )
             axes.plot(*1e3 * segments.T, color=colour)
-            axes.plot(*1e3 * group.places.T, color=colour, marker=marker, markersize=MARKER, linestyle="none")
+            axes.plot(
+                *1e3 * group.places.T,
+                color=colour,
+                marker=marker,
+                markersize=MARKER,
+                linestyle="none",
+            )
         for text, place, away in named:
             axes.annotate(
                 text,
@@ -101,7 +115,9 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | Non
 
 
 def _named(groups: tuple[Vectors, ...]) -> list[tuple[str, Array, Array]]:
-    """Each ball's name once for each group, its place and the direction (2,) away from its vector."""
+    """Each ball's name once for each group, its place and the direction (2,) away from its
+    vector.
+    """
     found: dict[tuple[int, str], tuple[str, Array, Array]] = {}
     for k, group in enumerate(groups):
         for name, place, residual in zip(group.names, group.places, group.residuals, strict=False):
@@ -116,8 +132,12 @@ def _style(k: int) -> tuple[str, str]:
     return SERIES[k % len(SERIES)], MARKERS[(k + k // len(SERIES)) % len(MARKERS)]
 
 
-def _legend(figure: Figure, groups: tuple[Vectors, ...], times: float, per_millimetre: float) -> None:
-    """Names of the groups, and a bar of one, two or five of some unit, that long in the drawing as a residual is."""
+def _legend(
+    figure: Figure, groups: tuple[Vectors, ...], times: float, per_millimetre: float
+) -> None:
+    """Names of the groups, and a bar of one, two or five of some unit, that long in the drawing as
+    a residual is.
+    """
     longest = max(float(np.sqrt((g.residuals**2).sum(axis=1)).max()) for g in groups)
     length = round_number(longest) if longest > 0.0 else 1e-6
     w, h = 72.0 * figure.get_size_inches()
@@ -133,4 +153,10 @@ def _legend(figure: Figure, groups: tuple[Vectors, ...], times: float, per_milli
         scale.text(MARGIN + 30.0, y, group.label, va="center", color=INK)
     bar = 1e3 * length * times * per_millimetre
     scale.plot([MARGIN, MARGIN + bar], [6.0, 6.0], color=MUTED, linewidth=3.0)
-    scale.text(MARGIN + bar + 8.0, 6.0, f"{1e6 * length:g} µm, magnified {times:,.0f} times", va="center", color=INK)
+    scale.text(
+        MARGIN + bar + 8.0,
+        6.0,
+        f"{1e6 * length:g} µm, magnified {times:,.0f} times",
+        va="center",
+        color=INK,
+    )

@@ -17,7 +17,9 @@ AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?= (um|urad|ppm)\b)")
 
 @dataclass(frozen=True)
 class Group:
-    """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, less `more` of them."""
+    """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, less
+    `more` of them.
+    """
 
     heading: str
     cells: str
@@ -52,12 +54,16 @@ def ranks(results: Results) -> Groups:
     if "rank_deficiency" not in results.frame:
         return Groups(())
     done = results.done
-    columns = (results.frame[name].to_numpy()[done] for name in ("cell", "rank_deficiency", "as_expected"))
+    columns = (
+        results.frame[name].to_numpy()[done] for name in ("cell", "rank_deficiency", "as_expected")
+    )
     found: dict[Told, list[int]] = {}
     for cell, deficiency, expected in zip(*columns, strict=True):
         heading = f"rank deficiency {int(deficiency)}" if deficiency else "full rank"
         lines = tuple(results.texts.get(int(cell), {}).get("undetermined", ()))
-        found.setdefault((f"{heading}, {'' if expected else NOT}as expected", lines), []).append(int(cell))
+        found.setdefault((f"{heading}, {'' if expected else NOT}as expected", lines), []).append(
+            int(cell)
+        )
     return _told(results, found)
 
 
@@ -73,7 +79,9 @@ def weak(results: Results) -> Groups:
 
 
 def flags(results: Results) -> Groups:
-    """Cells by what Monte Carlo finds different from linear theory, and by why there is no Monte Carlo."""
+    """Cells by what Monte Carlo finds different from linear theory, and by why there is no Monte
+    Carlo.
+    """
     found: dict[Told, list[int]] = {}
     for cell, texts in results.texts.items():
         told = [f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()]
@@ -92,7 +100,11 @@ def failures(results: Results) -> Groups:
     failed = results.frame[results.frame["status"] == "failed"]
     for cell, reason in zip(failed["cell"], failed["reason"], strict=True):
         lines = tuple(str(reason).splitlines())
-        told: Told = (lines[0] if lines else "failed", ()) if len(lines) < 2 else (f"{len(lines)} errors", lines)
+        told: Told = (
+            (lines[0] if lines else "failed", ())
+            if len(lines) < 2
+            else (f"{len(lines)} errors", lines)
+        )
         found.setdefault(told, []).append(int(cell))
     return _told(results, found)
 
@@ -104,13 +116,19 @@ def _told(results: Results, found: Mapping[Told, list[int]]) -> Groups:
         form = heading, tuple(AMOUNT.sub("", line) for line in lines)
         alike.setdefault(form, ((heading, lines), []))[1].extend(cells)
     some = list(alike.values())[:MOST_GROUPS]
-    groups = [_group(results, *told, sorted(cells), len(found) > len(alike)) for told, cells in some]
+    groups = [
+        _group(results, *told, sorted(cells), len(found) > len(alike)) for told, cells in some
+    ]
     return Groups(tuple(groups), max(len(alike) - MOST_GROUPS, 0))
 
 
-def _group(results: Results, heading: str, lines: tuple[str, ...], cells: list[int], with_example: bool) -> Group:
+def _group(
+    results: Results, heading: str, lines: tuple[str, ...], cells: list[int], with_example: bool
+) -> Group:
     values = results.label(cells[0]) if len(cells) == 1 else common_values(results, cells)
     if with_example and lines and len(cells) > 1:
         heading += f", with the amounts of cell {cells[0]}"
     shown, more = lines[:MOST_LINES], max(len(lines) - MOST_LINES, 0)
-    return Group(heading, cell_list(cells), values, len(cells), shown, f"{NOT}as expected" in heading, more)
+    return Group(
+        heading, cell_list(cells), values, len(cells), shown, f"{NOT}as expected" in heading, more
+    )

@@ -1,4 +1,6 @@
-"""Drawings of volumetric errors: a displaced grid, errors along a line, and a parametric error along its axis."""
+"""Drawings of volumetric errors: a displaced grid, errors along a line, and a parametric error
+along its axis.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,8 @@ WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 52.0
 # Part of the volume's diagonal that the largest displacement is drawn as, about.
 LARGEST = 0.06
 
-# Lines that are drawn of a face of the grid in each direction, and points of each line; the table has them all.
+# Lines that are drawn of a face of the grid in each direction, and points of each line; the table
+# has them all.
 MOST_LINES, MOST_ON_LINE = 41, 201
 
 # Between the plot and its title, in points: the legend stands there and covers nothing.
@@ -75,11 +78,14 @@ def draw_grid(
         axes = blank_axes(figure)
         edges, hidden = box_edges(nominal[0, 0, 0], nominal[-1, -1, -1], away)
         for edge, is_hidden in zip(edges, hidden, strict=True):
-            axes.plot(*(edge @ view.T).T, color=MUTED, linewidth=0.9, linestyle=":" if is_hidden else "-")
+            axes.plot(
+                *(edge @ view.T).T, color=MUTED, linewidth=0.9, linestyle=":" if is_hidden else "-"
+            )
         for axis in range(3):
             near = -1 if away[axis] < 0 else 0
             for side, is_near in ((near, True), (-1 - near, False)):
-                # The front faces with all their lines, the rear ones by their edges, so that the front stays readable.
+                # The front faces with all their lines, the rear ones by their edges, so that the
+                # front stays readable.
                 _face(axes, nominal.take(side, axis) @ view.T, MUTED, 0.5, is_near)
                 _face(axes, moved.take(side, axis) @ view.T, SERIES[0], 1.1, is_near)
         size = float(np.ptp(edges @ view.T, axis=(0, 1)).max())
@@ -89,12 +95,21 @@ def draw_grid(
         middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
         for k, corner in enumerate(diagonals.starts @ view.T):
             x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
-            circle = {"boxstyle": "circle,pad=0.2", "facecolor": PAPER, "edgecolor": MUTED, "linewidth": 0.7}
+            circle = {
+                "boxstyle": "circle,pad=0.2",
+                "facecolor": PAPER,
+                "edgecolor": MUTED,
+                "linewidth": 0.7,
+            }
             axes.text(x, y, str(k + 1), ha="center", va="center", fontsize=8.5, bbox=circle)
         axes.plot([], [], color=MUTED, linewidth=0.9, label="nominal grid")
-        axes.plot([], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor:g} times")
+        axes.plot(
+            [], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor:g} times"
+        )
         axes.legend(loc="upper left", borderaxespad=0.8)
-        told = [f"{k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)]
+        told = [
+            f"{k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)
+        ]
         lengths = f"length errors of the diagonals from the corners {', '.join(told)}"
         figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
         axes.set_xlim(low[0] - 0.16 * size, high[0] + 0.12 * size)
@@ -137,11 +152,18 @@ def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
         texts = [(edge.mean(axis=0) + off * size * out, f"{'xyz'[axis]}, mm")]
         texts += [(edge[k] + 0.02 * size * out, f"{1e3 * ends[k][axis] + 0.0:.6g}") for k in (0, 1)]
         for (x, y), text in texts:
-            axes.text(x, y, text, ha="left" if out[0] > 0 else "right", va="center" if axis == 2 else "top")
+            axes.text(
+                x,
+                y,
+                text,
+                ha="left" if out[0] > 0 else "right",
+                va="center" if axis == 2 else "top",
+            )
 
 
 def draw_line(found: VolumetricErrors, path: Path) -> None:
-    """Write a picture of the errors along a line: components, resultant, and twice the random part about them.
+    """Write a picture of the errors along a line: components, resultant, and twice the random part
+    about them.
 
     :raises OSError: the file cannot be written.
     """
@@ -160,12 +182,29 @@ def draw_line(found: VolumetricErrors, path: Path) -> None:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 320.0 - BELOW - ABOVE)
         axes.set_title(where, loc="left", pad=TITLE_PAD)
         for k, letter in enumerate("XYZ"):
-            _band(axes, positions, 1e6 * found.systematic[:, k], 1e6 * found.deviation[:, k], k, letter)
-        axes.plot(positions, 1e6 * found.resultant, color=INK, linewidth=1.2, linestyle=DASHES[3], label="resultant")
+            _band(
+                axes,
+                positions,
+                1e6 * found.systematic[:, k],
+                1e6 * found.deviation[:, k],
+                k,
+                letter,
+            )
+        axes.plot(
+            positions,
+            1e6 * found.resultant,
+            color=INK,
+            linewidth=1.2,
+            linestyle=DASHES[3],
+            label="resultant",
+        )
         _band_in_legend(axes, bool(found.deviation.any()))
         _finish(axes, f"{name}, mm", "error, µm")
         worst = int(comparable(found.resultant).argmax())
-        told = f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at {positions[worst]:.6g} mm"
+        told = (
+            f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
+            f" {positions[worst]:.6g} mm"
+        )
         save(figure, path, f"Volumetric errors {along}: {told}")
 
 
@@ -185,25 +224,45 @@ def draw_along(one: AlongAxis, path: Path) -> None:
         label = "random part alone" if one.values is None else "at the reference point"
         _band(axes, positions, values, deviation, 0, label, mark=False)
         if one.stated is not None and one.values is not None and (one.stated != one.values).any():
-            axes.plot(positions, 1e6 * one.stated, color=SERIES[1], linestyle=DASHES[1], label="as stated")
+            axes.plot(
+                positions, 1e6 * one.stated, color=SERIES[1], linestyle=DASHES[1], label="as stated"
+            )
         if one.measured is not None:
             x, y = 1e3 * np.array(one.measured.positions), 1e6 * np.array(one.measured.values)
             axes.plot(
-                x, y, color=SERIES[1], linestyle="none", marker=MARKERS[1], markersize=4.0, markerfacecolor=PAPER,
-                label="measured", clip_on=False, zorder=3,
-            )  # fmt: skip
+                x,
+                y,
+                color=SERIES[1],
+                linestyle="none",
+                marker=MARKERS[1],
+                markersize=4.0,
+                markerfacecolor=PAPER,
+                label="measured",
+                clip_on=False,
+                zorder=3,
+            )
         _band_in_legend(axes, bool(deviation.any()))
         _finish(axes, f"{name[2].lower()}, mm", unit)
         save(figure, path, f"{name}, {meaning(name)}{band}")
 
 
-def _band(axes: Axes, x: Array, values: Array, deviation: Array, k: int, label: str, mark: bool = True) -> None:
+def _band(
+    axes: Axes, x: Array, values: Array, deviation: Array, k: int, label: str, mark: bool = True
+) -> None:
     """A curve, and twice its standard deviation on either side."""
     marker = MARKERS[k] if mark and len(x) <= MOST_MARKS else ""
     axes.plot(
-        x, values, color=SERIES[k], linestyle=DASHES[k], marker=marker, markersize=3.5, markerfacecolor=PAPER,
-        label=label, clip_on=not marker, zorder=3,
-    )  # fmt: skip
+        x,
+        values,
+        color=SERIES[k],
+        linestyle=DASHES[k],
+        marker=marker,
+        markersize=3.5,
+        markerfacecolor=PAPER,
+        label=label,
+        clip_on=not marker,
+        zorder=3,
+    )
     if deviation.any():
         low, high = values - 2.0 * deviation, values + 2.0 * deviation
         axes.fill_between(x, low, high, color=SERIES[k], alpha=0.1, linewidth=0)
@@ -215,7 +274,9 @@ def _band(axes: Axes, x: Array, values: Array, deviation: Array, k: int, label: 
 def _band_in_legend(axes: Axes, is_drawn: bool) -> None:
     """An entry for the bands of all colours."""
     if is_drawn:
-        axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label="± 2 standard deviations")
+        axes.fill_between(
+            [], [], [], color=MUTED, alpha=0.3, linewidth=0, label="± 2 standard deviations"
+        )
 
 
 def _finish(axes: Axes, x: str, y: str) -> None:
@@ -225,6 +286,12 @@ def _finish(axes: Axes, x: str, y: str) -> None:
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.3, borderpad=0.2, columnspacing=1.2,
-        handlelength=2.0, handletextpad=0.5,
-    )  # fmt: skip
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=5,
+        borderaxespad=0.3,
+        borderpad=0.2,
+        columnspacing=1.2,
+        handlelength=2.0,
+        handletextpad=0.5,
+    )

@@ -1,1 +1,3 @@
-"""Published experiments computed anew: what documents print, beside what the shipped designs give."""
+"""Published experiments computed anew: what documents print, beside what the shipped designs
+give.
+"""

@@ -28,15 +28,23 @@ from .published import (
     Statistic,
     section_of,
 )
-from .shipped import Shipped, fitted_exactly, planned, shipped_experiment, sums_of_squares, tabulated, variants
+from .shipped import (
+    Shipped,
+    fitted_exactly,
+    planned,
+    shipped_experiment,
+    sums_of_squares,
+    tabulated,
+    variants,
+)
 
 
 @dataclass(frozen=True)
 class Figure:
     """A published figure and ours, in metres or radians.
 
-    `ratio` is published over ours, `adjusted` the same after the column's common factor, which has to lie `within`
-    limits; `rests_on` are keys of assumptions.
+    `ratio` is published over ours, `adjusted` the same after the column's common factor, which has
+    to lie `within` limits; `rests_on` are keys of assumptions.
     """
 
     quantity: str
@@ -102,7 +110,8 @@ class ComparedRemark:
 
 @dataclass(frozen=True)
 class ErratumLine:
-    """Published figures of one column over those of the design it is headed with, and of the one that is meant.
+    """Published figures of one column over those of the design it is headed with, and of the one
+    that is meant.
 
     The deviations are the largest of a figure from the common factor.
     """
@@ -133,9 +142,11 @@ class ComparedErratum:
 
 @dataclass(frozen=True)
 class ProgressLine:
-    """One figure of an iteration: a step, or a sum of squares in square metres; `limit` is a factor.
+    """One figure of an iteration: a step, or a sum of squares in square metres; `limit` is a
+    factor.
 
-    A published figure is met `within` that factor, bounds ours at `most`, or is `shown` only; it is NaN if illegible.
+    A published figure is met `within` that factor, bounds ours at `most`, or is `shown` only; it is
+    NaN if illegible.
     """
 
     quantity: str
@@ -163,12 +174,16 @@ class ComparedProgress:
 
     @property
     def agrees(self) -> bool:
-        return self.progress.settles in (None, self.settled) and all(line.agrees for line in self.lines)
+        return self.progress.settles in (None, self.settled) and all(
+            line.agrees for line in self.lines
+        )
 
 
 @dataclass(frozen=True)
 class ComparedDifference:
-    """Two estimators over synthetic data sets, and the published differences of one data set; `limit` is a factor."""
+    """Two estimators over synthetic data sets, and the published differences of one data set;
+    `limit` is a factor.
+    """
 
     difference: Difference
     comparison: Comparison
@@ -178,7 +193,9 @@ class ComparedDifference:
     def parts(self) -> tuple[PlacedFigure, ...]:
         found = (("rms", self.comparison.rms), ("maximum", self.comparison.maximum))
         return tuple(
-            PlacedFigure(name, getattr(self.difference, name), tuple(map(float, values)), self.limit)
+            PlacedFigure(
+                name, getattr(self.difference, name), tuple(map(float, values)), self.limit
+            )
             for name, values in found
         )
 
@@ -269,8 +286,8 @@ def reproduce(
 ) -> Reproduction:
     """Compute the experiments of a document's sections, all of them if none are named.
 
-    `trials` is the number of synthetic data sets that estimators are compared over; None leaves that comparison out.
-    `report` is told what is being done, how many data sets of how many.
+    `trials` is the number of synthetic data sets that estimators are compared over; None leaves
+    that comparison out. `report` is told what is being done, how many data sets of how many.
 
     :raises ExperimentError: a shipped design is missing or has errors.
     """
@@ -278,17 +295,25 @@ def reproduce(
     return Reproduction(
         document,
         tuple(
-            _section(document, shipped, name, trials, report) for name in document.statements.sections if name in wanted
+            _section(document, shipped, name, trials, report)
+            for name in document.statements.sections
+            if name in wanted
         ),
     )
 
 
-def _section(document: Document, shipped: Shipped, name: str, trials: int | None, report: Report) -> Section:
+def _section(
+    document: Document, shipped: Shipped, name: str, trials: int | None, report: Report
+) -> Section:
     stated = document.statements
     illegible = tuple(block for block in stated.illegible if block.section == name)
     told = variants(shipped, name) if any(block.told for block in illegible) else {}
     differences = [one for one in stated.differences if section_of(one.design) == name]
-    skipped = "the comparison of estimators over synthetic data sets" if differences and trials is None else ""
+    skipped = (
+        "the comparison of estimators over synthetic data sets"
+        if differences and trials is None
+        else ""
+    )
     return Section(
         name,
         next(iter(variants(shipped, name).values())).title,
@@ -299,8 +324,14 @@ def _section(document: Document, shipped: Shipped, name: str, trials: int | None
             for design in statement.designs
             if statement.section == name
         ),
-        tuple(compare_column(document, shipped, column) for column in document.columns if column.section == name),
-        tuple(compare_remark(shipped, remark) for remark in stated.remarks if remark.section == name),
+        tuple(
+            compare_column(document, shipped, column)
+            for column in document.columns
+            if column.section == name
+        ),
+        tuple(
+            compare_remark(shipped, remark) for remark in stated.remarks if remark.section == name
+        ),
         tuple(
             compare_erratum(document, shipped, erratum)
             for erratum in stated.errata
@@ -311,7 +342,11 @@ def _section(document: Document, shipped: Shipped, name: str, trials: int | None
             for progress in stated.convergence
             if section_of(progress.design) == name
         ),
-        tuple(compare_difference(document, shipped, one, trials, report) for one in differences if trials is not None),
+        tuple(
+            compare_difference(document, shipped, one, trials, report)
+            for one in differences
+            if trials is not None
+        ),
         tuple(Told(label, tabulated(shipped, label)) for label in told),
         illegible,
         skipped,
@@ -339,12 +374,15 @@ def common_factor(ratios: Iterable[float]) -> float:
 
 
 def compare_column(document: Document, shipped: Shipped, column: Column) -> ComparedColumn:
-    """Compare the figures of one column after its common factor, in which exceptions have no part."""
+    """Compare the figures of one column after its common factor, in which exceptions have no
+    part.
+    """
     stated = document.statements
     quantities = tabulated(shipped, column.design)
     ratios = _ratios(column, quantities)
     exceptions = {
-        symbol: next((one for one in stated.exceptions if one.concerns(column, symbol)), None) for symbol in ratios
+        symbol: next((one for one in stated.exceptions if one.concerns(column, symbol)), None)
+        for symbol in ratios
     }
     factor = common_factor(ratio for symbol, ratio in ratios.items() if exceptions[symbol] is None)
     usual = (1.0 - stated.limits.figure, 1.0 + stated.limits.figure)
@@ -369,7 +407,10 @@ def compare_column(document: Document, shipped: Shipped, column: Column) -> Comp
 
 
 def _ratios(column: Column, quantities: dict[str, Quantity]) -> dict[str, float]:
-    return {symbol: value / getattr(quantities[symbol], column.statistic) for symbol, value in column.figures.items()}
+    return {
+        symbol: value / getattr(quantities[symbol], column.statistic)
+        for symbol, value in column.figures.items()
+    }
 
 
 def compare_rank(shipped: Shipped, statement: RankStatement, design: str) -> ComparedRank:
@@ -384,7 +425,8 @@ def compare_remark(shipped: Shipped, remark: Remark) -> ComparedRemark:
     for design, other in remark.pairs:
         if remark.quantities == (SUM_OF_SQUARES,):
             last, compared = (
-                sums_of_squares(fitted_exactly(shipped_experiment(shipped, name)))[-1] for name in (design, other)
+                sums_of_squares(fitted_exactly(shipped_experiment(shipped, name)))[-1]
+                for name in (design, other)
             )
             ratios.append(last / compared)
             continue
@@ -405,7 +447,10 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
     for headed, meant in zip(erratum.headed, erratum.meant, strict=True):
         for column in document.columns:
             table = erratum.figures_of or erratum.table
-            if (column.table, column.design) != (table, meant) or column.statistic not in erratum.statistics:
+            if (column.table, column.design) != (
+                table,
+                meant,
+            ) or column.statistic not in erratum.statistics:
                 continue
             both = [_ratios(column, tabulated(shipped, design)) for design in (headed, meant)]
             regular = [
@@ -417,7 +462,11 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
             for ratios in both:
                 factor = common_factor(ratios[symbol] for symbol in regular)
                 deviations.append(max(abs(ratios[symbol] / factor - 1.0) for symbol in regular))
-            lines.append(ErratumLine(headed, meant, column.statistic, both[0], both[1], deviations[0], deviations[1]))
+            lines.append(
+                ErratumLine(
+                    headed, meant, column.statistic, both[0], both[1], deviations[0], deviations[1]
+                )
+            )
     return ComparedErratum(erratum, tuple(lines), stated.limits.figure)
 
 
@@ -429,7 +478,9 @@ def compare_progress(document: Document, shipped: Shipped, progress: Progress) -
     steps, sums = [iteration.step for iteration in record], sums_of_squares(found)
     lines = []
 
-    def add(quantity: str, published: float, ours: list[float], k: int, rule: str, limit: float) -> None:
+    def add(
+        quantity: str, published: float, ours: list[float], k: int, rule: str, limit: float
+    ) -> None:
         value = ours[k] if k < len(ours) else math.nan
         chosen: Literal["within", "most", "shown"] = "within"
         if rule == "shown":
@@ -443,7 +494,13 @@ def compare_progress(document: Document, shipped: Shipped, progress: Progress) -
         rule = "shown" if k in progress.steps_shown_only else "most" if last else "within"
         add("step", published, steps, k, rule, limits.step)
     for k, published in enumerate(progress.sums_of_squares):
-        rule = "shown" if k in progress.sums_shown_only else "within" if k < 2 or progress.misfit else "most"
+        rule = (
+            "shown"
+            if k in progress.sums_shown_only
+            else "within"
+            if k < 2 or progress.misfit
+            else "most"
+        )
         # What ours has ended with is what it would have later.
         add("S^2", published, sums + sums[-1:] * k, k, rule, limits.sum_of_squares)
     settled = found.solution.status == "converged"

@@ -1,4 +1,6 @@
-"""What a document states, as data: figures, ranks, remarks, errata, and the assumptions that a comparison rests on."""
+"""What a document states, as data: figures, ranks, remarks, errata, and the assumptions that a
+comparison rests on.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ SUM_OF_SQUARES = "S^2"
 
 
 class Assumption(Settings):
-    """What a comparison takes for granted that the document does not state; of all sections and quantities if empty."""
+    """What a comparison takes for granted that the document does not state; of all sections and
+    quantities if empty.
+    """
 
     key: str
     text: str
@@ -27,7 +31,9 @@ class Assumption(Settings):
 
     def concerns(self, section: str, quantity: str) -> bool:
         """Whether a quantity of a section rests on it."""
-        return section in (self.sections or (section,)) and quantity in (self.quantities or (quantity,))
+        return section in (self.sections or (section,)) and quantity in (
+            self.quantities or (quantity,)
+        )
 
 
 class Limits(Settings):
@@ -77,7 +83,9 @@ class Erratum(Settings):
 
 
 class Illegible(Settings):
-    """A block of which no figure can be read; ours are `told` if there is nothing else of its section."""
+    """A block of which no figure can be read; ours are `told` if there is nothing else of its
+    section.
+    """
 
     table: str
     section: str
@@ -108,11 +116,12 @@ class Remark(Settings):
 
 
 class Progress(Settings):
-    """Length of step and sum of squares, in square metres with weight 1 for a reading, of Gauss-Newton iterations.
+    """Length of step and sum of squares, in square metres with weight 1 for a reading, of
+    Gauss-Newton iterations.
 
-    It `settles` by the last of them, or does not, or is not compared in that if None; without any figure, it settles at
-    all. With a `misfit` the sum of squares that is left is not that of rounding. Figures that are only shown have a
-    reason.
+    It `settles` by the last of them, or does not, or is not compared in that if None; without any
+    figure, it settles at all. With a `misfit` the sum of squares that is left is not that of
+    rounding. Figures that are only shown have a reason.
     """
 
     table: str
@@ -127,7 +136,9 @@ class Progress(Settings):
 
 
 class Difference(Settings):
-    """Root mean square and largest difference, in metres, of distances corrected by two estimators."""
+    """Root mean square and largest difference, in metres, of distances corrected by two
+    estimators.
+    """
 
     design: str
     rms: float
@@ -152,7 +163,9 @@ class Statements(Settings):
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a printed table: the legible ones of U1 to U6, in metres and radians, of one design."""
+    """One column of a printed table: the legible ones of U1 to U6, in metres and radians, of one
+    design.
+    """
 
     table: str
     section: str
@@ -193,13 +206,17 @@ def section_of(design: str) -> str:
 
 @cache
 def npl() -> Document:
-    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 1 to 12, and what is said."""
+    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 1 to 12, and what is
+    said.
+    """
     name = "npl-cise-15-98"
     folder = files(__package__)
     text = folder.joinpath(f"{name}.yaml").read_text(encoding="utf-8")
     statements = Statements.model_validate(to_python(parse_tree(text, f"{name}.yaml")))
     columns = []
-    for row in csv.DictReader(folder.joinpath(f"{name}-tables.csv").read_text(encoding="utf-8").splitlines()):
+    for row in csv.DictReader(
+        folder.joinpath(f"{name}-tables.csv").read_text(encoding="utf-8").splitlines()
+    ):
         statistic: Statistic = "maximum" if row["statistic"] == "maximum" else "average"
         figures = {symbol: float(row[symbol]) for symbol in SYMBOLS if row[symbol]}
         columns.append(Column(row["table"], row["experiment"], row["design"], statistic, figures))

@@ -1,6 +1,7 @@
 """U2, U3 and U5 in the form in which NPL Report CISE 15/98 tabulates them.
 
-Three of its six quantities depend on choices that it does not state; these give its figures to the last digits printed.
+Three of its six quantities depend on choices that it does not state; these give its figures to the
+last digits printed.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from ..uncertainty.summaries import Quantity, summarise
 def tabulated_quantities(design: Design) -> dict[str, Quantity]:
     """U2, U3 and U5 of a design at zero machine error, in the report's form.
 
-    U2 is that of transformations about the machine's origin, U3 that of the coefficients of t, t - t^2, t^2 - t^3, ...
-    for positional errors, and U5 that of the distances from an artefact's first ball to all others.
+    U2 is that of transformations about the machine's origin, U3 that of the coefficients of t, t -
+    t^2, t^2 - t^3, ... for positional errors, and U5 that of the distances from an artefact's first
+    ball to all others.
     """
     at = linearise(design)
     layout = at.layout
@@ -42,8 +44,9 @@ def tabulated_quantities(design: Design) -> dict[str, Quantity]:
 def pose_rows(design: Design, layout: SharedLayout) -> Array:
     """Derivatives (m, s) of the free pose parameters, with origins taken at the machine's origin.
 
-    A transformation R (y - o) moves the machine's origin by its translation alone; R y + o does so to the origin of the
-    artefact, from which the one is obtained by the rotation's effect between both places. Held parameters have none.
+    A transformation R (y - o) moves the machine's origin by its translation alone; R y + o does so
+    to the origin of the artefact, from which the one is obtained by the rotation's effect between
+    both places. Held parameters have none.
     """
     d = design.dimension
     rows = np.eye(len(layout))[layout.poses]
@@ -60,8 +63,9 @@ def pose_rows(design: Design, layout: SharedLayout) -> Array:
 def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], Array]:
     """Names and derivatives (m, s) of the model's coefficients as the report has them.
 
-    A positional function is a multiple of t and of t - t^2, t^2 - t^3, ..., of which those that vanish at the far end
-    lack the first; rotational functions, and those of other models, are quoted as they are reported.
+    A positional function is a multiple of t and of t - t^2, t^2 - t^3, ..., of which those that
+    vanish at the far end lack the first; rotational functions, and those of other models, are
+    quoted as they are reported.
     """
     reported = design.model.reported()
     names, matrix = list(reported.names), reported.matrix.copy()
@@ -71,7 +75,8 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
         for function in dict.fromkeys(functions):
             if function[1] in TRANSLATIONS:
                 own = np.array([i for i, other in enumerate(functions) if other == function])
-                # Coefficients of t^k - t^(k + 1) are sums of those of all higher monomials, up to sign.
+                # Coefficients of t^k - t^(k + 1) are sums of those of all higher monomials, up to
+                # sign.
                 matrix[own] = np.cumsum(matrix[own][::-1], axis=0)[::-1]
                 dropped[own[0]] |= function in HELD_AT_FAR_END
     kept = np.flatnonzero(~dropped)
@@ -81,7 +86,8 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
 
 
 def first_ball_lengths(at: Linearisation) -> tuple[Array, list[str]]:
-    """Standard uncertainties (m,) of the distances from the first ball of each artefact to all others, and their names.
+    """Standard uncertainties (m,) of the distances from the first ball of each artefact to all
+    others, and their names.
 
     They are NaN where they are undetermined.
     """

@@ -21,7 +21,15 @@ from .compare import (
     Reproduction,
     Section,
 )
-from .published import REPEATABILITY, SUM_OF_SQUARES, SYMBOLS, Document, Remark, Reservation, case_of
+from .published import (
+    REPEATABILITY,
+    SUM_OF_SQUARES,
+    SYMBOLS,
+    Document,
+    Remark,
+    Reservation,
+    case_of,
+)
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,12 @@ def reproduction_markdown(found: Reproduction) -> str:
         else:
             marks = ["---:" if right else "---" for right in block.right]
             cells = [block.head, marks, *block.rows]
-            parts.append("\n".join(f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |" for row in cells))
+            parts.append(
+                "\n".join(
+                    f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |"
+                    for row in cells
+                )
+            )
     return "\n\n".join(parts)
 
 
@@ -86,15 +99,20 @@ def _blocks(found: Reproduction, with_assumptions: bool = False) -> list[Block]:
     stated = found.document.statements
     shown = {assumption for section in found.sections for assumption in section.rests_on}
     blocks: list[Block] = [
-        Heading(1, f"{stated.title}: published figures and those computed from the shipped designs"),
+        Heading(
+            1, f"{stated.title}: published figures and those computed from the shipped designs"
+        ),
         Paragraph(
-            "Ratios are published over ours. Agreement means that they are within "
-            f"{100 * stated.limits.figure:g} % after the common factor of their column, and that factor within "
-            f"{100 * stated.limits.factor:g} % of 1, unless a numbered exception states other limits."
+            "Ratios are published over ours. Agreement means that they are within"
+            f" {100 * stated.limits.figure:g} % after the common factor of their column, and that"
+            f" factor within {100 * stated.limits.factor:g} % of 1, unless a numbered exception"
+            " states other limits."
         ),
         Heading(2, "Assumptions"),
     ]
-    blocks += [Paragraph(f"{one.key}: {one.text}.") for one in stated.assumptions if one.key in shown]
+    blocks += [
+        Paragraph(f"{one.key}: {one.text}.") for one in stated.assumptions if one.key in shown
+    ]
     for section in found.sections:
         blocks += _section_blocks(found.document, section, with_assumptions)
     return blocks + _exception_blocks(found) + _summary(found)
@@ -106,14 +124,19 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
         Paragraph(f"Rests on {_resting(document, section)}."),
     ]
     if section.ranks:
-        rows = [(case_of(one.design), _rank(one.published), _rank(one.ours), yes(one.agrees)) for one in section.ranks]
+        rows = [
+            (case_of(one.design), _rank(one.published), _rank(one.ours), yes(one.agrees))
+            for one in section.ranks
+        ]
         blocks.append(_grid(("rank of", "published", "ours", "agrees"), rows, 1))
     if section.columns:
-        blocks.append(Paragraph("Columns of tables, their common factor, and how far figures are from it:"))
+        blocks.append(
+            Paragraph("Columns of tables, their common factor, and how far figures are from it:")
+        )
         blocks.append(_factors(section.columns))
         text = (
-            "Published and computed U in um and urad; the ratio as it is, and after the common factor. Notes refer to "
-            "the exceptions and open differences at the end."
+            "Published and computed U in um and urad; the ratio as it is, and after the common"
+            " factor. Notes refer to the exceptions and open differences at the end."
         )
         blocks.append(Paragraph(text))
         blocks.append(_figures(section.columns, with_assumptions))
@@ -139,7 +162,9 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
 
 
 def _grid(head: Sequence[str], rows: Iterable[Sequence[str]], left: int) -> Grid:
-    """A table whose first `left` columns stand to the left, and the last one too unless it is a number."""
+    """A table whose first `left` columns stand to the left, and the last one too unless it is a
+    number.
+    """
     right = [False] * left + [True] * (len(head) - left)
     right[-1] = head[-1] not in ("agrees", "note", "rests on")
     if head[-1] == "rests on":
@@ -222,7 +247,10 @@ def _remark(one: ComparedRemark) -> str:
     against = " over the repeatability" if _over_repeatability(one.remark) else ""
     verdict = "agrees" if one.agrees else "DIFFERS"
     what = "" if one.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
-    return f"Said: {one.remark.text}. Ratio of {what}{names}{against}: {ratios}, {_wanted(one.remark)}; {verdict}."
+    return (
+        f"Said: {one.remark.text}. Ratio of {what}{names}{against}: {ratios},"
+        f" {_wanted(one.remark)}; {verdict}."
+    )
 
 
 def _over_repeatability(remark: Remark) -> bool:
@@ -240,7 +268,9 @@ def _wanted(remark: Remark) -> str:
 
 def _erratum(one: ComparedErratum) -> list[Block]:
     verdict = "confirmed" if one.agrees else "NOT confirmed"
-    blocks: list[Block] = [Paragraph(f"Erratum in Table {one.erratum.table}: {one.erratum.text}; {verdict}.")]
+    blocks: list[Block] = [
+        Paragraph(f"Erratum in Table {one.erratum.table}: {one.erratum.text}; {verdict}.")
+    ]
     for statistic in one.erratum.statistics:
         rows = []
         for line in one.lines:
@@ -264,14 +294,26 @@ def _progress(one: ComparedProgress) -> list[Block]:
     else:
         text += f"published as {'settling' if progress.settles else 'not settling'}"
         text += f" within {len(progress.steps)} iterations" if progress.steps else ""
-    text += f", ours {'settles' if one.settled else 'does not'} ({one.iterations} in all); {_verdict(one)}."
+    text += (
+        f", ours {'settles' if one.settled else 'does not'} ({one.iterations} in all);"
+        f" {_verdict(one)}."
+    )
     if progress.reason:
         text += f" Figures without a limit: {progress.reason}."
     rows = [
-        (line.quantity, _figure(line.published), _figure(line.ours), _wanted_of(line), yes(line.agrees))
+        (
+            line.quantity,
+            _figure(line.published),
+            _figure(line.ours),
+            _wanted_of(line),
+            yes(line.agrees),
+        )
         for line in one.lines
     ]
-    return [Paragraph(text), _grid(("iteration", "published", "ours", "ours has to be", "agrees"), rows, 1)]
+    return [
+        Paragraph(text),
+        _grid(("iteration", "published", "ours", "ours has to be", "agrees"), rows, 1),
+    ]
 
 
 def _figure(value: float) -> str:
@@ -285,7 +327,11 @@ def _verdict(one: ComparedProgress) -> str:
 def _wanted_of(line: ProgressLine) -> str:
     if line.rule == "shown":
         return "anything"
-    return f"at most {line.limit:g} times" if line.rule == "most" else f"within a factor {line.limit:g}"
+    return (
+        f"at most {line.limit:g} times"
+        if line.rule == "most"
+        else f"within a factor {line.limit:g}"
+    )
 
 
 def _differences(section: Section) -> list[Block]:
@@ -294,7 +340,10 @@ def _differences(section: Section) -> list[Block]:
     for one in section.differences:
         if one.comparison.failed:
             blocks.append(
-                Paragraph(f"{one.difference.design}: {len(one.comparison.failed)} data sets did not converge.")
+                Paragraph(
+                    f"{one.difference.design}: {len(one.comparison.failed)} data sets did not"
+                    " converge."
+                )
             )
         rows += [
             (
@@ -309,9 +358,10 @@ def _differences(section: Section) -> list[Block]:
         ]
     first = section.differences[0].comparison
     text = (
-        "Corrected distances by an estimator of distances alone, less those by the full one, in um: the figure of the "
-        f"one published data set, and the quantiles of {first.trials} data sets of ours, into whose range it has to "
-        f"fall, and within a factor {section.differences[0].limit:g} of whose median."
+        "Corrected distances by an estimator of distances alone, less those by the full one, in"
+        f" um: the figure of the one published data set, and the quantiles of {first.trials} data"
+        " sets of ours, into whose range it has to fall, and within a factor"
+        f" {section.differences[0].limit:g} of whose median."
     )
     quantiles = ("least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest")
     head = ("case", "", "published", *quantiles, "below", "agrees")
@@ -332,8 +382,12 @@ def _told(section: Section) -> Grid:
 
 
 def _excepted(found: Reproduction) -> list[tuple[Reservation, list[Figure]]]:
-    """Exceptions that figures of the sections fall under, open ones first, each with its figures."""
-    figures = [f for section in found.sections for column in section.columns for f in column.figures]
+    """Exceptions that figures of the sections fall under, open ones first, each with its
+    figures.
+    """
+    figures = [
+        f for section in found.sections for column in section.columns for f in column.figures
+    ]
     pairs = [
         (one, [f for f in figures if f.exception == one])
         for one in sorted(found.document.statements.exceptions, key=lambda one: not one.open)
@@ -351,12 +405,14 @@ def _exception_blocks(found: Reproduction) -> list[Block]:
         for one, under in chosen:
             ratios = [f.adjusted for f in under]
             many = f"{len(under)} figures" if len(under) > 1 else "1 figure"
-            between = " to ".join(dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios))))
+            between = " to ".join(
+                dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios)))
+            )
             blocks.append(
                 Paragraph(
-                    f"{one.key}: {' and '.join(one.quantities)} in {_tables(one)}, {many}: after the "
-                    f"common factor {between} times ours, held to {one.within[0]:g} to {one.within[1]:g}. "
-                    f"{_sentence(one.reason)}"
+                    f"{one.key}: {' and '.join(one.quantities)} in {_tables(one)}, {many}: after"
+                    f" the common factor {between} times ours, held to {one.within[0]:g} to"
+                    f" {one.within[1]:g}. {_sentence(one.reason)}"
                 )
             )
     return blocks
@@ -372,7 +428,9 @@ def _sentence(text: str) -> str:
 
 
 def _summary(found: Reproduction) -> list[Block]:
-    figures = [f for section in found.sections for column in section.columns for f in column.figures]
+    figures = [
+        f for section in found.sections for column in section.columns for f in column.figures
+    ]
     regular = [f for f in figures if f.exception is None]
     excepted = [f for f in figures if f.exception is not None]
     columns = [column for section in found.sections for column in section.columns]
@@ -384,22 +442,33 @@ def _summary(found: Reproduction) -> list[Block]:
         ("statements on rank", [one.agrees for section in found.sections for one in section.ranks]),
         ("remarks", [one.agrees for section in found.sections for one in section.remarks]),
         ("errata confirmed", [one.agrees for section in found.sections for one in section.errata]),
-        ("fits of exact readings", [one.agrees for section in found.sections for one in section.progress]),
-        ("differences of estimators", [p.agrees for s in found.sections for one in s.differences for p in one.parts]),
+        (
+            "fits of exact readings",
+            [one.agrees for section in found.sections for one in section.progress],
+        ),
+        (
+            "differences of estimators",
+            [p.agrees for s in found.sections for one in s.differences for p in one.parts],
+        ),
     ):
         if ones:
             parts.append((words, f"{sum(ones)} of {len(ones)}"))
     unexplained = sum(len(under) for one, under in _excepted(found) if one.open)
     if unexplained:
         parts.append(("open differences, unexplained", f"{unexplained} figures"))
-    text = "Everything compared agrees within what is stated." if found.agrees else "NOT everything compared agrees."
+    text = (
+        "Everything compared agrees within what is stated."
+        if found.agrees
+        else "NOT everything compared agrees."
+    )
     blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), Paragraph(text)]
     if regular:
         deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
         factors = [column.factor for column in columns]
         text = (
-            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are no exceptions are "
-            f"off by {100 * float(np.median(deviations)):.1f} % (median) and {100 * deviations.max():.1f} % at most."
+            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are"
+            f" no exceptions are off by {100 * float(np.median(deviations)):.1f} % (median) and"
+            f" {100 * deviations.max():.1f} % at most."
         )
         blocks.append(Paragraph(text))
     return blocks
@@ -415,7 +484,12 @@ def reproduction_data(found: Reproduction) -> dict[str, Any]:
         "limits": stated.limits.model_dump(),
         "assumptions": {one.key: one.text for one in stated.assumptions if one.key in shown},
         "exceptions": {
-            one.key: {"reason": one.reason, "open": one.open, "within": list(one.within), "figures": len(under)}
+            one.key: {
+                "reason": one.reason,
+                "open": one.open,
+                "within": list(one.within),
+                "figures": len(under),
+            }
             for one, under in _excepted(found)
         },
         "sections": [_section_data(section) for section in found.sections],
@@ -556,7 +630,10 @@ def _placed_data(part: PlacedFigure) -> dict[str, Any]:
     return {
         "published": part.published,
         "median": part.median,
-        "quantiles": {str(q): float(v) for q, v in zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)},
+        "quantiles": {
+            str(q): float(v)
+            for q, v in zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)
+        },
         "share_below_published": part.below,
         "agrees": part.agrees,
     }

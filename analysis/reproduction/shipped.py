@@ -23,7 +23,9 @@ from .quantities import tabulated_quantities
 
 @dataclass(frozen=True)
 class Shipped:
-    """The designs in a folder, one YAML file for each experiment; what was loaded and planned is kept."""
+    """The designs in a folder, one YAML file for each experiment; what was loaded and planned is
+    kept.
+    """
 
     folder: Path
     loaded: dict[str, dict[str, Experiment]] = field(default_factory=dict)
@@ -39,7 +41,8 @@ def variants(shipped: Shipped, name: str) -> dict[str, Experiment]:
     if name not in shipped.loaded:
         if not shipped.folder.is_dir():
             text = (
-                "no such folder; name that of the shipped designs, which is designs/npl in a checkout, with --designs"
+                "no such folder; name that of the shipped designs, which is designs/npl in a"
+                " checkout, with --designs"
             )
             raise ExperimentError([Message(str(shipped.folder), 0, 0, "", text)])
         shipped.loaded[name] = {one.label: one for one in load(shipped.folder / f"{name}.yaml")}
@@ -67,7 +70,9 @@ def planned(shipped: Shipped, label: str) -> Prediction:
 
 
 def tabulated(shipped: Shipped, label: str) -> dict[str, Quantity]:
-    """Quantities of a shipped design, at zero machine error, in the form of the document's tables."""
+    """Quantities of a shipped design, at zero machine error, in the form of the document's
+    tables.
+    """
     if label not in shipped.tabulated:
         found = planned(shipped, label)
         shipped.tabulated[label] = found.quantities | tabulated_quantities(found.design)
@@ -75,7 +80,9 @@ def tabulated(shipped: Shipped, label: str) -> dict[str, Quantity]:
 
 
 def fitted_exactly(experiment: Experiment) -> Fit:
-    """The fit of readings without noise of an experiment's true machine, with uncertainties as given."""
+    """The fit of readings without noise of an experiment's true machine, with uncertainties as
+    given.
+    """
     design = lay_out(experiment)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
     machine = true_machine(experiment.true_machine, design.model, *corners)

@@ -15,10 +15,11 @@ from .unknowns import UnknownName
 class Answer:
     """What an unknown must be for the goal to be met, the others as they are.
 
-    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that was looked at
-    does; `none` does; nothing of this kind repairs what is `undetermined`; or the unknown cannot be `varied`. `words`
-    and `value`, in metres or a number, are the value needed, or without one that comes nearest, or the last looked at;
-    `outcome` is what the prediction with it gives. `remarks` tell of the range.
+    `status`: a value was `found` beside which the next one, `beside`, does not do; `any` value that
+    was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
+    unknown cannot be `varied`. `words` and `value`, in metres or a number, are the value needed, or
+    without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
+    gives. `remarks` tell of the range.
     """
 
     name: UnknownName
@@ -65,10 +66,15 @@ class Reach(Result):
 def _lines(found: Reach) -> list[str]:
     """The goal, what the design makes of it, and a row for each unknown."""
     now = "met" if found.present.is_met else "not met"
-    lines = [f"{found.label}: {found.title}", f"goal: {found.goal}", f"as drawn: {now}; {found.present.words}"]
+    lines = [
+        f"{found.label}: {found.title}",
+        f"goal: {found.goal}",
+        f"as drawn: {now}; {found.present.words}",
+    ]
     if found.present.undetermined:
         lines.append(
-            f"rank deficiency {found.deficiency}: repair the design first; ballplate check tells what is undetermined"
+            f"rank deficiency {found.deficiency}: repair the design first; ballplate check tells"
+            " what is undetermined"
         )
     rows = [["changed alone", "as drawn", "needed", "what comes of it"]]
     for one in found.answers:

@@ -7,7 +7,11 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from ballplate.simulator.inputs.quantities import QuantityError, parse_positive_angle, parse_positive_length
+from ballplate.simulator.inputs.quantities import (
+    QuantityError,
+    parse_positive_angle,
+    parse_positive_length,
+)
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.numerics.rounding import comparable
 
@@ -20,22 +24,26 @@ from ..uncertainty.summaries import Quantity
 FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
 # Wholes that have values of several units.
 MIXED = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.parts)
-RATIOS = tuple(f"{symbol} {kind.parts['1'][0]}" for symbol, kind in QUANTITIES.items() if "1" in kind.parts)
+RATIOS = tuple(
+    f"{symbol} {kind.parts['1'][0]}" for symbol, kind in QUANTITIES.items() if "1" in kind.parts
+)
 SYMBOLS = tuple(symbol for symbol in DESCRIPTIONS if symbol not in (*MIXED, *RATIOS))
 PATTERN = re.compile(r"\s*(.+?)\s+(maximum|average)\s+(.+?)\s*", re.DOTALL)
 
 
 class GoalError(ValueError):
-    """A text is no goal, or not one that the experiment can have; the message says what would be right."""
+    """A text is no goal, or not one that the experiment can have; the message says what would be
+    right.
+    """
 
 
 @dataclass(frozen=True)
 class Goal:
     """What is to be reached.
 
-    `lengths`: at least the `share` of the distances between corrected points (U6) within the target accuracy of the
-    file. `tasks`: every task within its target. `quantity`: a `statistic` of the quantity `symbol` at most `limit`,
-    in metres or radians.
+    `lengths`: at least the `share` of the distances between corrected points (U6) within the target
+    accuracy of the file. `tasks`: every task within its target. `quantity`: a `statistic` of the
+    quantity `symbol` at most `limit`, in metres or radians.
     """
 
     kind: Literal["lengths", "tasks", "quantity"] = "lengths"
@@ -86,12 +94,18 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
         raise GoalError(f'"{text}" is no goal; write {FORMS}')
     symbol, statistic, limit = found.groups()
     if symbol not in SYMBOLS:
-        advice = f"give {symbol} lengths or {symbol} angles" if symbol in MIXED else f"known: {listing(SYMBOLS, 20)}"
+        advice = (
+            f"give {symbol} lengths or {symbol} angles"
+            if symbol in MIXED
+            else f"known: {listing(SYMBOLS, 20)}"
+        )
         raise GoalError(f'"{symbol}" is no quantity with a limit; {advice}')
     if share is not None:
         raise GoalError("a share goes with the goal lengths; leave it out")
     try:
-        value = (parse_positive_angle if symbol.endswith("angles") else parse_positive_length)(limit)
+        value = (parse_positive_angle if symbol.endswith("angles") else parse_positive_length)(
+            limit
+        )
     except QuantityError as error:
         raise GoalError(str(error)) from None
     return Goal("quantity", 1.0, symbol, statistic, value)  # type: ignore[arg-type]
@@ -106,16 +120,21 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
         "U6" not in prediction.quantities or prediction.quantities["U6"].within_target is None
     ):
         raise GoalError(
-            'the file states no target_accuracy; add it, such as "0.5 um + L/1000000", or give --target or --goal'
+            'the file states no target_accuracy; add it, such as "0.5 um + L/1000000", or give'
+            " --target or --goal"
         )
     if goal.kind == "tasks":
         if not prediction.tasks:
             raise GoalError("the file has no tasks; add evaluation.tasks, or give another goal")
         without = [task.name for task in prediction.tasks if task.target is None]
         if without:
-            raise GoalError(f"no target for {listing(without)}; give target_accuracy to tasks, or to the file")
+            raise GoalError(
+                f"no target for {listing(without)}; give target_accuracy to tasks, or to the file"
+            )
     if goal.kind == "quantity" and goal.symbol not in prediction.quantities:
-        raise GoalError(f"the design has no {goal.symbol}; it has {listing(prediction.quantities, 20)}")
+        raise GoalError(
+            f"the design has no {goal.symbol}; it has {listing(prediction.quantities, 20)}"
+        )
 
 
 def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
@@ -130,7 +149,9 @@ def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
         # A file whose targets are of expanded uncertainties may make one think that this is one.
         words += "" if found.coverage_factor == 1.0 else " (standard uncertainty)"
         distance = math.inf if math.isnan(value) else value / goal.limit
-        return Judgement(is_met, distance + found.undetermined, words + _open(found), found.undetermined)
+        return Judgement(
+            is_met, distance + found.undetermined, words + _open(found), found.undetermined
+        )
     found = prediction.quantities["U6"]
     share = found.within_target or 0.0
     average = "" if math.isnan(found.average) else f", average U6 {number(1e6 * found.average)} um"
@@ -157,7 +178,10 @@ def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:
         words += f", {undetermined} undetermined"
         return Judgement(False, math.inf, words, undetermined)
     worst = int(comparable(ratios).argmax())
-    words += f"; most of its target needs {prediction.tasks[worst].name}, {number(100 * ratios[worst])} %"
+    words += (
+        f"; most of its target needs {prediction.tasks[worst].name},"
+        f" {number(100 * ratios[worst])} %"
+    )
     return Judgement(within == len(ratios), ratios[worst], words, 0)
 
 

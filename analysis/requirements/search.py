@@ -1,4 +1,6 @@
-"""Searches for the value of an unknown that just meets a goal; the value found is judged by a prediction of its own."""
+"""Searches for the value of an unknown that just meets a goal; the value found is judged by a
+prediction of its own.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,8 @@ from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
 # Evaluation points, the distances between which are gone through for each value tried.
 MOST_POINTS = 10_000
 
-# Columns of balls up to which every number is tried, and the ratio beyond; values of a size that are tried first,
-# and about the best of them if none does.
+# Columns of balls up to which every number is tried, and the ratio beyond; values of a size that
+# are tried first, and about the best of them if none does.
 EVERY, RATIO, SIZES, REFINED = 12, 1.25, 16, 12
 # Change of the goal's figure from ten times the extreme to it, up to which it is as good as exact.
 CONVERGED = 1e-3
@@ -35,7 +37,9 @@ CONVERGED = 1e-3
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of a value: how the goal is met and the rank deficiency, or why the file is wrong with it."""
+    """What came of a value: how the goal is met and the rank deficiency, or why the file is wrong
+    with it.
+    """
 
     words: str
     judgement: Judgement | None
@@ -59,8 +63,8 @@ def reach(
 ) -> Reach:
     """Solve for each of some unknowns, the others staying as they are.
 
-    `artefact` and `calibration`, an index, choose what varies where there are several; `target` replaces the target
-    accuracy of the file, and `report` is told the number of unknowns done.
+    `artefact` and `calibration`, an index, choose what varies where there are several; `target`
+    replaces the target accuracy of the file, and `report` is told the number of unknowns done.
 
     :raises GoalError: the experiment does not have what the goal is about.
     :raises NotVariableError: a single unknown is asked for that the experiment does not have.
@@ -68,8 +72,14 @@ def reach(
     """
     count = len(experiment.evaluation.points)
     if count > MOST_POINTS:
-        text = f"{count} points make {count * (count - 1) // 2} distances, which reach computes for every value that "
-        text += f"it tries, some dozens, which takes too long; give at most {MOST_POINTS}, better some hundred"
+        text = (
+            f"{count} points make {count * (count - 1) // 2} distances, which reach computes for"
+            " every value that "
+        )
+        text += (
+            f"it tries, some dozens, which takes too long; give at most {MOST_POINTS}, better some"
+            " hundred"
+        )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
     root = experiment.tree
     # Planning is at zero machine error, and true machines take time to check.
@@ -91,7 +101,9 @@ def reach(
             answers.append(Answer(name, name, "varied", remarks=(str(error),)))
             continue
         answers.append(_answer(one, searched, judged, present.deficiency))
-    return Reach(experiment.label, experiment.title, goal, judged, present.deficiency, tuple(answers))
+    return Reach(
+        experiment.label, experiment.title, goal, judged, present.deficiency, tuple(answers)
+    )
 
 
 @dataclass(frozen=True)
@@ -159,7 +171,9 @@ class _Trials:
         return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
 
     def is_right(self, step: int) -> bool:
-        """Whether the file is right with a value, which is quicker to find out than what comes of it."""
+        """Whether the file is right with a value, which is quicker to find out than what comes of
+        it.
+        """
         if step not in self.known:
             experiment, _ = build(self.one.tree(step), self.searched.source, self.searched.name)
             return experiment is not None
@@ -168,17 +182,35 @@ class _Trials:
 
 def _answer(one: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
     if one.is_monotone and present.undetermined:
-        reason = f"rank deficiency {deficiency} leaves {present.undetermined} undetermined whatever it is"
-        return Answer(one.name, one.title, "undetermined", one.present, one.grows, remarks=(reason,))
+        reason = (
+            f"rank deficiency {deficiency} leaves {present.undetermined} undetermined whatever"
+            " it is"
+        )
+        return Answer(
+            one.name, one.title, "undetermined", one.present, one.grows, remarks=(reason,)
+        )
     trials = _Trials(one, searched)
     return _monotone(trials, deficiency) if one.is_monotone else _scanned(trials)
 
 
-def _told(trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]) -> Answer:
+def _told(
+    trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]
+) -> Answer:
     one, found = trials.one, trials.verified(step)
     assert found.is_met is (status != "none")
     words, value = one.words(step), one.value(step)
-    return Answer(one.name, one.title, status, one.present, one.grows, words, value, found.words, "", tuple(remarks))
+    return Answer(
+        one.name,
+        one.title,
+        status,
+        one.present,
+        one.grows,
+        words,
+        value,
+        found.words,
+        "",
+        tuple(remarks),
+    )
 
 
 def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:
@@ -187,7 +219,9 @@ def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer
         middle = (met + failed) // 2
         met, failed = (middle, failed) if trials.at(middle).is_met else (met, middle)
     beside = trials.at(failed)
-    words = f"{beside.words} does not do: " + (beside.judgement.words if beside.judgement else beside.refusal)
+    words = f"{beside.words} does not do: " + (
+        beside.judgement.words if beside.judgement else beside.refusal
+    )
     return replace(_told(trials, "found", met, remarks), beside=words)
 
 
@@ -199,15 +233,21 @@ def _monotone(trials: _Trials, deficiency: int) -> Answer:
     if not one.grows and not trials.is_right(worst):
         # An uncertainty that grows with length has an end where no file may state it.
         worst = _border(trials, one.drawn, worst)
-        remarks.append(f"more than {one.words(worst)} is not possible: {trials.at(worst + 1).refusal}")
+        remarks.append(
+            f"more than {one.words(worst)} is not possible: {trials.at(worst + 1).refusal}"
+        )
     if trials.at(worst).is_met:
         return _told(trials, "any", worst, remarks)
     remarks = []
     if one.grows and not trials.is_right(best):
         best = _border(trials, one.first, best)
-        remarks.append(f"more than {one.words(best)} are not possible: {trials.at(best + 1).refusal}")
+        remarks.append(
+            f"more than {one.words(best)} are not possible: {trials.at(best + 1).refusal}"
+        )
     # Where an extreme drowns everything else in rounding, it tells nothing.
-    while not one.grows and trials.at(best).deficiency > deficiency and best + PER_DECADE < one.last:
+    while (
+        not one.grows and trials.at(best).deficiency > deficiency and best + PER_DECADE < one.last
+    ):
         best += PER_DECADE
     if not trials.at(best).is_met:
         remarks += [] if one.grows else _convergence(trials, best)
@@ -250,10 +290,15 @@ def _scanned(trials: _Trials) -> Answer:
         remarks.append(f"from {beyond.words} on the file is wrong: {beyond.refusal}")
     refused = [trials.at(step) for step in probes if step not in usable]
     if refused:
-        remarks.append(f"the file is wrong with {listing([one.words for one in refused], 3)}: {refused[0].refusal}")
+        remarks.append(
+            f"the file is wrong with {listing([one.words for one in refused], 3)}:"
+            f" {refused[0].refusal}"
+        )
     if one.name == "size" and not any(trials.at(step).is_met for step in usable):
         # What just does may lie beside the best of them.
-        best = probes.index(usable[int(comparable([trials.distance(step) for step in usable]).argmin())])
+        best = probes.index(
+            usable[int(comparable([trials.distance(step) for step in usable]).argmin())]
+        )
         ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
         probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
         usable = [step for step in probes if not trials.at(step).refusal]
@@ -264,12 +309,17 @@ def _scanned(trials: _Trials) -> Answer:
         best = usable[int(comparable([trials.distance(step) for step in usable]).argmin())]
         if trials.undetermined(best):
             told = (
-                f"something stays undetermined with every value from {one.words(usable[0])} to {one.words(usable[-1])}"
+                f"something stays undetermined with every value from {one.words(usable[0])} to"
+                f" {one.words(usable[-1])}"
             )
-            return Answer(one.name, one.title, "undetermined", one.present, one.grows, remarks=(told,))
+            return Answer(
+                one.name, one.title, "undetermined", one.present, one.grows, remarks=(told,)
+            )
         return _told(trials, "none", best, remarks)
     if one.name == "size":
-        again = next((trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None)
+        again = next(
+            (trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None
+        )
         remarks += [] if again is None else [f"not every larger one does: {again.words} does not"]
     if good == 0:
         return _told(trials, "any", probes[0], remarks)
@@ -289,7 +339,11 @@ def _probes(trials: _Trials) -> list[int]:
         found = [step for step in every if one.value(step) <= max(EVERY, one.value(one.first))]
         while found[-1] < one.last:
             least = RATIO * one.value(found[-1])
-            found.append(next((step for step in every[found[-1] + 1 :] if one.value(step) >= least), one.last))
+            found.append(
+                next(
+                    (step for step in every[found[-1] + 1 :] if one.value(step) >= least), one.last
+                )
+            )
         return found
     if not trials.is_right(one.drawn):
         return []

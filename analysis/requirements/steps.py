@@ -26,7 +26,11 @@ def step_of(value: Decimal) -> int:
     True
     """
     rounded = round_down(value)
-    return rounded.adjusted() * PER_DECADE + int(rounded.scaleb(DIGITS - 1 - rounded.adjusted())) - 10 ** (DIGITS - 1)
+    return (
+        rounded.adjusted() * PER_DECADE
+        + int(rounded.scaleb(DIGITS - 1 - rounded.adjusted()))
+        - 10 ** (DIGITS - 1)
+    )
 
 
 def round_down(value: Decimal, digits: int = DIGITS) -> Decimal:
@@ -46,4 +50,6 @@ def exact(value: float) -> Decimal:
 
 def times(value: Decimal, factor: Fraction) -> Decimal:
     """A product to 30 digits."""
-    return Decimal((Fraction(value) * factor).numerator) / Decimal((Fraction(value) * factor).denominator)
+    return Decimal((Fraction(value) * factor).numerator) / Decimal(
+        (Fraction(value) * factor).denominator
+    )

@@ -1,4 +1,6 @@
-"""What may be solved for: each unknown as a family of experiment files, one for each of its values."""
+"""What may be solved for: each unknown as a family of experiment files, one for each of its
+values.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,11 @@ from typing import Literal
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import node_at, override
 from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
-from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length_function
+from ballplate.simulator.inputs.quantities import (
+    LengthFunction,
+    format_length,
+    parse_length_function,
+)
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, child
 
@@ -21,25 +27,31 @@ from .steps import at_step, exact, round_down, round_up, step_of, times
 UnknownName = Literal["repeatability", "certificate", "repeats", "balls", "size"]
 NAMES: tuple[UnknownName, ...] = ("repeatability", "certificate", "repeats", "balls", "size")
 
-# Ratio to the present value at which a repeatability or certificate counts as exact, or as of no use.
+# Ratio to the present value at which a repeatability or certificate counts as exact, or as of no
+# use.
 EXTREME = 10_000
-# Balls on a side, repeats of a reading, and ratio of the present size to the smallest, that are looked at.
+# Balls on a side, repeats of a reading, and ratio of the present size to the smallest, that are
+# looked at.
 MOST_BALLS, MOST_REPEATS, SMALLEST = 30, 10_000, 20
 # Ratio of the largest size that is looked at to the present one; the volume is smaller.
 LARGEST = 100
 
 
 class NotVariableError(ValueError):
-    """The experiment has nothing of the kind, or several of which none is chosen; the message says what to do."""
+    """The experiment has nothing of the kind, or several of which none is chosen; the message says
+    what to do.
+    """
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """One quantity of an experiment with values `first` to `last`, by their places in an order of small to large.
+    """One quantity of an experiment with values `first` to `last`, by their places in an order of
+    small to large.
 
-    `tree` gives the file with a value, `words` the value in words and `value` in metres, or as a number. `grows`: a
-    larger value makes everything better; otherwise a smaller one does; `is_monotone` whether that is sure. `present`
-    is the value as drawn, in words, and `drawn` the value next to it.
+    `tree` gives the file with a value, `words` the value in words and `value` in metres, or as a
+    number. `grows`: a larger value makes everything better; otherwise a smaller one does;
+    `is_monotone` whether that is sure. `present` is the value as drawn, in words, and `drawn` the
+    value next to it.
     """
 
     name: UnknownName
@@ -56,7 +68,11 @@ class Unknown:
 
 
 def unknown(
-    name: UnknownName, experiment: Experiment, root: Node, artefact: str | None, calibration: int | None
+    name: UnknownName,
+    experiment: Experiment,
+    root: Node,
+    artefact: str | None,
+    calibration: int | None,
 ) -> Unknown:
     """An unknown of the experiment whose file is `root`.
 
@@ -65,7 +81,9 @@ def unknown(
     :raises NotVariableError: the experiment has no such thing, or several.
     """
     if artefact is not None and artefact not in experiment.artefacts:
-        raise NotVariableError(f'unknown artefact "{artefact}"; {hint(artefact, experiment.artefacts)}')
+        raise NotVariableError(
+            f'unknown artefact "{artefact}"; {hint(artefact, experiment.artefacts)}'
+        )
     if calibration is not None and calibration >= len(experiment.calibration):
         count = len(experiment.calibration)
         known = f"the indices are 0 to {count - 1}" if count else "there is none"
@@ -80,7 +98,9 @@ def unknown(
         ]
         if not chosen:
             of = "" if artefact is None else f' of "{artefact}"'
-            raise NotVariableError(f"the file states no calibration{of}; without certificate there is none to improve")
+            raise NotVariableError(
+                f"the file states no calibration{of}; without certificate there is none to improve"
+            )
         paths = [f"calibration[{k}].standard_uncertainty" for k in chosen]
         return _scaled(name, "certificate's standard uncertainty", root, paths)
     if name == "repeats":
@@ -89,7 +109,9 @@ def unknown(
 
 
 def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unknown:
-    """Uncertainties that are multiplied by the same factor; the first of them has three digits, the others less."""
+    """Uncertainties that are multiplied by the same factor; the first of them has three digits, the
+    others less.
+    """
     nodes = [node_at(root, path) for path in paths]
     leaves = [leaf for node in nodes if node is not None for leaf in _leaves(node)]
     lead = exact(leaves[0].constant or leaves[0].slope)
@@ -110,7 +132,19 @@ def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unkn
     middle = step_of(lead)
     width = step_of(Decimal(EXTREME))
     present = _several([_text(leaf, Fraction(1)) for leaf in leaves])
-    return Unknown(name, title, present, middle, middle - width, middle + width, False, True, tree, words, _metres)
+    return Unknown(
+        name,
+        title,
+        present,
+        middle,
+        middle - width,
+        middle + width,
+        False,
+        True,
+        tree,
+        words,
+        _metres,
+    )
 
 
 def _metres(step: int) -> float:
@@ -129,12 +163,16 @@ def _with_leaves(node: Node, factor: Fraction) -> Node:
     if isinstance(node, Scalar):
         return Scalar(node.mark, _text(parse_length_function(node.value), factor))
     if isinstance(node, Mapping):
-        return Mapping(node.mark, {k: _with_leaves(v, factor) for k, v in node.items.items()}, node.key_marks)
+        return Mapping(
+            node.mark, {k: _with_leaves(v, factor) for k, v in node.items.items()}, node.key_marks
+        )
     return Sequence(node.mark, tuple(_with_leaves(one, factor) for one in node.items))
 
 
 def _text(leaf: LengthFunction, factor: Fraction) -> str:
-    """An uncertainty multiplied by a factor, as it is written; cut to three digits unless the factor is 1."""
+    """An uncertainty multiplied by a factor, as it is written; cut to three digits unless the
+    factor is 1.
+    """
     constant = exact(leaf.constant)
     if constant and factor != 1:
         constant = round_down(times(constant, factor))
@@ -152,10 +190,15 @@ def _several(texts: list[str]) -> str:
 
 
 def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknown:
-    """How often everything is read: so many times, or so many times as often where repeats differ."""
+    """How often everything is read: so many times, or so many times as often where repeats
+    differ.
+    """
     places = [k for k, one in enumerate(experiment.positions) if artefact in (None, one.artefact)]
     groups = [
-        (f"positions[{k}].readings[{j}]" if _has_groups(root, k) else f"positions[{k}]", group.repeats)
+        (
+            f"positions[{k}].readings[{j}]" if _has_groups(root, k) else f"positions[{k}]",
+            group.repeats,
+        )
         for k in places
         for j, group in enumerate(experiment.positions[k].readings)
     ]
@@ -168,7 +211,9 @@ def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknow
         found = root
         for path, count in groups:
             mark = root.mark
-            found = override(found, f"{path}.repeats", Scalar(mark, step if is_same else step * count), mark)
+            found = override(
+                found, f"{path}.repeats", Scalar(mark, step if is_same else step * count), mark
+            )
         return found
 
     def words(step: int) -> str:
@@ -195,7 +240,9 @@ def _has_groups(root: Node, position: int) -> bool:
     return child(node_at(root, f"positions[{position}]"), "readings") is not None
 
 
-def _of_plate(name: UnknownName, experiment: Experiment, root: Node, artefact: str | None) -> Unknown:
+def _of_plate(
+    name: UnknownName, experiment: Experiment, root: Node, artefact: str | None
+) -> Unknown:
     """Balls per side, or size, of a grid or square."""
     fitting = [
         one
@@ -209,7 +256,9 @@ def _of_plate(name: UnknownName, experiment: Experiment, root: Node, artefact: s
         of = "no artefact is" if artefact is None else f'"{artefact}" is not'
         raise NotVariableError(f"{of} of kind grid or square, whose {name} could be varied")
     if len(fitting) > 1:
-        raise NotVariableError(f"there are several plates; choose one with --artefact: {listing(fitting)}")
+        raise NotVariableError(
+            f"there are several plates; choose one with --artefact: {listing(fitting)}"
+        )
     plate = experiment.artefacts[fitting[0]]
     assert isinstance(plate, GridSettings | SquareSettings)
     path = f"artefacts[{fitting[0]}].{name}"
@@ -231,28 +280,44 @@ def _balls(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unkno
         return override(root, path, node, mark)
 
     def words(step: int) -> str:
-        return f"{every[step][0]} a side" if isinstance(present, int) else " x ".join(map(str, every[step]))
+        return (
+            f"{every[step][0]} a side"
+            if isinstance(present, int)
+            else " x ".join(map(str, every[step]))
+        )
 
     def value(step: int) -> float:
         return every[step][0]
 
     drawn = every.index((present,) if isinstance(present, int) else present)
     last = len(every) - 1
-    return Unknown("balls", "balls of the plate", words(drawn), drawn, 0, last, True, False, tree, words, value)
+    return Unknown(
+        "balls", "balls of the plate", words(drawn), drawn, 0, last, True, False, tree, words, value
+    )
 
 
 def _grids(columns: int, rows: int) -> Iterator[tuple[int, int]]:
-    """Columns and rows with which one side is within a ball of being in proportion to the other, by their number.
+    """Columns and rows with which one side is within a ball of being in proportion to the other, by
+    their number.
 
     Of as many balls, those nearest to the proportion come first.
     """
     sides = range(2, max(MOST_BALLS, columns, rows) + 1)
-    near = [(n, m) for n, m in product(sides, sides) if abs(m * columns - n * rows) <= max(columns, rows)]
-    yield from sorted(near, key=lambda grid: (grid[0] * grid[1], abs(grid[1] * columns - grid[0] * rows), -grid[0]))
+    near = [
+        (n, m)
+        for n, m in product(sides, sides)
+        if abs(m * columns - n * rows) <= max(columns, rows)
+    ]
+    yield from sorted(
+        near,
+        key=lambda grid: (grid[0] * grid[1], abs(grid[1] * columns - grid[0] * rows), -grid[0]),
+    )
 
 
 def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknown:
-    """Size of a plate with the same balls, and the same ratio of its sides; its positions keep corner or centre."""
+    """Size of a plate with the same balls, and the same ratio of its sides; its positions keep
+    corner or centre.
+    """
     mark = root.mark
     edges = [plate.size] if isinstance(plate, SquareSettings) else list(plate.size)
     lead = exact(edges[0])
@@ -271,4 +336,6 @@ def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknow
 
     present = " x ".join(map(format_length, edges))
     first, drawn, last = (step_of(one) for one in (lead / SMALLEST, lead, lead * LARGEST))
-    return Unknown("size", "size of the plate", present, drawn, first, last, True, False, tree, words, _metres)
+    return Unknown(
+        "size", "size of the plate", present, drawn, first, last, True, False, tree, words, _metres
+    )

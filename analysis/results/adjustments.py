@@ -1,7 +1,8 @@
-"""What a mechanic would change on a machine of straight axes: scales, and the directions of guideways.
+"""What a mechanic would change on a machine of straight axes: scales, and the directions of
+guideways.
 
-Readings that are too short have a positive scale error. A squareness error is the turn that a guideway has suffered
-about the positive axis in its name, so that the adjustment turns it back.
+Readings that are too short have a positive scale error. A squareness error is the turn that a
+guideway has suffered about the positive axis in its name, so that the adjustment turns it back.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from ballplate.simulator.machines.protocol import Array, Unit
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
 
-# Below so many degrees of freedom a standard deviation is uncertain by more than about a quarter (GUM, E.4.3).
+# Below so many degrees of freedom a standard deviation is uncertain by more than about a quarter
+# (GUM, E.4.3).
 FEW = 10
 
-# Axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess over 90 degrees.
+# Axes, guideway to be turned, where it leans to if the error is positive, and the angle's excess
+# over 90 degrees.
 _SQUARENESS = (
     ("X and Y", "Y", "X", -1, 1),  # C0Y
     ("X and Z", "Z", "X", 1, -1),  # B0Z
@@ -28,8 +31,9 @@ _SQUARENESS = (
 class Adjustment:
     """An error with its uncertainty, NaN where it is open, and what to do about it in words.
 
-    The expanded uncertainty is of 95 %: Student's factor times the standard uncertainty (GUM, annex G).
-    `what` is the scale of an axis, or two axes whose angle differs from 90 degrees by `value`; `unit` is 1 or rad.
+    The expanded uncertainty is of 95 %: Student's factor times the standard uncertainty (GUM, annex
+    G). `what` is the scale of an axis, or two axes whose angle differs from 90 degrees by `value`;
+    `unit` is 1 or rad.
     """
 
     name: str
@@ -46,9 +50,10 @@ def adjustments(
 ) -> tuple[Adjustment, ...]:
     """From scale errors of X, Y and Z and C0Y, B0Z and A0Z (6,), or the latter alone (3,).
 
-    `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where scales are open and
-    their differences are not, those of Y and Z against X are told as well. `degrees_of_freedom` are those of the
-    scatter that `spread` comes from, infinite where uncertainties are as stated.
+    `spread` (6, r) is a square root of their covariance, `null` (6, k) what of them is open. Where
+    scales are open and their differences are not, those of Y and Z against X are told as well.
+    `degrees_of_freedom` are those of the scatter that `spread` comes from, infinite where
+    uncertainties are as stated.
     """
     factor = coverage_factor(degrees_of_freedom)
     null = np.zeros((len(values), 0)) if null is None else null
@@ -57,13 +62,25 @@ def adjustments(
 
     def told(row: Array) -> tuple[float, float]:
         is_open = null.shape[1] > 0 and float(np.abs(row @ null).max()) > 1e-7 * size
-        return (np.nan, np.nan) if is_open else (float(row @ values), float(np.linalg.norm(row @ spread)))
+        return (
+            (np.nan, np.nan)
+            if is_open
+            else (float(row @ values), float(np.linalg.norm(row @ spread)))
+        )
 
     if len(values) == 6:
         for row, axis in zip(rows[:3], "XYZ", strict=True):
             value, u = told(row)
             found.append(
-                Adjustment(f"scale {axis.lower()}", f"scale of {axis}", value, u, factor * u, "1", _scale(axis, value))
+                Adjustment(
+                    f"scale {axis.lower()}",
+                    f"scale of {axis}",
+                    value,
+                    u,
+                    factor * u,
+                    "1",
+                    _scale(axis, value),
+                )
             )
         alone = [not np.isnan(one.value) for one in found]
         for k, axis in ((1, "Y"), (2, "Z")):
@@ -71,17 +88,22 @@ def adjustments(
             if not np.isnan(value) and not (alone[0] and alone[k]):
                 name = f"scale {axis.lower()} - scale x"
                 words = _scale(axis, value, " against X")
-                found.append(Adjustment(name, f"scale of {axis} against X", value, u, factor * u, "1", words))
+                found.append(
+                    Adjustment(name, f"scale of {axis} against X", value, u, factor * u, "1", words)
+                )
     for row, (axes, guideway, other, sign, excess) in zip(rows[-3:], _SQUARENESS, strict=True):
         value, u = told(row)
         words = _turn(guideway, other, sign * value)
         name = f"angle {other}{guideway}".lower()
-        found.append(Adjustment(name, f"angle of {axes}", excess * value, u, factor * u, "rad", words))
+        found.append(
+            Adjustment(name, f"angle of {axes}", excess * value, u, factor * u, "rad", words)
+        )
     return tuple(found)
 
 
 def coverage_factor(degrees_of_freedom: float) -> float:
-    """Student's factor for an expanded uncertainty of 95 % (GUM, table G.2), NaN without degrees of freedom.
+    """Student's factor for an expanded uncertainty of 95 % (GUM, table G.2), NaN without degrees of
+    freedom.
 
     >>> [round(coverage_factor(freedom), 2) for freedom in (1, 2, 10, float("inf"))]
     [12.71, 4.3, 2.23, 1.96]
@@ -90,7 +112,9 @@ def coverage_factor(degrees_of_freedom: float) -> float:
 
     if not degrees_of_freedom > 0:
         return float("nan")
-    return float(ndtri(0.975) if np.isinf(degrees_of_freedom) else stdtrit(degrees_of_freedom, 0.975))
+    return float(
+        ndtri(0.975) if np.isinf(degrees_of_freedom) else stdtrit(degrees_of_freedom, 0.975)
+    )
 
 
 def freedom_words(degrees_of_freedom: int) -> str:
@@ -99,17 +123,25 @@ def freedom_words(degrees_of_freedom: int) -> str:
 
 
 def few_degrees_of_freedom(degrees_of_freedom: int, what: str, instead: str) -> str:
-    """A warning where `what` has been estimated from few degrees of freedom, and `instead`; otherwise empty."""
+    """A warning where `what` has been estimated from few degrees of freedom, and `instead`;
+    otherwise empty.
+    """
     if not 0 < degrees_of_freedom < FEW:
         return ""
     doubt = 100.0 / np.sqrt(2.0 * degrees_of_freedom)
-    return f"{what} from {freedom_words(degrees_of_freedom)} is itself uncertain by {doubt:.0f} %; {instead}"
+    return (
+        f"{what} from {freedom_words(degrees_of_freedom)} is itself uncertain by {doubt:.0f} %;"
+        f" {instead}"
+    )
 
 
 def _scale(axis: str, value: float, against: str = "") -> str:
     if np.isnan(value):
         return "cannot be told"
-    return f"let {axis} read {_amount(1e6 * abs(value))} um per m {'more' if value > 0 else 'less'}{against}"
+    return (
+        f"let {axis} read {_amount(1e6 * abs(value))} um per m"
+        f" {'more' if value > 0 else 'less'}{against}"
+    )
 
 
 def _turn(guideway: str, other: str, lean: float) -> str:
@@ -126,4 +158,8 @@ def _amount(value: float) -> str:
     ('50 000', '12.3', '2', '0.000012')
     """
     rounded = float(f"{value:.3g}")
-    return f"{rounded:,.0f}".replace(",", " ") if rounded >= 1e3 else np.format_float_positional(rounded, trim="-")
+    return (
+        f"{rounded:,.0f}".replace(",", " ")
+        if rounded >= 1e3
+        else np.format_float_positional(rounded, trim="-")
+    )

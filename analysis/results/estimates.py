@@ -1,4 +1,6 @@
-"""What a fit estimates, as functions of its parameters: names, values, uncertainties and covariances."""
+"""What a fit estimates, as functions of its parameters: names, values, uncertainties and
+covariances.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +28,20 @@ FunctionKind = Literal[ParameterKind, "task"]
 # What may be asked for in place of a kind of its own.
 KINDS: dict[str, tuple[FunctionKind, ...]] = {
     "pose": ("origin", "rotation"),
-    **{kind: (kind,) for kind in ("machine", "origin", "rotation", "offset", "length", "ball", "task")},
+    **{
+        kind: (kind,)
+        for kind in ("machine", "origin", "rotation", "offset", "length", "ball", "task")
+    },
 }
 
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is undetermined.
+    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is
+    undetermined.
 
-    `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a standard's length, a ball.
+    `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a
+    standard's length, a ball.
     """
 
     name: str
@@ -57,8 +64,9 @@ class Function:
 class EstimatedFunctions:
     """Functions (m,) of the parameters at a fit, with their `values` (m,) there.
 
-    `rows` (m, s) are their derivatives by the shared parameters, `drawn` (m, s) the same at the design as drawn; those
-    of a co-ordinate of a ball are zero, of which `ball` and `axis` (m,) are the indices, -1 for all others.
+    `rows` (m, s) are their derivatives by the shared parameters, `drawn` (m, s) the same at the
+    design as drawn; those of a co-ordinate of a ball are zero, of which `ball` and `axis` (m,) are
+    the indices, -1 for all others.
     """
 
     at: Linearisation
@@ -75,7 +83,9 @@ class EstimatedFunctions:
         return labels(self.functions)
 
     def uncertainties(self) -> Array:
-        """Standard deviations (m,) in units of that of a unit-weight observation; NaN where undetermined."""
+        """Standard deviations (m,) in units of that of a unit-weight observation; NaN where
+        undetermined.
+        """
         result = self.at.of_shared(self.rows, self.drawn)
         of_balls = self.ball >= 0
         if of_balls.any():
@@ -83,7 +93,8 @@ class EstimatedFunctions:
         return result
 
     def choose(self, asked: Sequence[str]) -> EstimatedFunctions:
-        """Those of some kinds, or with some names, in the order asked for; all where nothing is asked for.
+        """Those of some kinds, or with some names, in the order asked for; all where nothing is
+        asked for.
 
         :raises ValueError: there is no such kind and no such name.
         """
@@ -136,7 +147,8 @@ class EstimatedFunctions:
 def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
     """Names, with the kind in front where a model or a file gives the same name to two.
 
-    >>> labels([Function("EXX", "machine", "m"), Function("a", "machine", "m"), Function("a", "task", "m")])
+    >>> kinds = [("EXX", "machine"), ("a", "machine"), ("a", "task")]
+    >>> labels([Function(name, kind, "m") for name, kind in kinds])
     ['EXX', 'machine: a', 'task: a']
     """
     times = Counter(one.name for one in functions)
@@ -145,10 +157,11 @@ def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
 
 @single_threaded
 def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunctions:
-    """All that a fit estimates: the machine, poses, offsets, lengths of standards and balls; measuring tasks last.
+    """All that a fit estimates: the machine, poses, offsets, lengths of standards and balls;
+    measuring tasks last.
 
-    With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1] instead of those of the
-    stable basis.
+    With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1] instead
+    of those of the stable basis.
     """
     design, layout, state = at.design, at.layout, at.state
     own, size = np.eye(len(layout)), len(layout)
@@ -156,8 +169,16 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     values: list[Array] = []
     rows: list[Array] = []
 
-    def add(kind: FunctionKind, names: Sequence[str], units: Sequence[Unit], value: Array, derivative: Array) -> None:
-        functions.extend(Function(*one) for one in zip(names, [kind] * len(names), units, strict=True))
+    def add(
+        kind: FunctionKind,
+        names: Sequence[str],
+        units: Sequence[Unit],
+        value: Array,
+        derivative: Array,
+    ) -> None:
+        functions.extend(
+            Function(*one) for one in zip(names, [kind] * len(names), units, strict=True)
+        )
         values.append(np.atleast_1d(value))
         rows.append(derivative.reshape(len(names), size))
 
@@ -168,7 +189,13 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
         add("machine", reported.names, reported.units, matrix @ state.a, matrix @ own[layout.model])
     else:
         machine = design.model.parameters
-        add("machine", [p.name for p in machine], [p.unit for p in machine], state.a, own[layout.model])
+        add(
+            "machine",
+            [p.name for p in machine],
+            [p.unit for p in machine],
+            state.a,
+            own[layout.model],
+        )
 
     turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
     poses = np.concatenate([state.origins, turned], axis=1)
@@ -176,7 +203,13 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     for k, j in np.argwhere(layout.pose_columns >= 0).tolist():
         is_origin, name = j < design.dimension, f"{design.position_names[k]}: {words[j]}"
         unit: Unit = "m" if is_origin else "rad"
-        add("origin" if is_origin else "rotation", [name], [unit], poses[k, j], own[layout.pose_columns[k, j]])
+        add(
+            "origin" if is_origin else "rotation",
+            [name],
+            [unit],
+            poses[k, j],
+            own[layout.pose_columns[k, j]],
+        )
 
     estimated = layout.offset_columns >= 0
     columns = layout.offset_columns[estimated]
@@ -198,7 +231,13 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
         distances = task_distances(design)
         ends = distances.places.at(design, state).reshape(count, 2, d)
         found = linear_functions(at, distances)
-        add("task", design.task_names, ["m"] * count, np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), found.shared)
+        add(
+            "task",
+            design.task_names,
+            ["m"] * count,
+            np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1),
+            found.shared,
+        )
         drawn.append(found.shared if found.drawn is None else found.drawn.shared)
     none = np.full(count, -1)
     return EstimatedFunctions(
@@ -228,8 +267,9 @@ def parameter_estimates(found: EstimatedFunctions, sigma: float) -> tuple[Parame
 class CorrectedPoints:
     """Scale readings corrected for the estimated errors of the machine: `points` (n, d) in metres.
 
-    `root` (n, d, r) is a square root of their joint covariance, in metres; NaN where a co-ordinate is undetermined. It
-    is that of the correction: the noise of the reading that is corrected is not in it.
+    `root` (n, d, r) is a square root of their joint covariance, in metres; NaN where a co-ordinate
+    is undetermined. It is that of the correction: the noise of the reading that is corrected is not
+    in it.
     """
 
     points: Array
@@ -247,13 +287,17 @@ class CorrectedPoints:
 
     @property
     def covariance(self) -> Array:
-        """Of all co-ordinates together (n d, n d), those of a point side by side, in square metres."""
+        """Of all co-ordinates together (n d, n d), those of a point side by side, in square
+        metres.
+        """
         flat = self.root.reshape(-1, self.root.shape[2])
         return np.asarray(flat @ flat.T)
 
     @property
     def blocks(self) -> Array:
-        """Of each point by itself (n, d, d), in square metres: the diagonal blocks of `covariance`."""
+        """Of each point by itself (n, d, d), in square metres: the diagonal blocks of
+        `covariance`.
+        """
         return np.asarray(self.root @ self.root.transpose(0, 2, 1))
 
 
@@ -261,7 +305,11 @@ class CorrectedPoints:
 def correct(at: Linearisation, points: Array, probes: Integers, sigma: float) -> CorrectedPoints:
     """Corrected points for scale readings `points` (n, d) in metres with probes of indices (n,)."""
     rows = correction_rows(at.design, at.layout, at.state, points, probes)
-    drawn = rows if at.drawn is None else correction_rows(at.design, at.layout, at.drawn.state, points, probes)
+    drawn = (
+        rows
+        if at.drawn is None
+        else correction_rows(at.design, at.layout, at.drawn.state, points, probes)
+    )
     flat = rows.reshape(-1, len(at.layout))
     is_open = np.isnan(at.of_shared(flat, drawn.reshape(flat.shape))).reshape(points.shape)
     root = np.where(is_open[:, :, None], np.nan, sigma * (rows @ at.shared))

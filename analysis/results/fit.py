@@ -63,14 +63,15 @@ SHOWN_RESIDUALS = 3
 
 @dataclass(frozen=True, repr=False)
 class Fit(Result):
-    """An estimate from readings; without quantities and estimates, and the design judged as drawn, if it has failed.
+    """An estimate from readings; without quantities and estimates, and the design judged as drawn,
+    if it has failed.
 
-    `x` (readings, d) are the scale readings in metres. `sigma` multiplies all stated uncertainties: estimated from the
-    residuals as the root of S^2 over the degrees of freedom, or 1 where the file says that they are given.
-    `adjustments` are those of a three-dimensional metric.
-    `diagnosis` is what the residuals make suspect, which nothing else here heeds, or `untested` says why there is none;
-    `marks` tell where readings stand.
-    With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1].
+    `x` (readings, d) are the scale readings in metres. `sigma` multiplies all stated uncertainties:
+    estimated from the residuals as the root of S^2 over the degrees of freedom, or 1 where the file
+    says that they are given. `adjustments` are those of a three-dimensional metric. `diagnosis` is
+    what the residuals make suspect, which nothing else here heeds, or `untested` says why there is
+    none; `marks` tell where readings stand. With `monomials` the machine's parameters are the
+    coefficients of t, t^2, ... on [0, 1].
     """
 
     label: str
@@ -96,19 +97,30 @@ class Fit(Result):
     def headline(self) -> str:
         if not self.converged:
             return f"the estimate has {self.solution.status}"
-        return ", ".join([rank_words(self.verdict), f"sigma {self.sigma:.3g}", *length_headline(self.quantities)])
+        return ", ".join(
+            [rank_words(self.verdict), f"sigma {self.sigma:.3g}", *length_headline(self.quantities)]
+        )
 
     def lines(self) -> list[str]:
         record = self.solution.iterations
         verdict = verdict_lines(self.verdict, with_values=True, lengths=self.quantities.get("U6"))
         lines = [f"{self.label}: {self.title}", *verdict]
         how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
-        summary = f"{self.solution.status} after {len(record) - 1} iterations; S^2 = {record[-1].sum_of_squares:.6g}"
+        summary = (
+            f"{self.solution.status} after {len(record) - 1} iterations; S^2 ="
+            f" {record[-1].sum_of_squares:.6g}"
+        )
         if self.converged:
-            summary += f" with {freedom_words(self.degrees_of_freedom)}; sigma = {self.sigma:.4g} times the stated "
+            summary += (
+                f" with {freedom_words(self.degrees_of_freedom)}; sigma = {self.sigma:.4g} times"
+                " the stated "
+            )
             summary += f"uncertainties ({how})"
         rows = [["iteration", "step", "S^2"]]
-        rows += [[str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"] for k, it in enumerate(record)]
+        rows += [
+            [str(k), _step(it.step) if k else "", f"{it.sum_of_squares:.5e}"]
+            for k, it in enumerate(record)
+        ]
         lines += [summary, "", *aligned(rows, [True, True, True])]
         if not self.converged:
             return lines
@@ -128,7 +140,9 @@ class Fit(Result):
                 ]
             )
         lines += aligned(rows, [False, True, True, False])
-        lines.append("(origins of positions and co-ordinates of balls are among the estimates of --json)")
+        lines.append(
+            "(origins of positions and co-ordinates of balls are among the estimates of --json)"
+        )
         if self.adjustments:
             lines += ["", *adjustment_lines(self.adjustments)]
         for plate in self.plates:
@@ -169,7 +183,11 @@ class Fit(Result):
             ],
             **suspected,
             "estimates": self._estimates_data(),
-            **({"plates": {plate.artefact: plate_data(plate) for plate in self.plates}} if self.plates else {}),
+            **(
+                {"plates": {plate.artefact: plate_data(plate) for plate in self.plates}}
+                if self.plates
+                else {}
+            ),
             **({"adjustments": adjustment_data(self.adjustments)} if self.adjustments else {}),
         }
 
@@ -192,19 +210,24 @@ class Fit(Result):
 
     @cached_property
     def functions(self) -> EstimatedFunctions:
-        """Everything estimated and the measuring tasks, as functions of the parameters; without sigma.
+        """Everything estimated and the measuring tasks, as functions of the parameters; without
+        sigma.
 
         :raises ValueError: the estimate has not converged.
         """
         if not self.converged:
-            raise ValueError(f"the estimate has {self.solution.status}; nothing is known of its uncertainty")
+            raise ValueError(
+                f"the estimate has {self.solution.status}; nothing is known of its uncertainty"
+            )
         return estimated_functions(linearised_fit(self.design, self.solution), self.monomials)
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
-        """Covariance of estimates and measuring tasks, in products of their units; NaN where one is undetermined.
+        """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
+        undetermined.
 
-        Each of `chosen` is a name or a kind: machine, pose (or origin, rotation), offset, length, ball, task; without
-        any it is that of everything. The uncertainties are multiplied by `sigma`, as everywhere in a fit.
+        Each of `chosen` is a name or a kind: machine, pose (or origin, rotation), offset, length,
+        ball, task; without any it is that of everything. The uncertainties are multiplied by
+        `sigma`, as everywhere in a fit.
 
         :raises ValueError: there is no such name, or the estimate has not converged.
 
@@ -219,7 +242,8 @@ class Fit(Result):
         return pandas.DataFrame(self.sigma**2 * found.covariance(), found.labels, found.labels)
 
     def correlation(self, *chosen: str) -> pandas.DataFrame:
-        """Correlation coefficients of what `covariance` gives; NaN also beside what has no uncertainty.
+        """Correlation coefficients of what `covariance` gives; NaN also beside what has no
+        uncertainty.
 
         :raises ValueError: there is no such name, or the estimate has not converged.
         """
@@ -229,14 +253,15 @@ class Fit(Result):
             return found / np.outer(spread, spread)
 
     def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
-        """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint covariance.
+        """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint
+        covariance.
 
-        `probe` is the name of one, or of one for each point; without any it is that of the evaluation points. Of
-        points outside the volume the correction is extrapolated; those farther outside than the volume is large are
-        refused, since they are in another unit.
+        `probe` is the name of one, or of one for each point; without any it is that of the
+        evaluation points. Of points outside the volume the correction is extrapolated; those
+        farther outside than the volume is large are refused, since they are in another unit.
 
-        :raises ValueError: points of another shape or far outside the volume, an unknown probe, or an estimate that
-            has not converged.
+        :raises ValueError: points of another shape or far outside the volume, an unknown probe, or
+            an estimate that has not converged.
 
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
@@ -247,7 +272,10 @@ class Fit(Result):
         if given.ndim != 2 or given.shape[1] != design.dimension:
             raise ValueError(f"points of shape {given.shape}; expected (n, {design.dimension})")
         for i, axis in np.argwhere(far_outside(given, design)).tolist():
-            told = f"{AXIS_NAMES[axis]} = {given[i, axis]:.6g} m of points[{i}] is far outside the volume"
+            told = (
+                f"{AXIS_NAMES[axis]} = {given[i, axis]:.6g} m of points[{i}] is far outside the"
+                " volume"
+            )
             raise ValueError(f"{told}; give points in metres")
         names = design.probe_names
         given_probe = names[design.point_probe] if probe is None else probe
@@ -282,29 +310,37 @@ class Fit(Result):
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, the fit has three dimensions, or has not converged.
+        :raises ValueError: the path ends in something else, the fit has three dimensions, or has
+            not converged.
         """
         if self.design.dimension != 2 or not self.converged:
             why = "has three dimensions" if self.converged else f"has {self.solution.status}"
-            raise ValueError(f"residuals are drawn of fits in two dimensions that have converged; this one {why}")
+            raise ValueError(
+                f"residuals are drawn of fits in two dimensions that have converged; this one {why}"
+            )
         return draw_vectors(self.residual_vectors(), self.title, path)
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What is to be said of sigma where it comes from few degrees of freedom, and of what was not tested."""
+        """What is to be said of sigma where it comes from few degrees of freedom, and of what was
+        not tested.
+        """
         found = []
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
         if self.untested:
             found.append(
-                f"{self.untested}: fit the means of repeated readings, with u as a column, to have them tested"
+                f"{self.untested}: fit the means of repeated readings, with u as a column, to have"
+                " them tested"
             )
         return tuple(filter(None, found))
 
     @property
     def too_large(self) -> bool:
-        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in a thousand."""
+        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in
+        a thousand.
+        """
         from scipy.special import chdtri
 
         if not self.converged or self.degrees_of_freedom <= 0:
@@ -328,7 +364,9 @@ class Fit(Result):
         return aligned(rows, [False, False, False, False, True, True])
 
     def _estimates_data(self) -> dict[str, Any]:
-        """Estimates by name; by kind and name where a model gives a parameter the name that another kind has."""
+        """Estimates by name; by kind and name where a model gives a parameter the name that another
+        kind has.
+        """
         return {
             name: {
                 "value": finite(one.value),

@@ -37,7 +37,10 @@ def _text_rows(table: Table) -> list[str]:
     for block in table.blocks:
         if block.title:
             titles[len(rows)] = block.title
-        rows += [[indent + row.headings[0], *row.headings[1:], *(e.text for e in row.entries)] for row in block.rows]
+        rows += [
+            [indent + row.headings[0], *row.headings[1:], *(e.text for e in row.entries)]
+            for row in block.rows
+        ]
     lines = []
     for k, line in enumerate(aligned(rows, right)):
         lines += [titles[k]] if k in titles else []
@@ -86,7 +89,11 @@ def as_html(title: str, tables: Sequence[Table]) -> str:
         parts.append(f"<table><caption>{escape(table.caption)}</caption>")
         parts.append(f"<thead>{_html_row(head, 'th', stubs)}</thead>")
         for block in table.blocks:
-            titled = f'<tr><th colspan="{len(head)}">{escape(block.title)}</th></tr>' if block.title else ""
+            titled = (
+                f'<tr><th colspan="{len(head)}">{escape(block.title)}</th></tr>'
+                if block.title
+                else ""
+            )
             rows = "\n".join(_html_row(_texts(row), "td", stubs) for row in block.rows)
             parts.append(f"<tbody>{titled}{rows}</tbody>")
         parts += ["</table>", *(f"<p>{escape(note)}</p>" for note in table.notes)]
@@ -128,7 +135,9 @@ def as_latex(title: str, tables: Sequence[Table]) -> str:
         parts += ["\\begin{table}", "\\centering", f"\\caption{{{_latex(table.caption)}}}"]
         parts += [f"\\begin{{tabular}}{{{'l' * stubs}{'r' * count}}}", "\\hline"]
         if table.spanner:
-            parts.append(f"{'& ' * stubs}\\multicolumn{{{count}}}{{c}}{{{_latex(table.spanner)}}} \\\\")
+            parts.append(
+                f"{'& ' * stubs}\\multicolumn{{{count}}}{{c}}{{{_latex(table.spanner)}}} \\\\"
+            )
         parts += [_latex_row([*table.headings, *table.columns]), "\\hline"]
         for block in table.blocks:
             parts += _latex_block(block, stubs + count)
@@ -138,7 +147,9 @@ def as_latex(title: str, tables: Sequence[Table]) -> str:
 
 
 def _latex_block(block: Block, columns: int) -> list[str]:
-    title = [f"\\multicolumn{{{columns}}}{{l}}{{{_latex(block.title)}}} \\\\"] if block.title else []
+    title = (
+        [f"\\multicolumn{{{columns}}}{{l}}{{{_latex(block.title)}}} \\\\"] if block.title else []
+    )
     return [*title, *(_latex_row(_texts(row)) for row in block.rows), "\\hline"]
 
 

@@ -53,14 +53,20 @@ def uncertainty_words(coverage_factor: float) -> str:
     >>> uncertainty_words(1.0), uncertainty_words(2.0)
     ('standard uncertainty u', 'expanded uncertainty U = 2 u')
     """
-    return "standard uncertainty u" if coverage_factor == 1.0 else f"expanded uncertainty U = {coverage_factor:g} u"
+    return (
+        "standard uncertainty u"
+        if coverage_factor == 1.0
+        else f"expanded uncertainty U = {coverage_factor:g} u"
+    )
 
 
 def to_uncertainty(value: float, uncertainty: float) -> str:
     """A value to the third digit of its standard uncertainty.
 
-    >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597), to_uncertainty(12.0, float("nan"))
-    ('50000.213', '-0.042', '12.0000')
+    >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597)
+    ('50000.213', '-0.042')
+    >>> to_uncertainty(12.0, float("nan"))
+    '12.0000'
     """
     if math.isnan(value) or not uncertainty > 0.0:
         return number(value, 6)

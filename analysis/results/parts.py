@@ -13,7 +13,15 @@ from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity
 from ..uncertainty.tasks import TaskUncertainty, is_determined
 from .adjustments import ARCSECOND, Adjustment
-from .formatting import aligned, finite, number, percent, shown_unit, to_uncertainty, uncertainty_words
+from .formatting import (
+    aligned,
+    finite,
+    number,
+    percent,
+    shown_unit,
+    to_uncertainty,
+    uncertainty_words,
+)
 from .plates import PlateCoordinates
 
 # Balls of a plate that a table has room for.
@@ -45,19 +53,26 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
         )
         told.add(name)
     lines = aligned(rows, [False, False, True, True, False, False, False])
-    places = list(dict.fromkeys(place for quantity in quantities.values() for place in quantity.places))
+    places = list(
+        dict.fromkeys(place for quantity in quantities.values() for place in quantity.places)
+    )
     lines += [f"({', '.join(places)})"] if places else []
     for quantity in quantities.values():
         if quantity.within_target is not None:
             by = uncertainty_words(quantity.coverage_factor)
-            lines.append(f"within the target accuracy ({by}): {percent(quantity.within_target)} of {quantity.symbol}")
+            lines.append(
+                f"within the target accuracy ({by}): {percent(quantity.within_target)} of"
+                f" {quantity.symbol}"
+            )
     return lines
 
 
 def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
     """Measuring tasks as lines of text."""
     expanded = f"expanded (k = {tasks[0].expansion:g}), um"
-    rows = [["task", "length, mm", "standard uncertainty, um", expanded, "target, um", "within target"]]
+    rows = [
+        ["task", "length, mm", "standard uncertainty, um", expanded, "target, um", "within target"]
+    ]
     for task in tasks:
         rows.append(
             [
@@ -69,7 +84,9 @@ def task_table(tasks: Sequence[TaskUncertainty]) -> list[str]:
             ]
         )
     with_target = any(task.target is not None for task in tasks)
-    by = next((uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), "")
+    by = next(
+        (uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), ""
+    )
     note = [f"(the target is compared with the {by})"] if with_target else []
     return [*aligned(rows, [False, True, True, True, True, False]), *note]
 
@@ -97,8 +114,12 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
     }
 
 
-def verdict_lines(judged: Verdict, with_values: bool = False, lengths: Quantity | None = None) -> list[str]:
-    """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of them."""
+def verdict_lines(
+    judged: Verdict, with_values: bool = False, lengths: Quantity | None = None
+) -> list[str]:
+    """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of
+    them.
+    """
     lines = []
     rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
     if judged.expected is not None or not judged.as_expected:
@@ -130,21 +151,35 @@ def _lengths_words(lengths: Quantity) -> str:
         return "all are undetermined"
     # Beside a share that is of an expanded uncertainty, it has to be said what this is.
     symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
-    words = f"{symbol} {number(1e6 * lengths.average)} um on the average, {number(1e6 * lengths.maximum)} um at most"
-    open_ = f", {lengths.undetermined} of {lengths.count} distances undetermined" if lengths.undetermined else ""
+    words = (
+        f"{symbol} {number(1e6 * lengths.average)} um on the average,"
+        f" {number(1e6 * lengths.maximum)} um at most"
+    )
+    open_ = (
+        f", {lengths.undetermined} of {lengths.count} distances undetermined"
+        if lengths.undetermined
+        else ""
+    )
     return words + open_
 
 
 def target_lines(lengths: Quantity | None) -> list[str]:
-    """The share of lengths within the target accuracy, with U6, as a line of text; none where nothing is compared."""
+    """The share of lengths within the target accuracy, with U6, as a line of text; none where
+    nothing is compared.
+    """
     if lengths is None or lengths.within_target is None:
         return []
     by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
-    return [f"within the target accuracy ({by}): {share} of {lengths.count} lengths; {_lengths_words(lengths)}"]
+    return [
+        f"within the target accuracy ({by}): {share} of {lengths.count} lengths;"
+        f" {_lengths_words(lengths)}"
+    ]
 
 
 def scale_lines(found: Scale | None) -> list[str]:
-    """What carries scale as lines of text, and a warning where it rests on offsets that are held exact."""
+    """What carries scale as lines of text, and a warning where it rests on offsets that are held
+    exact.
+    """
     if found is None:
         return []
     if all(one.without is None for one in found.carriers):
@@ -155,7 +190,9 @@ def scale_lines(found: Scale | None) -> list[str]:
         if one.without is None:
             told.append(one.words)
             continue
-        without = "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
+        without = (
+            "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
+        )
         told.append(f"{one.words} ({without} without)")
     lines = [f"scale known to {number(1e6 * found.uncertainty, 3)} ppm from {' and '.join(told)}"]
     if not found.rests_on_offsets:
@@ -163,12 +200,18 @@ def scale_lines(found: Scale | None) -> list[str]:
     warning = "warning: the scale rests on probe offsets that are held exact"
     if found.loosened is not None:
         loose = found.loosened
-        average, most, before = (number(1e6 * value) for value in (loose.average, loose.maximum, loose.before))
-        warning += (
-            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but one, U6 would be "
-            f"{average} um on the average and {most} um at most instead of {before} um on the average"
+        average, most, before = (
+            number(1e6 * value) for value in (loose.average, loose.maximum, loose.before)
         )
-    return [*lines, f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets"]
+        warning += (
+            f": with a standard uncertainty of {1e6 * loose.offset_uncertainty:g} um of each but"
+            f" one, U6 would be {average} um on the average and {most} um at most instead of"
+            f" {before} um on the average"
+        )
+    return [
+        *lines,
+        f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets",
+    ]
 
 
 def scale_data(found: Scale | None) -> dict[str, Any] | None:
@@ -183,18 +226,22 @@ def scale_data(found: Scale | None) -> dict[str, Any] | None:
             for one in found.carriers
         ],
         "rests_on_exact_offsets": found.rests_on_offsets,
-        "with_uncertain_offsets": None
-        if loose is None
-        else {
-            "standard_uncertainty": loose.offset_uncertainty,
-            "U6_average": loose.average,
-            "U6_maximum": loose.maximum,
-        },
+        "with_uncertain_offsets": (
+            None
+            if loose is None
+            else {
+                "standard_uncertainty": loose.offset_uncertainty,
+                "U6_average": loose.average,
+                "U6_maximum": loose.maximum,
+            }
+        ),
     }
 
 
 def _border(judged: Verdict) -> str:
-    """What singular values come after those that count; what they are is not told where they are rounding."""
+    """What singular values come after those that count; what they are is not told where they are
+    rounding.
+    """
     if not judged.deficiency:
         return ""
     if judged.gap >= GREAT:
@@ -204,29 +251,45 @@ def _border(judged: Verdict) -> str:
 
 
 def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_BALLS) -> list[str]:
-    """A plate's co-ordinates in its own axes as lines of text, for the first balls of a large one."""
+    """A plate's co-ordinates in its own axes as lines of text, for the first balls of a large
+    one.
+    """
     title = "co-ordinates of the balls in the plate's own axes"
     lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
     rows = [["ball", "x, mm", "y, mm", "standard uncertainty of x, um", "of y, um"]]
-    for name, values, uncertainties in zip(plate.names, plate.coordinates, plate.standard_uncertainties, strict=True):
-        x, y = (to_uncertainty(1e3 * v, 1e3 * u) for v, u in zip(values, uncertainties, strict=True))
+    for name, values, uncertainties in zip(
+        plate.names, plate.coordinates, plate.standard_uncertainties, strict=True
+    ):
+        x, y = (
+            to_uncertainty(1e3 * v, 1e3 * u) for v, u in zip(values, uncertainties, strict=True)
+        )
         rows.append([name, x, y, *(number(1e6 * u, 3) for u in uncertainties)])
     lines += aligned(rows[: most + 1], [False, True, True, True, True])
-    return lines + ([f"({len(rows) - 1 - most} balls more in --json)"] if len(rows) - 1 > most else [])
+    return lines + (
+        [f"({len(rows) - 1 - most} balls more in --json)"] if len(rows) - 1 > most else []
+    )
 
 
 def adjustment_lines(found: Sequence[Adjustment]) -> list[str]:
     """Adjustments as a table of text."""
-    rows = [["adjustment", "is off by", "standard uncertainty", "expanded, 95 %", "unit", "what to do"]]
+    rows = [
+        ["adjustment", "is off by", "standard uncertainty", "expanded, 95 %", "unit", "what to do"]
+    ]
     for one in found:
         shown = ARCSECOND if one.unit == "rad" else 1e-6
         value, u, expanded = (
-            number(v / shown) for v in (one.value, one.standard_uncertainty, one.expanded_uncertainty)
+            number(v / shown)
+            for v in (one.value, one.standard_uncertainty, one.expanded_uncertainty)
         )
-        rows.append([one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "um/m", one.words])
+        rows.append(
+            [one.what, value, u, expanded, "arcsec" if one.unit == "rad" else "um/m", one.words]
+        )
     return [
         *aligned(rows, [False, True, True, True, False, False]),
-        "(a scale is off by what readings lack of the true length; an angle by what it exceeds 90 deg)",
+        (
+            "(a scale is off by what readings lack of the true length; an angle by what it exceeds"
+            " 90 deg)"
+        ),
     ]
 
 
@@ -246,17 +309,26 @@ def adjustment_data(found: Sequence[Adjustment]) -> dict[str, Any]:
 
 
 def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
-    """A plate's co-ordinates in its own axes as plain data in metres; what is undetermined is None."""
+    """A plate's co-ordinates in its own axes as plain data in metres; what is undetermined is
+    None.
+    """
     axes = plate.axes
     return {
         "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
         "balls": {
             name: {
-                axis: {"value": finite(value), "standard_uncertainty": finite(uncertainty), "unit": "m"}
+                axis: {
+                    "value": finite(value),
+                    "standard_uncertainty": finite(uncertainty),
+                    "unit": "m",
+                }
                 for axis, value, uncertainty in zip("xy", values, uncertainties, strict=True)
             }
             for name, values, uncertainties in zip(
-                plate.names, plate.coordinates.tolist(), plate.standard_uncertainties.tolist(), strict=True
+                plate.names,
+                plate.coordinates.tolist(),
+                plate.standard_uncertainties.tolist(),
+                strict=True,
             )
         },
     }

@@ -1,4 +1,6 @@
-"""Co-ordinates of a plate's balls in the plate's own axes, with the standard uncertainties that they have there."""
+"""Co-ordinates of a plate's balls in the plate's own axes, with the standard uncertainties that
+they have there.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from ballplate.simulator.machines.protocol import Array
 
 @dataclass(frozen=True, eq=False)
 class PlateCoordinates:
-    """A plate in the axes that two of its balls define: `coordinates` and `standard_uncertainties` (n, 2), metres.
+    """A plate in the axes that two of its balls define: `coordinates` and `standard_uncertainties`
+    (n, 2), metres.
 
     What the axes define is exact; what the observations leave open is NaN, and so its uncertainty.
     """
@@ -33,7 +36,9 @@ class PlateCoordinates:
 
 
 def axes_of_plates(experiment: Experiment) -> Mapping[str, PlateAxes]:
-    """The axes of each plate of a two-dimensional experiment; none in three dimensions, or for a single ball."""
+    """The axes of each plate of a two-dimensional experiment; none in three dimensions, or for a
+    single ball.
+    """
     if experiment.dimension != 2:
         return {}
     found = {
@@ -44,10 +49,13 @@ def axes_of_plates(experiment: Experiment) -> Mapping[str, PlateAxes]:
     return {name: axes for name, axes in found.items() if axes is not None}
 
 
-def plate_coordinates(experiment: Experiment, at: Linearisation, sigma: float = 1.0) -> tuple[PlateCoordinates, ...]:
+def plate_coordinates(
+    experiment: Experiment, at: Linearisation, sigma: float = 1.0
+) -> tuple[PlateCoordinates, ...]:
     """The balls of every plate of a two-dimensional experiment in the plate's own axes.
 
-    With c the co-ordinates there, Q the rotation into the axes and the x axis fixed by ball b, to first order
+    With c the co-ordinates there, Q the rotation into the axes and the x axis fixed by ball b, to
+    first order
 
         dc_j = Q (dy_j - dy_o) + g_j (Q (dy_b - dy_o))_y / c_bx,  g_j = (c_jy, -c_jx)
 
@@ -81,10 +89,15 @@ def plate_coordinates(experiment: Experiment, at: Linearisation, sigma: float = 
 
 
 def _weights(coordinates: Array, axes: PlateAxes) -> dict[int, Array]:
-    """How each co-ordinate (n, 2) follows the ball on the axis and that at the origin (n, 2, 2), besides its own."""
+    """How each co-ordinate (n, 2) follows the ball on the axis and that at the origin (n, 2, 2),
+    besides its own.
+    """
     across, length = 1 - axes.axis, coordinates[axes.ball, axes.axis]
     if axes.axis == 1:
         length = -length
     by_ball = np.zeros((len(coordinates), 2, 2))
-    by_ball[:, 0, across], by_ball[:, 1, across] = coordinates[:, 1] / length, -coordinates[:, 0] / length
+    by_ball[:, 0, across], by_ball[:, 1, across] = (
+        coordinates[:, 1] / length,
+        -coordinates[:, 0] / length,
+    )
     return {axes.ball: by_ball, axes.origin: -np.eye(2) - by_ball}

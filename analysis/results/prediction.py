@@ -38,10 +38,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Prediction(Result):
-    """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they were asked for.
+    """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they
+    were asked for.
 
-    `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if that was asked for
-    and is determined. `monte_carlo` has replicates, if they were asked for.
+    `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if
+    that was asked for and is determined. `monte_carlo` has replicates, if they were asked for.
     """
 
     label: str
@@ -63,7 +64,10 @@ class Prediction(Result):
 
     def table_lines(self) -> list[str]:
         """The same without replicates: title, verdict and table."""
-        lines = [f"{self.label}: {self.title}", *verdict_lines(self.verdict, with_values=True, lengths=self.lengths)]
+        lines = [
+            f"{self.label}: {self.title}",
+            *verdict_lines(self.verdict, with_values=True, lengths=self.lengths),
+        ]
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += scale_lines(self.scale)
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
@@ -76,7 +80,11 @@ class Prediction(Result):
             **verdict_data(self.verdict),
             "sigma": 1.0,
             "quantities": quantities_data(self.quantities),
-            **({} if self.quantities or self.lengths is None else {"lengths": quantity_data(self.lengths)}),
+            **(
+                {}
+                if self.quantities or self.lengths is None
+                else {"lengths": quantity_data(self.lengths)}
+            ),
             **({"tasks": task_data(self.tasks)} if self.tasks else {}),
             "scale": scale_data(self.scale),
             **({} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}),
@@ -95,7 +103,10 @@ class Prediction(Result):
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each of U1 to U6."""
-        return [{"symbol": symbol, **quantity_row(quantity)} for symbol, quantity in self.quantities.items()]
+        return [
+            {"symbol": symbol, **quantity_row(quantity)}
+            for symbol, quantity in self.quantities.items()
+        ]
 
 
 def rank_words(judged: Verdict) -> str:

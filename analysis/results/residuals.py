@@ -8,7 +8,11 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations import Readings
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.estimation.observations import length_deviations, reading_blocks, reading_weights
+from ballplate.simulator.estimation.observations import (
+    length_deviations,
+    reading_blocks,
+    reading_weights,
+)
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.rounding import comparable
 
@@ -18,9 +22,11 @@ LARGEST = 10
 
 @dataclass(frozen=True)
 class Residual:
-    """What a reading of a plate differs by from the estimate along one axis, in metres and in its uncertainties.
+    """What a reading of a plate differs by from the estimate along one axis, in metres and in its
+    uncertainties.
 
-    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the certificate's.
+    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the
+    certificate's.
     """
 
     position: str
@@ -31,8 +37,12 @@ class Residual:
     standardised: float
 
 
-def reading_residuals(design: Design, solution: Solution, x: Array) -> tuple[Readings, Array, Array]:
-    """Readings of plates, with what each differs by from the estimate, (m, d) metres and in standard uncertainties."""
+def reading_residuals(
+    design: Design, solution: Solution, x: Array
+) -> tuple[Readings, Array, Array]:
+    """Readings of plates, with what each differs by from the estimate, (m, d) metres and in
+    standard uncertainties.
+    """
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
     standardised = reading_blocks(design, solution.state, readings, x[chosen]).residual
@@ -54,7 +64,9 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
         ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
         if k >= 0:
             second = design.lengths.second[k]
-            ball, words = (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
+            ball, words = (
+                (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
+            )
         found.append(
             Residual(
                 design.position_names[design.readings.position[reading]],

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 class Result:
-    """A result with a label and a title. Numbers in data and frames are in metres, radians and ratios."""
+    """A result with a label and a title. Numbers in data and frames are in metres, radians and
+    ratios.
+    """
 
     if TYPE_CHECKING:
 
@@ -33,11 +35,15 @@ class Result:
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as plain data, as the command's --json prints it; what is undetermined is None."""
+        """The result as plain data, as the command's --json prints it; what is undetermined is
+        None.
+        """
         raise NotImplementedError
 
     def rows(self) -> list[dict[str, Any]]:
-        """The rows of its main table, by the names of the columns; units have a column of their own."""
+        """The rows of its main table, by the names of the columns; units have a column of their
+        own.
+        """
         raise NotImplementedError
 
     def to_frame(self) -> pandas.DataFrame:
@@ -59,7 +65,9 @@ class Result:
         return self._written(as_html)
 
     def to_csv(self) -> str:
-        """Its main table as CSV with a line of headings, with all digits; what is undetermined is empty."""
+        """Its main table as CSV with a line of headings, with all digits; what is undetermined is
+        empty.
+        """
         return self.to_frame().to_csv(index=False)
 
     def __str__(self) -> str:
@@ -72,7 +80,9 @@ class Result:
         return self.to_html()
 
     def _written(self, form: Callable[[str, Sequence[Table]], str]) -> str:
-        """Title and main table in a form, with four digits; without any row, the result in a few words."""
+        """Title and main table in a form, with four digits; without any row, the result in a few
+        words.
+        """
         rows, title = self.rows(), f"{self.label}: {self.title}"
         if not rows:
             return form(f"{title}: {self.headline()}", [])
@@ -80,8 +90,12 @@ class Result:
         are_text = [all(isinstance(row[name], str) for row in rows) for name in names]
         left = are_text.index(False) if False in are_text else len(names)
         texts = [tuple(_shown(row[name]) for name in names) for row in rows]
-        block = Block("", tuple(Row(row[:left], tuple(Entry(text) for text in row[left:])) for row in texts))
-        return form(title, [Table("", self.headline(), tuple(names[:left]), tuple(names[left:]), (block,))])
+        block = Block(
+            "", tuple(Row(row[:left], tuple(Entry(text) for text in row[left:])) for row in texts)
+        )
+        return form(
+            title, [Table("", self.headline(), tuple(names[:left]), tuple(names[left:]), (block,))]
+        )
 
 
 def _shown(value: Any) -> str:

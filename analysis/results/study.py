@@ -1,4 +1,6 @@
-"""What the commands do, without a terminal: check a design, predict its uncertainties, fit readings to it."""
+"""What the commands do, without a terminal: check a design, predict its uncertainties, fit readings
+to it.
+"""
 
 from __future__ import annotations
 
@@ -32,14 +34,18 @@ from .residuals import largest_residuals
 
 @dataclass(frozen=True)
 class PlannedUncertainty:
-    """Uncertainties alone, for searches that judge many designs: rank deficiency, quantities and tasks."""
+    """Uncertainties alone, for searches that judge many designs: rank deficiency, quantities and
+    tasks.
+    """
 
     deficiency: int
     quantities: dict[str, Quantity]
     tasks: tuple[TaskUncertainty, ...]
 
 
-def check(experiment: Experiment, design: Design | None = None, with_scale: bool = False) -> Prediction:
+def check(
+    experiment: Experiment, design: Design | None = None, with_scale: bool = False
+) -> Prediction:
     """Judge the rank of an experiment's design, or of what came of it, at zero machine error."""
     return _predict(experiment, design or lay_out(experiment), False, with_scale)
 
@@ -58,7 +64,9 @@ def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
 
 
 @single_threaded
-def _predict(experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool) -> Prediction:
+def _predict(
+    experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool
+) -> Prediction:
     at, target = linearise(design), experiment.target_accuracy
     judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities: dict[str, Quantity] = {}
@@ -70,7 +78,9 @@ def _predict(experiment: Experiment, design: Design, with_quantities: bool, with
     else:
         lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
     scale = scale_of(experiment, at) if with_scale else None
-    return Prediction(experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale)
+    return Prediction(
+        experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale
+    )
 
 
 @single_threaded
@@ -82,8 +92,8 @@ def fit(
 ) -> Fit:
     """Estimate machine errors, balls and poses from readings.
 
-    `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as the
-    coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
+    `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as
+    the coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
     """
     design = observed.design
     solution = estimate(design, observed.x)

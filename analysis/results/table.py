@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Entry:
-    """A place in a table; `value` is the figure of the cell as it is stored, None where a text stands alone."""
+    """A place in a table; `value` is the figure of the cell as it is stored, None where a text
+    stands alone.
+    """
 
     text: str
     value: float | None = None
@@ -35,8 +37,8 @@ class Block:
 class Table:
     """A table.
 
-    `headings` stand above what rows are about, `columns` above the entries, `spanner` above all of these, and `block`
-    says what the blocks' titles are values of.
+    `headings` stand above what rows are about, `columns` above the entries, `spanner` above all of
+    these, and `block` says what the blocks' titles are values of.
     """
 
     name: str

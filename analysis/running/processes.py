@@ -29,10 +29,11 @@ def in_processes(
     ordered: bool = True,
     batch_size: int | str = 1,
 ) -> Iterator[Result]:
-    """Results of a function, called with each of the arguments in one of several processes; one worker is this process.
+    """Results of a function, called with each of the arguments in one of several processes; one
+    worker is this process.
 
-    In the order of the arguments, or as they come. An end before the last of them ends the workers as well, and so does
-    within seconds whatever ends this process.
+    In the order of the arguments, or as they come. An end before the last of them ends the workers
+    as well, and so does within seconds whatever ends this process.
     """
     if workers == 1:
         for own in arguments:
@@ -60,7 +61,8 @@ def in_processes(
         finished = True
     finally:
         if not finished and results is not None:
-            # Nobody waits for what is under way; a run that has ended early ends at once, and says so itself.
+            # Nobody waits for what is under way; a run that has ended early ends at once, and says
+            # so itself.
             with warnings.catch_warnings(), _managers_silenced():
                 warnings.simplefilter("ignore", UserWarning)
                 results.close()
@@ -68,7 +70,8 @@ def in_processes(
 
 @contextmanager
 def _managers_silenced() -> Iterator[None]:
-    """Let threads that manage processes end without a word: what is taken away from them amid their work is no error.
+    """Let threads that manage processes end without a word: what is taken away from them amid their
+    work is no error.
 
     Joblib's may look for a task that was just withdrawn.
     """
@@ -89,7 +92,8 @@ def _managers_silenced() -> Iterator[None]:
 
 
 def begin_worker(parent: int) -> None:
-    """Prepare a process that works for another: it ends with that one, which alone answers interruptions.
+    """Prepare a process that works for another: it ends with that one, which alone answers
+    interruptions.
 
     An interruption from the keyboard reaches every process of the terminal.
     """
@@ -104,7 +108,9 @@ def _end_with(parent: int) -> None:
         synchronize = 0x00100000
         # There is an error where it has ended already.
         with suppress(OSError):
-            _winapi.WaitForSingleObject(_winapi.OpenProcess(synchronize, False, parent), _winapi.INFINITE)
+            _winapi.WaitForSingleObject(
+                _winapi.OpenProcess(synchronize, False, parent), _winapi.INFINITE
+            )
     else:
         while os.getppid() == parent:
             time.sleep(PARENT_INTERVAL)
@@ -142,7 +148,8 @@ def _signals_held() -> Iterator[None]:
 def _start_trackers() -> None:
     """Start the processes that remove shared memory when this one has ended.
 
-    They let interruptions in again when they start, and say what they remove if this process was killed.
+    They let interruptions in again when they start, and say what they remove if this process was
+    killed.
     """
     from joblib.externals.loky.backend import resource_tracker as of_joblib
 
@@ -159,7 +166,9 @@ def _start_trackers() -> None:
 
 @contextmanager
 def _interruptions_blocked() -> Iterator[None]:
-    """Let processes inherit that interruptions are blocked, until they have loaded what ignores them."""
+    """Let processes inherit that interruptions are blocked, until they have loaded what ignores
+    them.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

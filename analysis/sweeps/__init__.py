@@ -1,1 +1,3 @@
-"""Families of experiments: what varies, the store of what came out, and the work spread over processes."""
+"""Families of experiments: what varies, the store of what came out, and the work spread over
+processes.
+"""

@@ -9,7 +9,16 @@ from ballplate.simulator.experiment.variants import node_at, override
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python, written
+from ballplate.simulator.inputs.yamltree import (
+    Mapping,
+    Mark,
+    Node,
+    Scalar,
+    Sequence,
+    mark_of,
+    to_python,
+    written,
+)
 
 from .model import Axis, Choice, Unit
 from .settings import AxisSettings
@@ -34,11 +43,17 @@ def read_axis(
     given = [key for key in SOURCES if getattr(settings, key) is not None]
     if len(given) != 1:
         known = "values, from … to …, together, subsets or variants"
-        problems.add(here, f"{'nothing says' if not given else 'too much says'} what it varies; give one of {known}")
+        problems.add(
+            here,
+            f"{'nothing says' if not given else 'too much says'} what it varies; give one of"
+            f" {known}",
+        )
         return None
     needless = _needless(settings, given[0])
     if needless:
-        problems.add((*here, needless), f"does not go with {_key(given[0])}; remove it", of_key=True)
+        problems.add(
+            (*here, needless), f"does not go with {_key(given[0])}; remove it", of_key=True
+        )
         return None
     before = len(problems.messages)
     choices = _choices(here, given[0], settings, root, trees, variant, problems)
@@ -47,20 +62,26 @@ def read_axis(
     counts = Counter(choice.label for choice in choices)
     twice = next((one for one, times in counts.items() if times > 1), None)
     if twice is not None:
-        problems.add(here, f'has the value "{twice}" twice; take one away, or name the values differently')
+        problems.add(
+            here, f'has the value "{twice}" twice; take one away, or name the values differently'
+        )
         return None
     _check_paths(here, choices, trees, problems)
     return _with_numbers(name, choices, given[0] in ("values", "start"))
 
 
 def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> Axis:
-    """The axis, with the choices' values as numbers where all of them are quantities of one kind."""
+    """The axis, with the choices' values as numbers where all of them are quantities of one
+    kind.
+    """
     found: list[tuple[float, Unit]] = []
     if is_simple:
         found = [numeric(to_python(choice.changes[0][1])) for choice in choices]
     if len({unit for _, unit in found}) != 1 or not found[0][1]:
         return Axis(name, tuple(choices), "")
-    numbers = [replace(choice, value=value) for choice, (value, _) in zip(choices, found, strict=True)]
+    numbers = [
+        replace(choice, value=value) for choice, (value, _) in zip(choices, found, strict=True)
+    ]
     return Axis(name, tuple(numbers), found[0][1])
 
 
@@ -141,16 +162,25 @@ def _variant_choices(
         return []
     for k, name in enumerate(chosen):
         if name not in names:
-            problems.add((*here, "variants", k), f'no variant "{name}" in the base file; {hint(name, names)}')
+            problems.add(
+                (*here, "variants", k), f'no variant "{name}" in the base file; {hint(name, names)}'
+            )
     return [Choice(name, (), variant=name) for name in chosen]
 
 
-def _choices_together(here: Steps, settings: AxisSettings, root: Node, problems: Problems) -> list[Choice]:
-    columns = {path: _nodes(root, (*here, "together", path), problems) for path in settings.together or {}}
+def _choices_together(
+    here: Steps, settings: AxisSettings, root: Node, problems: Problems
+) -> list[Choice]:
+    columns = {
+        path: _nodes(root, (*here, "together", path), problems) for path in settings.together or {}
+    }
     lengths = {len(column) for column in columns.values()}
     if len(lengths) > 1:
         counts = listing(f"{path}: {len(column)}" for path, column in columns.items())
-        problems.add((*here, "together"), f"lists of different lengths ({counts}); give each path as many values")
+        problems.add(
+            (*here, "together"),
+            f"lists of different lengths ({counts}); give each path as many values",
+        )
         return []
     count = lengths.pop() if lengths else 0
     names = list(settings.names or ())
@@ -161,7 +191,12 @@ def _choices_together(here: Steps, settings: AxisSettings, root: Node, problems:
     for k in range(count):
         own = [column[k] for column in columns.values()]
         text = names[k] if names else " / ".join(one[0] for one in own)
-        choices.append(Choice(text, tuple((path, one[1], one[1].mark) for path, one in zip(columns, own, strict=True))))
+        choices.append(
+            Choice(
+                text,
+                tuple((path, one[1], one[1].mark) for path, one in zip(columns, own, strict=True)),
+            )
+        )
     return choices
 
 
@@ -183,13 +218,17 @@ def _subset_choices(
         return []
     names = entry_names(place) if place is not None else None
     if names is None or not isinstance(place, Sequence):
-        problems.add((*here, "path"), "leads to no list of entries with names; write for example positions")
+        problems.add(
+            (*here, "path"), "leads to no list of entries with names; write for example positions"
+        )
         return []
     before = len(problems.messages)
     for key, some in (("always", wanted.always), ("among", wanted.among or ())):
         for k, name in enumerate(some):
             if name not in names:
-                problems.add((*here, "subsets", key, k), f'no entry "{name}" in {path}; {hint(name, names)}')
+                problems.add(
+                    (*here, "subsets", key, k), f'no entry "{name}" in {path}; {hint(name, names)}'
+                )
     among = wanted.among if wanted.among is not None else tuple(names)
     fixed = len(set(wanted.always))
     total = len(set(among) | set(wanted.always))
@@ -201,14 +240,19 @@ def _subset_choices(
         return []
     count = subset_count(total, fixed, wanted.sizes)
     if count > MOST_VALUES:
-        problems.add((*here, "subsets"), f"{count} subsets; {MOST_VALUES} are the limit, so take fewer of them")
+        problems.add(
+            (*here, "subsets"),
+            f"{count} subsets; {MOST_VALUES} are the limit, so take fewer of them",
+        )
         return []
     mark = mark_of(root, (*here, "subsets"))
     found = subsets(names, wanted.always, among, wanted.sizes)
     return [Choice(text, (), kept=(path, kept, mark)) for text, kept in found]
 
 
-def _check_paths(here: Steps, choices: list[Choice], trees: dict[str | None, Node], problems: Problems) -> None:
+def _check_paths(
+    here: Steps, choices: list[Choice], trees: dict[str | None, Node], problems: Problems
+) -> None:
     """Refuse paths that lead nowhere in every variant."""
     for path in dict.fromkeys(path for choice in choices[:1] for path, _, _ in choice.changes):
         errors = []

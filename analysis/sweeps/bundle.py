@@ -1,4 +1,6 @@
-"""The files that a sweep depends on, so that any machine can compute its cells and a store can tell what changed."""
+"""The files that a sweep depends on, so that any machine can compute its cells and a store can tell
+what changed.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ MOST_BYTES = 100_000_000
 
 @dataclass(frozen=True)
 class Bundle:
-    """Contents of files by their path below a common folder; `source` is the sweep file, `base` the experiment file."""
+    """Contents of files by their path below a common folder; `source` is the sweep file, `base` the
+    experiment file.
+    """
 
     source: str
     base: str
@@ -55,8 +59,9 @@ def bundle_of(sweep: Sweep) -> Bundle:
         size = sum(path.stat().st_size for path in paths)
         if size > MOST_BYTES:
             text = (
-                f"the files that the sweep names hold {size / 1e6:.0f} MB, and {MOST_BYTES / 1e6:.0f} MB are the limit "
-                "of what a store takes; name large files from the root of the file system"
+                f"the files that the sweep names hold {size / 1e6:.0f} MB, and"
+                f" {MOST_BYTES / 1e6:.0f} MB are the limit of what a store takes; name large files"
+                " from the root of the file system"
             )
             raise ExperimentError([Message(str(sweep.source), 0, 0, "", text)])
         files = tuple((name, Path(path).read_bytes()) for path, name in names.items())
@@ -67,15 +72,19 @@ def bundle_of(sweep: Sweep) -> Bundle:
 
 
 def names_of(paths: Sequence[PurePath]) -> dict[PurePath, str]:
-    """Names of absolute paths below the lowest folder that has them all, in the same order on every system.
+    """Names of absolute paths below the lowest folder that has them all, in the same order on every
+    system.
 
     :raises ValueError: they lie on several drives.
 
     >>> from pathlib import PureWindowsPath
-    >>> list(names_of([PureWindowsPath("C:/plan/b.yaml"), PureWindowsPath("c:/PLAN/tables/A.csv")]).values())
+    >>> paths = [PureWindowsPath("C:/plan/b.yaml"), PureWindowsPath("c:/PLAN/tables/A.csv")]
+    >>> list(names_of(paths).values())
     ['b.yaml', 'tables/A.csv']
     """
-    top = next((one for one in paths[0].parents if all(path.is_relative_to(one) for path in paths)), None)
+    top = next(
+        (one for one in paths[0].parents if all(path.is_relative_to(one) for path in paths)), None
+    )
     if top is None:
         raise ValueError("no folder has files of several drives")
     names = {path: path.relative_to(top).as_posix() for path in paths}
@@ -86,12 +95,15 @@ def names_of(paths: Sequence[PurePath]) -> dict[PurePath, str]:
 def files_of(sweep: Sweep) -> list[Path]:
     """Absolute paths of the files of a sweep's bundle.
 
-    :raises ExperimentError: a path that leads through a link and back, so that it means another file than it says, or
-        a file outside the folders of the sweep.
+    :raises ExperimentError: a path that leads through a link and back, so that it means another
+        file than it says, or a file outside the folders of the sweep.
     """
     source, base = (Path(os.path.abspath(path)) for path in (sweep.source, sweep.base))
     if not base.is_file() or not base.samefile(sweep.base):
-        text = f"{sweep.base} leads through a link to another folder and back; name the file from its real folder"
+        text = (
+            f"{sweep.base} leads through a link to another folder and back; name the file from its"
+            " real folder"
+        )
         raise ExperimentError([Message(str(sweep.source), 0, 0, "base", text)])
     return sorted({source, base, *named_files(sweep)})
 
@@ -99,7 +111,8 @@ def files_of(sweep: Sweep) -> list[Path]:
 def unpack(bundle: Bundle, folder: Path) -> Path:
     """Write the files below a folder and return the sweep file there.
 
-    :raises ValueError: a path that leads out of the folder, or two that are one file where case makes no difference.
+    :raises ValueError: a path that leads out of the folder, or two that are one file where case
+        makes no difference.
     """
     for name, content in bundle.files:
         place = PurePosixPath(name)
@@ -111,7 +124,9 @@ def unpack(bundle: Bundle, folder: Path) -> Path:
             with path.open("xb") as stream:
                 stream.write(content)
         except FileExistsError:
-            raise ValueError(f'"{name}" is the same file here as one whose name differs in case only') from None
+            raise ValueError(
+                f'"{name}" is the same file here as one whose name differs in case only'
+            ) from None
     return folder / PurePosixPath(bundle.source)
 
 
@@ -121,13 +136,17 @@ def has_code(tree: Node) -> bool:
 
 
 def code_digest(bundle: Bundle) -> str:
-    """A hash of everything but the YAML files: what a model written in Python may read or import."""
+    """A hash of everything but the YAML files: what a model written in Python may read or
+    import.
+    """
     kept = tuple(item for item in bundle.files if item[0] not in (bundle.source, bundle.base))
     return Bundle("", "", kept).digest
 
 
 def definition(sweep: Sweep, bundle: Bundle) -> dict[str, Any]:
-    """What a store keeps of a sweep as plain data: by it a changed file is told from the same one."""
+    """What a store keeps of a sweep as plain data: by it a changed file is told from the same
+    one.
+    """
     return {
         "title": sweep.title,
         "source": bundle.source,

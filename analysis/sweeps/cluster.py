@@ -35,7 +35,10 @@ PATIENCE = 30.0
 
 LOGGERS = ("distributed", "tornado", "asyncio")
 
-RESTART = "install the same wherever a worker runs; what is done is stored, and the same command goes on from there"
+RESTART = (
+    "install the same wherever a worker runs; what is done is stored, and the same command goes on"
+    " from there"
+)
 
 
 class ClusterError(Exception):
@@ -48,10 +51,11 @@ class OtherVersionError(Exception):
 
 @contextmanager
 def cluster_runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
-    """A runner on the cluster of a scheduler such as tcp://127.0.0.1:8786, for as long as it is needed.
+    """A runner on the cluster of a scheduler such as tcp://127.0.0.1:8786, for as long as it is
+    needed.
 
-    :raises ClusterError: dask is not installed, there is no scheduler at the address or not any longer, or its workers
-        have another version of ballplate, or none.
+    :raises ClusterError: dask is not installed, there is no scheduler at the address or not any
+        longer, or its workers have another version of ballplate, or none.
     """
     with _quiet():
         yield from _runner(address, sweep, bundle)
@@ -61,12 +65,17 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     try:
         from distributed import Client
     except ImportError:
-        raise ClusterError("dask is not installed; install it with: python -m pip install 'ballplate[dask]'") from None
+        raise ClusterError(
+            "dask is not installed; install it with: python -m pip install 'ballplate[dask]'"
+        ) from None
     try:
         client = Client(address, timeout=10, set_as_default=False)
     except Exception as error:
         # Of an address that makes no sense there may come anything.
-        text = f"there is no scheduler at {address} ({type(error).__name__}); start one with: dask scheduler"
+        text = (
+            f"there is no scheduler at {address} ({type(error).__name__}); start one with: dask"
+            " scheduler"
+        )
         raise ClusterError(text) from None
 
     def run(tasks: Sequence[Task]) -> Iterator[Row]:
@@ -74,10 +83,15 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
             yield from _rows(client, sweep, bundle, tasks)
         except (OSError, CancelledError, TimeoutError) as error:
             if _is_there(client):
-                text = f"the cluster of {address} fails ({type(error).__name__}: {error}); see the log of its scheduler"
+                text = (
+                    f"the cluster of {address} fails ({type(error).__name__}: {error}); see the log"
+                    " of its scheduler"
+                )
             else:
                 text = f"the scheduler at {address} has ended"
-            raise ClusterError(f"{text}; what is done is stored, and the same command goes on from there") from None
+            raise ClusterError(
+                f"{text}; what is done is stored, and the same command goes on from there"
+            ) from None
 
     try:
         _check_versions(client)
@@ -118,7 +132,8 @@ def _quiet() -> Iterator[None]:
 
 
 def _check_versions(client: Any) -> None:
-    """Check that all workers there are, and the scheduler, have this version of ballplate, before anything is sent.
+    """Check that all workers there are, and the scheduler, have this version of ballplate, before
+    anything is sent.
 
     :raises ClusterError: they have not, or no worker comes.
     """
@@ -129,7 +144,10 @@ def _check_versions(client: Any) -> None:
     _refuse({name: _version(answer) for name, answer in found.items()}, f"ballplate {own}")
     code = code_digest()
     digests = client.run(code_digest, on_error="return")
-    told = {name: "" if answer == code else f"other code of ballplate {own}" for name, answer in digests.items()}
+    told = {
+        name: "" if answer == code else f"other code of ballplate {own}"
+        for name, answer in digests.items()
+    }
     _refuse({name: text or f"ballplate {own}" for name, text in told.items()}, f"ballplate {own}")
 
 
@@ -174,7 +192,9 @@ def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> I
         under_way[future.key] = task
         return future
 
-    completed = as_completed([submit(task) for _, task in zip(range(room), left, strict=False)], loop=client.loop)
+    completed = as_completed(
+        [submit(task) for _, task in zip(range(room), left, strict=False)], loop=client.loop
+    )
     for future in completed:
         task = under_way.pop(future.key)
         try:
@@ -182,7 +202,9 @@ def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> I
         except KilledWorker:
             row = lost(sweep, task)
         except OtherVersionError:
-            raise ClusterError(f"a worker that came later has other code than this; {RESTART}") from None
+            raise ClusterError(
+                f"a worker that came later has other code than this; {RESTART}"
+            ) from None
         except CancelledError:
             if client.status != "running":
                 raise
@@ -196,7 +218,10 @@ def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> I
                 continue
         except (ImportError, AttributeError, TypeError) as error:
             # A worker that came later cannot even read what it is sent.
-            text = f"a worker that came later cannot compute ({type(error).__name__}: {error}), perhaps for lack of"
+            text = (
+                f"a worker that came later cannot compute ({type(error).__name__}: {error}),"
+                " perhaps for lack of"
+            )
             raise ClusterError(f"{text} ballplate; {RESTART}") from None
         following = next(left, None)
         if following is not None:
@@ -218,7 +243,9 @@ def _wait(client: Any) -> None:
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
-        raise ClusterError("the cluster has no workers; start some with: dask worker ADDRESS") from None
+        raise ClusterError(
+            "the cluster has no workers; start some with: dask worker ADDRESS"
+        ) from None
 
 
 def _on_worker(bundle: Bundle, code: str, task: Task) -> Row:

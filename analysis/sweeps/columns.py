@@ -8,8 +8,24 @@ from ..uncertainty.quantities import RECORDED
 
 # Besides those of quantities, versions and sums of squares.
 NAMES = (
-    *("cell", "status", "reason", "data_set_seed", "fingerprint", "duration_s", "parameters", "observations"),
-    *("rank_deficiency", "as_expected", "weakly_determined", "smallest_singular_value_per_um", "gap", "trials"),
+    *(
+        "cell",
+        "status",
+        "reason",
+        "data_set_seed",
+        "fingerprint",
+        "duration_s",
+        "parameters",
+        "observations",
+    ),
+    *(
+        "rank_deficiency",
+        "as_expected",
+        "weakly_determined",
+        "smallest_singular_value_per_um",
+        "gap",
+        "trials",
+    ),
     *("not_converged", "degrees_of_freedom"),
 )
 
@@ -25,7 +41,10 @@ def is_reserved(column: str) -> bool:
     (True, False)
     """
     own = "|".join(RECORDED)
-    return column in NAMES or re.fullmatch(rf"({own})([ _].*)?|.*_version|sum_of_squares.*", column) is not None
+    return (
+        column in NAMES
+        or re.fullmatch(rf"({own})([ _].*)?|.*_version|sum_of_squares.*", column) is not None
+    )
 
 
 def symbol_column(symbol: str) -> str:

@@ -13,12 +13,16 @@ from .values import numeric
 def holds(condition: Any, axis: Axis, choice: Choice) -> bool:
     """Whether a condition holds for a choice: a value, one of a list, or bounds.
 
-    A value is compared as a quantity where it and the axis are such, and otherwise as it is written.
+    A value is compared as a quantity where it and the axis are such, and otherwise as it is
+    written.
 
     :raises ValueError: bounds of an axis without numbers, or of another unit.
     """
     if isinstance(condition, BoundsSettings):
-        above, below = _bound(condition.above, axis, -math.inf), _bound(condition.below, axis, math.inf)
+        above, below = (
+            _bound(condition.above, axis, -math.inf),
+            _bound(condition.below, axis, math.inf),
+        )
         return above < choice.value < below
     if isinstance(condition, tuple):
         return any(holds(one, axis, choice) for one in condition)
@@ -37,5 +41,8 @@ def _bound(value: object, axis: Axis, otherwise: float) -> float:
         raise ValueError("the values of the axis are no numbers; name those that are meant")
     if unit != axis.unit:
         example = {"m": "300 mm", "rad": "2 arcsec", "1": "5"}[axis.unit]
-        raise ValueError(f'"{value}" cannot be compared with the values of the axis; write for example "{example}"')
+        raise ValueError(
+            f'"{value}" cannot be compared with the values of the axis; write for example'
+            f' "{example}"'
+        )
     return number

@@ -12,7 +12,9 @@ SOME = 256
 
 
 def seconds_of(sweep: Sweep) -> tuple[float, list[Row]]:
-    """Seconds that all cells take in one process, and the rows of the cells that were tried: first, middle and last."""
+    """Seconds that all cells take in one process, and the rows of the cells that were tried: first,
+    middle and last.
+    """
     last = len(sweep.cells) - 1
     numbers = sorted({0, last // 2, last})
     total, rows = 0.0, []

@@ -73,8 +73,8 @@ def run_sweep(
     known = {cell: key for cell, key in keys(store, number).items() if method_of(key) == METHOD}
     run = _Run(store, len(sweep.cells), known, statuses(store))
     if {key for key, _ in run.found} - set(run.known.values()):
-        # What another sweep of this store has computed needs no second time. Rows of another method give way before
-        # the first is computed anew, so that none stand beside one another.
+        # What another sweep of this store has computed needs no second time. Rows of another method
+        # give way before the first is computed anew, so that none stand beside one another.
         unknown = [Task(k, KEY_ONLY) for k in range(run.cells) if k not in run.known]
         fresh = {row.number: row.key for row in runner(unknown)}
         add_keys(store, number, fresh)
@@ -106,22 +106,30 @@ def run_sweep(
 
 
 def _groups(cells: list[int], blocks: int) -> Iterator[list[int]]:
-    """Cells whose replicate blocks are done together, before the cells themselves; all at once where there are none."""
+    """Cells whose replicate blocks are done together, before the cells themselves; all at once
+    where there are none.
+    """
     size = max(BLOCKS_AT_ONCE // blocks, 1) if blocks else max(len(cells), 1)
     for start in range(0, len(cells), size):
         yield cells[start : start + size]
 
 
 def _waves(run: _Run, cells: list[int], blocks: int) -> Iterator[list[Task]]:
-    """Tasks of the blocks that are not done yet, then those of the cells, which take the blocks' sums."""
+    """Tasks of the blocks that are not done yet, then those of the cells, which take the blocks'
+    sums.
+    """
     numbers = range(1, blocks + 1)
     yield [Task(k, block) for k in cells for block in numbers if run.status(k, block) != "done"]
-    sound = [k for k in cells if not blocks or all(run.status(k, block) == "done" for block in numbers)]
+    sound = [
+        k for k in cells if not blocks or all(run.status(k, block) == "done" for block in numbers)
+    ]
     yield [Task(k, 0, _total(run, k, numbers) if blocks else None) for k in sound]
 
 
 def _total(run: _Run, cell: int, blocks: range) -> Tally | None:
-    """Sums over all replicate blocks of a cell, which are done; None where it has no replicates for a reason."""
+    """Sums over all replicate blocks of a cell, which are done; None where it has no replicates for
+    a reason.
+    """
     parts = [block_tally(run.store, run.known[cell], block) for block in blocks]
     tallies = [part for part in parts if part is not None]
     return reduce(add, tallies) if len(tallies) == len(parts) else None

@@ -1,4 +1,6 @@
-"""Fingerprints of validated experiments: equal where the same is computed, whatever the file looks like."""
+"""Fingerprints of validated experiments: equal where the same is computed, whatever the file looks
+like.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +17,31 @@ from ballplate.simulator.inputs.settings import Settings
 from ballplate.simulator.machines.settings import PythonSettings
 from pydantic import BaseModel
 
-# The methods that figures and verdicts have been computed by, and what each corrected of the one before. A new one
-# begins whenever any experiment comes to other figures or another verdict; its number is part of every cell's key.
+# The methods that figures and verdicts have been computed by, and what each corrected of the one
+# before. A new one begins whenever any experiment comes to other figures or another verdict; its
+# number is part of every cell's key.
 METHODS = {
     1: "",
-    2: "lengths of standards that share a ball, priors and readings far tighter than others, the ratio of actual "
-    "errors to those predicted, and the order and number of weakly determined directions",
+    2: (
+        "lengths of standards that share a ball, priors and readings far tighter than others, the"
+        " ratio of actual errors to those predicted, and the order and number of weakly determined"
+        " directions"
+    ),
 }
 METHOD = max(METHODS)
 
 # What says nothing about the result: names, and where things stand.
-LEFT_OUT = ("title", "description", "source", "mark", "path", "doubts", "tree", "builder", "_folder")
+LEFT_OUT = (
+    "title",
+    "description",
+    "source",
+    "mark",
+    "path",
+    "doubts",
+    "tree",
+    "builder",
+    "_folder",
+)
 
 # Settings that decide only how a fit of real readings is told: the axes of a plate.
 TOLD_LATER = ("axes",)
@@ -43,7 +59,9 @@ def method_of(key: str) -> int:
     (2, 1, 1)
     """
     number, space, _ = key.partition(" ")
-    return int(number) if space and number.isdecimal() and number.isascii() and len(number) < 10 else 1
+    return (
+        int(number) if space and number.isdecimal() and number.isascii() and len(number) < 10 else 1
+    )
 
 
 def without_method(key: str) -> str:
@@ -58,7 +76,8 @@ class _Digest(Protocol):
 def fingerprint(experiment: Experiment, *more: object) -> str:
     """A hash of everything that the figures of an experiment depend on, and of `more`.
 
-    Files that the experiment names count by their content, a user's own error model by the text of its module.
+    Files that the experiment names count by their content, a user's own error model by the text of
+    its module.
 
     :raises TypeError: a value of a kind that is not known here, so that nothing is passed over.
     """
@@ -70,7 +89,9 @@ def fingerprint(experiment: Experiment, *more: object) -> str:
 
 
 def _add(digest: _Digest, value: Any) -> None:
-    """Add a value with its type and length, so that neighbours cannot be mistaken for one another."""
+    """Add a value with its type and length, so that neighbours cannot be mistaken for one
+    another.
+    """
     if value is None or isinstance(value, bool | int | str):
         _text(digest, f"{type(value).__name__} {value!r}")
     elif isinstance(value, float):

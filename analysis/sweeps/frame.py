@@ -1,4 +1,6 @@
-"""A sweep's results as one table: a row for each cell, a column for each figure, with its unit in the name."""
+"""A sweep's results as one table: a row for each cell, a column for each figure, with its unit in
+the name.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,13 @@ MOST_WHOLE = 2.0**53
 
 
 def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
-    """The cells of a sweep, the newest of the store unless told, in their order; those not done are not in it.
+    """The cells of a sweep, the newest of the store unless told, in their order; those not done are
+    not in it.
 
-    Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name, or texts),
-    `status`, `reason`, the figures by name, `data_set_seed`, `fingerprint`, `duration_s`, and the versions. Figures
-    that a cell lacks are NaN. Cells that cannot be read are not in it either.
+    Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name,
+    or texts), `status`, `reason`, the figures by name, `data_set_seed`, `fingerprint`,
+    `duration_s`, and the versions. Figures that a cell lacks are NaN. Cells that cannot be read are
+    not in it either.
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """
@@ -38,11 +42,17 @@ def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame
     chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells] if axes else None
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
-        is_whole = all(abs(value) < MOST_WHOLE and float(value).is_integer() for value in axis["values"])
+        is_whole = all(
+            abs(value) < MOST_WHOLE and float(value).is_integer() for value in axis["values"]
+        )
         if axis["unit"] == "1" and is_whole:
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
     columns |= {"status": found.statuses, "reason": found.reasons, **found.figures}
-    columns |= {"data_set_seed": found.seeds, "fingerprint": found.keys, "duration_s": found.seconds}
+    columns |= {
+        "data_set_seed": found.seeds,
+        "fingerprint": found.keys,
+        "duration_s": found.seconds,
+    }
     columns |= {f"{name}_version": texts for name, texts in found.versions.items()}
     return pandas.DataFrame(columns)

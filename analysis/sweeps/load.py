@@ -18,7 +18,16 @@ from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.wording import explain
-from ballplate.simulator.inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, read_tree, to_python, walk
+from ballplate.simulator.inputs.yamltree import (
+    Mapping,
+    Mark,
+    Node,
+    Scalar,
+    Sequence,
+    read_tree,
+    to_python,
+    walk,
+)
 from pydantic import TypeAdapter, ValidationError
 
 from .axes import read_axis
@@ -32,7 +41,9 @@ from .values import entry_names
 MOST_CELLS = 1_000_000
 
 
-def load_sweep(path: str | os.PathLike[str], base: Path | None = None, folders: tuple[Path, ...] = ()) -> Sweep:
+def load_sweep(
+    path: str | os.PathLike[str], base: Path | None = None, folders: tuple[Path, ...] = ()
+) -> Sweep:
     """Load a sweep file and the experiment file that it starts from, or `base` in its place.
 
     Files that it names must be below its folder, that of its base, or one of `folders`.
@@ -43,7 +54,9 @@ def load_sweep(path: str | os.PathLike[str], base: Path | None = None, folders: 
     root = read_tree(source)
     problems = Problems(root)
     if isinstance(root, Mapping) and "axes" not in root.items and "machine" in root.items:
-        text = "this is an experiment file; use it with ballplate run, or name it as base: of a sweep"
+        text = (
+            "this is an experiment file; use it with ballplate run, or name it as base: of a sweep"
+        )
         raise ExperimentError([root.mark.message("", text)])
     settings = _settings(root, problems)
     if settings is None:
@@ -67,11 +80,16 @@ def load_sweep(path: str | os.PathLike[str], base: Path | None = None, folders: 
         raise ExperimentError(sorted(problems.messages))
     total = math.prod(len(axis.choices) for axis in axes)
     if total > MOST_CELLS:
-        problems.add(("axes",), f"{total} combinations of values; {MOST_CELLS} are the limit, so take fewer values")
+        problems.add(
+            ("axes",),
+            f"{total} combinations of values; {MOST_CELLS} are the limit, so take fewer values",
+        )
         raise ExperimentError(problems.messages)
     cells = tuple(_kept(settings, axes))
     if not cells:
-        problems.add(("skip",) if settings.skip else ("only",), "leaves no cell; relax the conditions")
+        problems.add(
+            ("skip",) if settings.skip else ("only",), "leaves no cell; relax the conditions"
+        )
         raise ExperimentError(problems.messages)
     sweep = Sweep(
         source,
@@ -98,10 +116,16 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
     :raises ExperimentError: a cell that makes no valid experiment.
     """
     choices = sweep.choices(number)
-    variant = next((choice.variant for choice in choices if choice.variant is not None), sweep.variant)
+    variant = next(
+        (choice.variant for choice in choices if choice.variant is not None), sweep.variant
+    )
     tree = sweep.trees[variant]
     for choice in choices:
-        changes = choice.changes if choice.kept is None else (*choice.changes, _subset(tree, *choice.kept))
+        changes = (
+            choice.changes
+            if choice.kept is None
+            else (*choice.changes, _subset(tree, *choice.kept))
+        )
         for path, node, mark in changes:
             try:
                 tree = override(tree, path, node, mark)
@@ -125,7 +149,9 @@ def _subset(tree: Node, path: str, kept: tuple[str, ...], mark: Mark) -> tuple[s
     names = (entry_names(place) if place is not None else None) or []
     absent = next((name for name in kept if name not in names), None)
     if absent is not None or not isinstance(place, Sequence):
-        raise ExperimentError([mark.message(path, f'no entry "{absent}" in this variant; {hint(str(absent), names)}')])
+        raise ExperimentError(
+            [mark.message(path, f'no entry "{absent}" in this variant; {hint(str(absent), names)}')]
+        )
     return path, Sequence(place.mark, tuple(place.items[names.index(name)] for name in kept)), mark
 
 
@@ -165,16 +191,23 @@ def _trees(base: Path) -> dict[str | None, Node]:
     return dict(variants.items()) if variants else {None: root}
 
 
-def _check_variant(settings: SweepSettings, trees: dict[str | None, Node], problems: Problems) -> None:
+def _check_variant(
+    settings: SweepSettings, trees: dict[str | None, Node], problems: Problems
+) -> None:
     names = [name for name in trees if name is not None]
     has_axis = any(axis.variants is not None for axis in settings.axes.values())
     if settings.variant is not None and settings.variant not in trees:
         text = f'no variant "{settings.variant}" in {settings.base}; '
-        problems.add(("variant",), text + (hint(settings.variant, names) if names else "leave it out"))
+        problems.add(
+            ("variant",), text + (hint(settings.variant, names) if names else "leave it out")
+        )
     elif settings.variant is not None and has_axis:
         problems.add(("variant",), "an axis chooses the variant; leave it out")
     elif settings.variant is None and names and not has_axis:
-        text = f"has the variants {listing(names)}; choose one with variant: NAME, or add an axis {{variants: all}}"
+        text = (
+            f"has the variants {listing(names)}; choose one with variant: NAME, or add an axis"
+            " {variants: all}"
+        )
         problems.add(("base",), text)
 
 
@@ -191,7 +224,10 @@ def _check_apart(axes: list[Axis], tree: Node, problems: Problems) -> None:
     for k, (name, path) in enumerate(paths):
         other = next((one for one in paths[:k] if clash(one[1], path)), None)
         if other is not None:
-            text = f'{path} is part of the same place as {other[1]} of the axis "{other[0]}"; change it once'
+            text = (
+                f'{path} is part of the same place as {other[1]} of the axis "{other[0]}"; change'
+                " it once"
+            )
             problems.add(("axes", name), text)
 
 
@@ -200,9 +236,14 @@ def _check_names(axes: list[Axis], problems: Problems) -> None:
     columns: dict[str, str] = {}
     for axis in axes:
         if is_reserved(axis.column):
-            problems.add(("axes", axis.name), "is a column of every table; choose another name", of_key=True)
+            problems.add(
+                ("axes", axis.name), "is a column of every table; choose another name", of_key=True
+            )
         elif axis.column in columns:
-            text = f'would have the column "{axis.column}" of the axis "{columns[axis.column]}"; choose another name'
+            text = (
+                f'would have the column "{axis.column}" of the axis "{columns[axis.column]}";'
+                " choose another name"
+            )
             problems.add(("axes", axis.name), text, of_key=True)
         columns[axis.column] = axis.name
     chosen = [axis.name for axis in axes if axis.choices[0].variant is not None]
@@ -221,9 +262,14 @@ def _check_conditions(settings: SweepSettings, axes: list[Axis], problems: Probl
                     problems.add((key, k, name), text, of_key=True)
                 elif name in by_name:
                     try:
-                        if not any(holds(condition, by_name[name], choice) for choice in by_name[name].choices):
+                        if not any(
+                            holds(condition, by_name[name], choice)
+                            for choice in by_name[name].choices
+                        ):
                             values = listing(choice.label for choice in by_name[name].choices)
-                            problems.add((key, k, name), f"holds for no value of the axis; it has {values}")
+                            problems.add(
+                                (key, k, name), f"holds for no value of the axis; it has {values}"
+                            )
                     except ValueError as error:
                         problems.add((key, k, name), str(error))
 

@@ -1,4 +1,6 @@
-"""Runs tasks of a sweep in processes of this machine; a process that is killed costs nothing but time."""
+"""Runs tasks of a sweep in processes of this machine; a process that is killed costs nothing but
+time.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ from .load import load_sweep
 from .model import Sweep
 from .task import Row, Task, compute, lost
 
-# Deaths of processes, without a result in between, after which the tasks at the front are tried one by one.
+# Deaths of processes, without a result in between, after which the tasks at the front are tried one
+# by one.
 DEATHS = 3
 # Tries of a task in a process of its own.
 TRIES = 2
@@ -32,7 +35,9 @@ class ChangedError(Exception):
 
 @dataclass(frozen=True)
 class _Source:
-    """What a process loads a sweep from: its file, and further folders whose files it may take along."""
+    """What a process loads a sweep from: its file, and further folders whose files it may take
+    along.
+    """
 
     file: Path
     folders: tuple[Path, ...]
@@ -41,7 +46,8 @@ class _Source:
 def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
     """A runner in processes of this machine; with one worker in this process.
 
-    It raises ChangedError instead of a row that was computed from files other than those of the bundle.
+    It raises ChangedError instead of a row that was computed from files other than those of the
+    bundle.
     """
     source, digest = _Source(Path(os.path.abspath(sweep.source)), sweep.folders), bundle.digest
 
@@ -56,7 +62,9 @@ def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
     return run
 
 
-def _in_workers(sweep: Sweep, source: _Source, digest: str, tasks: Sequence[Task], workers: int) -> Iterator[Row]:
+def _in_workers(
+    sweep: Sweep, source: _Source, digest: str, tasks: Sequence[Task], workers: int
+) -> Iterator[Row]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     left = {(task.number, task.block): task for task in tasks}
@@ -71,7 +79,9 @@ def _in_workers(sweep: Sweep, source: _Source, digest: str, tasks: Sequence[Task
             deaths = 0
         arguments = ((source, digest, task) for task in list(left.values()))
         try:
-            for row in in_processes(compute_unchanged, arguments, workers, ordered=False, batch_size="auto"):
+            for row in in_processes(
+                compute_unchanged, arguments, workers, ordered=False, batch_size="auto"
+            ):
                 del left[row.number, row.block]
                 deaths = 0
                 yield row
@@ -83,7 +93,9 @@ def _alone(source: _Source, digest: str, task: Task) -> Row | None:
     """The row of a task in a process of its own; None if the process ends each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
-        with ProcessPoolExecutor(1, context, initializer=begin_worker, initargs=(os.getpid(),)) as pool:
+        with ProcessPoolExecutor(
+            1, context, initializer=begin_worker, initargs=(os.getpid(),)
+        ) as pool:
             try:
                 return pool.submit(compute_unchanged, source, digest, task).result()
             except BrokenProcessPool:
@@ -101,7 +113,9 @@ def compute_unchanged(source: _Source, digest: str, task: Task) -> Row:
 
 @dataclass(frozen=True)
 class _Watched:
-    """A sweep with what tells that one of its files is written to: their paths, and the signature they had."""
+    """A sweep with what tells that one of its files is written to: their paths, and the signature
+    they had.
+    """
 
     sweep: Sweep
     paths: list[Path]

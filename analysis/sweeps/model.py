@@ -13,11 +13,13 @@ Unit = Literal["m", "rad", "1", ""]
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """One value of an axis: `changes` are paths with the nodes to be put there, or `variant` a variant to begin with.
+    """One value of an axis: `changes` are paths with the nodes to be put there, or `variant` a
+    variant to begin with.
 
     `kept` are the names of the entries that are kept of the list at a path.
 
-    `value` is a number in metres, radians or without unit where the axis has such values, otherwise NaN.
+    `value` is a number in metres, radians or without unit where the axis has such values, otherwise
+    NaN.
     """
 
     label: str
@@ -29,7 +31,10 @@ class Choice:
     @property
     def paths(self) -> tuple[str, ...]:
         """Paths at which something is changed."""
-        return (*(path for path, _, _ in self.changes), *([] if self.kept is None else [self.kept[0]]))
+        return (
+            *(path for path, _, _ in self.changes),
+            *([] if self.kept is None else [self.kept[0]]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +55,10 @@ class Axis:
 class Sweep:
     """A sweep. `trees` are the base file's variants by name, or the whole file under None.
 
-    `cells` are indices of choices, one for each axis, in the order of the file with the last axis fastest. `digest`
-    is a hash of all files that the sweep depends on, `code` of those that an error model written in Python may use,
-    empty without one. `folders` are those, besides its own and that of its base, whose files it may take along.
+    `cells` are indices of choices, one for each axis, in the order of the file with the last axis
+    fastest. `digest` is a hash of all files that the sweep depends on, `code` of those that an
+    error model written in Python may use, empty without one. `folders` are those, besides its own
+    and that of its base, whose files it may take along.
     """
 
     source: Path
@@ -76,5 +82,6 @@ class Sweep:
     def label(self, number: int) -> str:
         """A cell in words."""
         return ", ".join(
-            f"{axis.name} {choice.label}" for axis, choice in zip(self.axes, self.choices(number), strict=True)
+            f"{axis.name} {choice.label}"
+            for axis, choice in zip(self.axes, self.choices(number), strict=True)
         )

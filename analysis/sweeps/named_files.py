@@ -1,4 +1,5 @@
-"""Files that a sweep names: values of the keys that hold paths, and the modules of error models in Python.
+"""Files that a sweep names: values of the keys that hold paths, and the modules of error models in
+Python.
 
 Text elsewhere is never taken for a path: a title that spells the name of a private key is a title.
 """
@@ -29,14 +30,16 @@ MEND = "move it there, or allow its folder with --folder"
 def named_files(sweep: Sweep) -> list[Path]:
     """Absolute paths of all files that the experiments of a sweep name and that are there.
 
-    A file that is named by its place from the root of the file system is left out: it must be there wherever the sweep
-    is computed.
+    A file that is named by its place from the root of the file system is left out: it must be there
+    wherever the sweep is computed.
 
-    :raises ExperimentError: a file that is not, links resolved, below the folder of the sweep file, of its base, or of
-        one of the sweep's further folders.
+    :raises ExperimentError: a file that is not, links resolved, below the folder of the sweep file,
+        of its base, or of one of the sweep's further folders.
     """
     base = Path(os.path.abspath(sweep.base))
-    allowed = [folder.resolve() for folder in (sweep.source.parent, sweep.base.parent, *sweep.folders)]
+    allowed = [
+        folder.resolve() for folder in (sweep.source.parent, sweep.base.parent, *sweep.folders)
+    ]
     nodes: list[tuple[str, Node]] = [("", root) for root in sweep.trees.values()]
     for axis in sweep.axes:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
@@ -51,7 +54,9 @@ def named_files(sweep: Sweep) -> list[Path]:
         for path in _imported(folder, str(scalar.value).partition(":")[0]):
             found.setdefault(path, scalar)
     messages = [
-        scalar.mark.message("", f"names {path}, outside the folders of the sweep and its base; {MEND}")
+        scalar.mark.message(
+            "", f"names {path}, outside the folders of the sweep and its base; {MEND}"
+        )
         for path, scalar in sorted(found.items(), key=lambda item: item[0])
         if not any(path.resolve().is_relative_to(folder) for folder in allowed)
     ]
@@ -61,7 +66,8 @@ def named_files(sweep: Sweep) -> list[Path]:
 
 
 def named_by(source: Path) -> list[Path]:
-    """Files that an experiment or machine file names, those that they name, and its modules, as far as they are there.
+    """Files that an experiment or machine file names, those that they name, and its modules, as far
+    as they are there.
 
     Empty where the file cannot be read: loading it tells why.
     """
@@ -123,7 +129,9 @@ def axis_paths(root: Node) -> Iterator[Scalar]:
             for path, values in _entries(axis.items["together"]):
                 for _, value in _entries(values):
                     yield from path_scalars(value, path)
-        changed = [scalar for name in ("path", "paths") for _, scalar in _entries(axis.items.get(name))]
+        changed = [
+            scalar for name in ("path", "paths") for _, scalar in _entries(axis.items.get(name))
+        ]
         for scalar in changed:
             for _, value in _entries(axis.items.get("values")):
                 if isinstance(scalar, Scalar):
@@ -140,7 +148,9 @@ def _entries(node: Node | None) -> list[tuple[str, Node]]:
 
 
 def _there(folder: Path, text: str) -> Iterator[Path]:
-    """The file that a text means, if it is one and not named from the root of a file system or of a drive."""
+    """The file that a text means, if it is one and not named from the root of a file system or of a
+    drive.
+    """
     if not 0 < len(text) <= 4096 or "\0" in text or "\n" in text or is_rooted(text):
         return
     path = Path(os.path.abspath(folder / text))
@@ -176,7 +186,9 @@ def _modules(nodes: Sequence[tuple[str, Node]], folder: Path) -> Iterator[tuple[
 
 
 def _imported(folder: Path, module: str) -> set[Path]:
-    """Files in a folder that make up a module, and those that it imports from there, by what their text says."""
+    """Files in a folder that make up a module, and those that it imports from there, by what their
+    text says.
+    """
     found: set[Path] = set()
     waiting = [module]
     while waiting:
@@ -194,7 +206,9 @@ def _imported(folder: Path, module: str) -> set[Path]:
 
 
 def _imports(path: Path) -> Iterator[str]:
-    """Names of the modules that a file of Python imports; what is wrong with the file is told when it is loaded."""
+    """Names of the modules that a file of Python imports; what is wrong with the file is told when
+    it is loaded.
+    """
     try:
         tree = ast.parse(path.read_bytes())
     except (OSError, SyntaxError, ValueError, RecursionError):

@@ -43,7 +43,9 @@ class OtherSweepError(Exception):
 
 @dataclass(frozen=True)
 class Entered:
-    """A sweep in its store: its number there, whether there are others, and what is to be said of what it found."""
+    """A sweep in its store: its number there, whether there are others, and what is to be said of
+    what it found.
+    """
 
     number: int
     has_others: bool
@@ -76,12 +78,23 @@ class SweepResult(Result):
     def to_dict(self) -> dict[str, Any]:
         one = self.summary
         counts = {"cells": one.cells, "done": one.done, "failed": one.failed, "left": one.left}
-        return {"sweep": self.label, "title": self.title, "store": str(self.store), **counts, "rows": self.rows()}
+        return {
+            "sweep": self.label,
+            "title": self.title,
+            "store": str(self.store),
+            **counts,
+            "rows": self.rows(),
+        }
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each cell, with its values of the axes and its figures; None where there is none."""
+        """One row for each cell, with its values of the axes and its figures; None where there is
+        none.
+        """
         table = self.table.astype(object)
-        return [{str(k): v for k, v in row.items()} for row in table.where(table.notna(), None).to_dict("records")]
+        return [
+            {str(k): v for k, v in row.items()}
+            for row in table.where(table.notna(), None).to_dict("records")
+        ]
 
     def to_frame(self) -> pandas.DataFrame:
         return self.table
@@ -91,7 +104,8 @@ class SweepResult(Result):
 def writable_store(path: Path) -> Iterator[Store]:
     """The store at a path, made where there is none, for one process alone.
 
-    :raises StoreError: no store, one that cannot be written, or one that another process is writing to.
+    :raises StoreError: no store, one that cannot be written, or one that another process is writing
+        to.
     """
     check_place(path, create=True)
     try:
@@ -102,7 +116,9 @@ def writable_store(path: Path) -> Iterator[Store]:
             finally:
                 store.close()
     except Timeout:
-        raise StoreError(f"{path}: another process is computing into it; wait for it, or end it") from None
+        raise StoreError(
+            f"{path}: another process is computing into it; wait for it, or end it"
+        ) from None
 
 
 def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
@@ -117,19 +133,28 @@ def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
     has_results = "done" in statuses(store).values()
     if number is None and unreadable and not beside:
         which, why = next(iter(unreadable.items()))
-        text = f"what sweep {which} in it is of cannot be read ({why}); enter this one anew with --beside, where what"
+        text = (
+            f"what sweep {which} in it is of cannot be read ({why}); enter this one anew with"
+            " --beside, where what"
+        )
         raise StoreError(f"{store.path}: {text} is the same is not computed again")
     if number is None and stored and has_results and not beside:
-        found = [f"  {in_one_line(line)}" for line in changes(stored[max(stored)], new)[:MOST_CHANGES]]
+        found = [
+            f"  {in_one_line(line)}" for line in changes(stored[max(stored)], new)[:MOST_CHANGES]
+        ]
         first = in_one_line(f"{store.path}: holds another sweep; what has changed:")
         last = "name another store with --store, or keep both in this one with --beside"
         raise OtherSweepError("\n".join([first, *found, last]))
     if number is None:
         number = add_sweep(store, new, bundle.files)
     mended, strays = mend(store, number, len(sweep.cells))
-    remarks = [unread(store.path, mended, strays, len(sweep.cells), "", "what is missing is computed anew")]
+    remarks = [
+        unread(store.path, mended, strays, len(sweep.cells), "", "what is missing is computed anew")
+    ]
     found_keys = statuses(store)
-    for text in of_other_methods(key for key in keys(store, number).values() if (key, 0) in found_keys):
+    for text in of_other_methods(
+        key for key in keys(store, number).values() if (key, 0) in found_keys
+    ):
         remarks.append(in_one_line(f"{store.path}: {text}, and computes these cells anew"))
     has_others = len({*stored, *unreadable, number}) > 1
     return Entered(number, has_others, tuple(filter(None, remarks)))
@@ -158,4 +183,6 @@ def compute_sweep(
 def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) -> SweepResult:
     """The rows of a sweep in its store."""
     table = frame(store, entered.number)
-    return SweepResult(sweep.source.stem, sweep.title, Path(store.path), summary, table, entered.remarks)
+    return SweepResult(
+        sweep.source.stem, sweep.title, Path(store.path), summary, table, entered.remarks
+    )

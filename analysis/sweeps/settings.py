@@ -1,4 +1,6 @@
-"""The keys of a sweep file: forms and ranges. What they refer to is checked where the sweep is loaded."""
+"""The keys of a sweep file: forms and ranges. What they refer to is checked where the sweep is
+loaded.
+"""
 
 from __future__ import annotations
 
@@ -42,27 +44,42 @@ class SubsetSettings(Settings):
         description="how many entries, those of always included"
     )
     always: tuple[Name, ...] = Field((), description="names of entries that every subset holds")
-    among: tuple[Name, ...] | None = Field(None, description="names to choose from; default: all entries of the list")
+    among: tuple[Name, ...] | None = Field(
+        None, description="names to choose from; default: all entries of the list"
+    )
 
 
 class AxisSettings(Settings):
     """One axis of a sweep: what it changes, and the values it takes."""
 
-    path: Path | None = Field(None, description="path of what the values replace, as in error messages")
+    path: Path | None = Field(
+        None, description="path of what the values replace, as in error messages"
+    )
     paths: Annotated[tuple[Path, ...], Field(min_length=1)] | None = Field(
         None, description="several paths that take the same values"
     )
     values: Values | None = Field(None, description="list of values, or name: value")
-    start: Scalar | None = Field(None, alias="from", description="first value of a range, a number or quantity")
+    start: Scalar | None = Field(
+        None, alias="from", description="first value of a range, a number or quantity"
+    )
     to: Scalar | None = Field(None, description="last value of a range")
-    count: Annotated[int, Field(ge=2, le=100_000)] | None = Field(None, description="number of values of a range")
-    step: Scalar | None = Field(None, description="difference of neighbouring values of a range, instead of count")
+    count: Annotated[int, Field(ge=2, le=100_000)] | None = Field(
+        None, description="number of values of a range"
+    )
+    step: Scalar | None = Field(
+        None, description="difference of neighbouring values of a range, instead of count"
+    )
     spacing: Literal["linear", "logarithmic"] = Field("linear", description="of a range with count")
     together: Annotated[dict[Path, Values], Field(min_length=1)] | None = Field(
-        None, description="path: values, for several paths that change together; lists of the same length"
+        None,
+        description=(
+            "path: values, for several paths that change together; lists of the same length"
+        ),
     )
     names: tuple[Name, ...] | None = Field(None, description="a name for each value of together")
-    subsets: SubsetSettings | None = Field(None, description="subsets of the list at path, such as positions")
+    subsets: SubsetSettings | None = Field(
+        None, description="subsets of the list at path, such as positions"
+    )
     variants: (
         Annotated[
             Annotated[Literal["all"], Tag("<one>")]
@@ -93,13 +110,21 @@ class SweepSettings(Settings):
     """A sweep file: an experiment, what varies in it, and what is recorded."""
 
     title: Line = Field(description="one line that says what the sweep is about")
-    base: Annotated[str, Field(min_length=1)] = Field(description="experiment file, from this file's folder")
-    variant: Name | None = Field(None, description="variant of the base file; needed if it has several")
+    base: Annotated[str, Field(min_length=1)] = Field(
+        description="experiment file, from this file's folder"
+    )
+    variant: Name | None = Field(
+        None, description="variant of the base file; needed if it has several"
+    )
     axes: Annotated[dict[Name, AxisSettings], Field(min_length=1)] = Field(
         description="name: what varies; every combination of the axes' values is a cell"
     )
     skip: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
-        (), description="cells left out: axis: value, list of values or {above: …, below: …}, all of an entry at once"
+        (),
+        description=(
+            "cells left out: axis: value, list of values or {above: …, below: …}, all of an entry"
+            " at once"
+        ),
     )
     only: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
         (), description="cells kept, in the same form; default: all"

@@ -1,8 +1,9 @@
-"""The store of a sweep: one SQLite file, written by one process, that survives whatever happens to it.
+"""The store of a sweep: one SQLite file, written by one process, that survives whatever happens to
+it.
 
-Every row is on disk before it is reported. The key of a result is the fingerprint of what was computed, and the
-replicate block; so a cell that was computed once is never computed again, whichever sweep file asks for it, unless a
-later version computes by another method.
+Every row is on disk before it is reported. The key of a result is the fingerprint of what was
+computed, and the replicate block; so a cell that was computed once is never computed again,
+whichever sweep file asks for it, unless a later version computes by another method.
 """
 
 from __future__ import annotations
@@ -25,7 +26,17 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ..montecarlo.tally import QuantityTally, Tally
 from .fingerprint import METHOD, METHODS, method_of
 from .load import MOST_CELLS
-from .store_file import GO_ON, NEWEST, WITH_DIGEST, StoreError, connected, damage, format_of, in_words, is_damage
+from .store_file import (
+    GO_ON,
+    NEWEST,
+    WITH_DIGEST,
+    StoreError,
+    connected,
+    damage,
+    format_of,
+    in_words,
+    is_damage,
+)
 from .stored import (
     OF_RESULT,
     UnreadableError,
@@ -60,15 +71,17 @@ CREATE TABLE result (
 );
 """
 
-COLUMNS = "key, block, status, reason, seed, names, figures, details, versions, seconds, tally, digest"
+COLUMNS = (
+    "key, block, status, reason, seed, names, figures, details, versions, seconds, tally, digest"
+)
 
 
 @dataclass
 class Store:
     """An open store; `texts` are those known by number.
 
-    `has_digests` is False of the first format, `damage` says what showed as it was opened, and `place` tells the file
-    from another in its place.
+    `has_digests` is False of the first format, `damage` says what showed as it was opened, and
+    `place` tells the file from another in its place.
     """
 
     path: Path
@@ -90,9 +103,11 @@ class Store:
 def open_store(path: Path, create: bool = False) -> Store:
     """Open a store for reading or, with `create`, for writing: it is made where there is none.
 
-    A store of an earlier format is read as it is, and brought to the newest format before it is written to.
+    A store of an earlier format is read as it is, and brought to the newest format before it is
+    written to.
 
-    :raises StoreError: no such store, a file that is none, or one that is damaged and to be written to.
+    :raises StoreError: no such store, a file that is none, or one that is damaged and to be written
+        to.
     """
     connection = None
     try:
@@ -109,7 +124,9 @@ def open_store(path: Path, create: bool = False) -> Store:
             connection.close()
         if isinstance(error, UnicodeDecodeError):
             # Of what SQLite says about names that are no text.
-            raise StoreError(f"{path}: is damaged (names of its tables are no text); restore a copy") from None
+            raise StoreError(
+                f"{path}: is damaged (names of its tables are no text); restore a copy"
+            ) from None
         if isinstance(error, sqlite3.Error) and create and is_damage(error):
             raise StoreError(f"{path}: is damaged ({error}); {GO_ON}") from None
         if isinstance(error, sqlite3.Error):
@@ -159,7 +176,10 @@ def ensure_in_place(store: Store) -> None:
         # SQLite leaves to its log what it wrote to a file that has moved.
         with suppress(sqlite3.Error):
             store.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        text = "the sweep ends here, and nothing was written to what is there now; if the store was moved, it has the "
+        text = (
+            "the sweep ends here, and nothing was written to what is there now; if the store was"
+            " moved, it has the "
+        )
         text += "rows computed until then, and --store goes on with it"
         raise StoreError(f"{store.path}: {what} while the sweep ran; {text}")
 
@@ -206,7 +226,8 @@ def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[st
     for name, _ in files:
         if not name.isprintable():
             raise StoreError(
-                f"{store.path}: cannot keep a file of the name {name}; give it one of printable characters"
+                f"{store.path}: cannot keep a file of the name {name}; give it one of printable"
+                " characters"
             )
     with _transaction(store) as connection:
         text = json.dumps(definition, sort_keys=True)
@@ -231,7 +252,9 @@ def definitions(store: Store) -> tuple[dict[int, dict[str, Any]], dict[int, str]
     found: dict[int, dict[str, Any]] = {}
     unreadable: dict[int, str] = {}
     with _reading(store) as connection:
-        rows = connection.execute(f"SELECT id, definition, {store.digest} FROM sweep ORDER BY id").fetchall()
+        rows = connection.execute(
+            f"SELECT id, definition, {store.digest} FROM sweep ORDER BY id"
+        ).fetchall()
     for number, text, digest in rows:
         try:
             found[number] = checked_definition(number, text, digest)
@@ -257,7 +280,10 @@ def definition_of(store: Store, sweep: int) -> dict[str, Any]:
             raise UnreadableError("it is not there")
         return checked_definition(sweep, *row)
     except (sqlite3.DatabaseError, UnreadableError) as error:
-        text = f"what sweep {sweep} is of cannot be read ({error}); ballplate export gives its cells by their numbers"
+        text = (
+            f"what sweep {sweep} is of cannot be read ({error}); ballplate export gives its cells"
+            " by their numbers"
+        )
         raise StoreError(f"{store.path}: {text}") from None
 
 
@@ -276,7 +302,10 @@ def chosen_sweep(store: Store, number: int | None) -> int:
             continue
         known |= {one for (one,) in found if isinstance(one, int)}
     if not known or (number is not None and number not in known):
-        raise StoreError(f"{store.path}: there is no such sweep; it has {', '.join(map(str, sorted(known))) or 'none'}")
+        raise StoreError(
+            f"{store.path}: there is no such sweep; it has"
+            f" {', '.join(map(str, sorted(known))) or 'none'}"
+        )
     return max(known) if number is None else number
 
 
@@ -298,12 +327,16 @@ def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
 def keys(store: Store, sweep: int) -> dict[int, str]:
     """Keys of the cells that are known, by number."""
     with _reading(store) as connection:
-        rows = connection.execute("SELECT number, key FROM cell WHERE sweep = ?", [sweep]).fetchall()
+        rows = connection.execute(
+            "SELECT number, key FROM cell WHERE sweep = ?", [sweep]
+        ).fetchall()
     return {number: key for number, key in rows if isinstance(number, int) and isinstance(key, str)}
 
 
 def of_other_methods(found: Iterable[str]) -> list[str]:
-    """Words for rows with these keys that this version would compute by another method; none where there are none."""
+    """Words for rows with these keys that this version would compute by another method; none where
+    there are none.
+    """
     told = []
     for method, count in sorted(Counter(map(method_of, found)).items()):
         if method == METHOD:
@@ -347,7 +380,9 @@ def mend(store: Store, sweep: int, count: int) -> tuple[dict[int, str], int]:
                 bad[key] = str(error)
                 places.append((place,))
         connection.executemany("DELETE FROM result WHERE rowid = ?", places)
-        entries = connection.execute(f"SELECT sweep, number, key, {store.digest} FROM cell").fetchall()
+        entries = connection.execute(
+            f"SELECT sweep, number, key, {store.digest} FROM cell"
+        ).fetchall()
         owned = {key for _, _, key, _ in entries}
         for of_sweep, number, key, digest in entries:
             try:
@@ -355,7 +390,9 @@ def mend(store: Store, sweep: int, count: int) -> tuple[dict[int, str], int]:
                 reason = bad.get(key, "")
             except UnreadableError as error:
                 reason = str(error)
-                connection.execute("DELETE FROM cell WHERE sweep IS ? AND number IS ?", [of_sweep, number])
+                connection.execute(
+                    "DELETE FROM cell WHERE sweep IS ? AND number IS ?", [of_sweep, number]
+                )
             if reason and of_sweep == sweep and isinstance(number, int) and 0 <= number < count:
                 found[number] = reason
             elif reason:
@@ -373,7 +410,9 @@ def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
 
 
 def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
-    """Write rows: on disk when this returns. A result that is there already stays, unless it had failed."""
+    """Write rows: on disk when this returns. A result that is there already stays, unless it had
+    failed.
+    """
     with _transaction(store) as connection:
         for row in rows:
             of_names, of_versions = json.dumps(list(row.figures)), json.dumps(dict(row.versions))
@@ -383,7 +422,18 @@ def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
             figures = np.array(list(row.figures.values()), "<f8").tobytes()
             details = json.dumps(row.details, ensure_ascii=True, sort_keys=True)
             tally = None if row.tally is None else _packed(row.tally)
-            kept = (row.key, row.block, row.status, reason, row.seed, of_names, figures, details, of_versions, tally)
+            kept = (
+                row.key,
+                row.block,
+                row.status,
+                reason,
+                row.seed,
+                of_names,
+                figures,
+                details,
+                of_versions,
+                tally,
+            )
             connection.execute(
                 f"INSERT INTO result ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
                 "ON CONFLICT (key, block) DO UPDATE SET "
@@ -414,7 +464,9 @@ def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
             if row.block == 0 and row.status == "done":
                 # The sums over blocks have been used, but for the time that they took.
                 spent = "SELECT coalesce(sum(seconds), 0) FROM result WHERE key = ? AND block > 0"
-                update = f"UPDATE result SET seconds = seconds + ({spent}) WHERE key = ? AND block = 0"
+                update = (
+                    f"UPDATE result SET seconds = seconds + ({spent}) WHERE key = ? AND block = 0"
+                )
                 connection.execute(update, [row.key, row.key])
                 connection.execute("DELETE FROM result WHERE key = ? AND block > 0", [row.key])
 
@@ -423,7 +475,9 @@ def _text(store: Store, value: str) -> int:
     if value not in store.texts:
         found = store.connection.execute("SELECT id FROM text WHERE value = ?", [value]).fetchone()
         if found is None:
-            found = [store.connection.execute("INSERT INTO text (value) VALUES (?)", [value]).lastrowid]
+            found = [
+                store.connection.execute("INSERT INTO text (value) VALUES (?)", [value]).lastrowid
+            ]
         store.texts[value] = int(found[0])
     return store.texts[value]
 
@@ -431,7 +485,9 @@ def _text(store: Store, value: str) -> int:
 def block_tally(store: Store, key: str, block: int) -> Tally | None:
     """The sums of a replicate block; None where the cell has no replicates for a reason."""
     with _reading(store) as connection:
-        row = connection.execute("SELECT tally FROM result WHERE key = ? AND block = ?", [key, block]).fetchone()
+        row = connection.execute(
+            "SELECT tally FROM result WHERE key = ? AND block = ?", [key, block]
+        ).fetchone()
     return None if row is None or row[0] is None else _unpacked(row[0])
 
 
@@ -462,18 +518,27 @@ def _unpacked(content: bytes) -> Tally:
         if [len(array) for array in arrays] != head["sizes"] or len(arrays) % 4 != 1:
             raise ValueError
         quantities = tuple(QuantityTally(*arrays[k : k + 4]) for k in range(1, len(arrays), 4))
-        return Tally(head["count"], tuple(head["failed"]), head["passes"], arrays[0], head["rejected"], quantities)
+        return Tally(
+            head["count"],
+            tuple(head["failed"]),
+            head["passes"],
+            arrays[0],
+            head["rejected"],
+            quantities,
+        )
     except (ValueError, TypeError, KeyError, IndexError, RecursionError):
         raise UnreadableError("its sums over data sets are none") from None
 
 
 @dataclass(frozen=True)
 class Results:
-    """Results of a sweep's cells (n,) in their order; `cells` count from 0, `seconds` is what each took.
+    """Results of a sweep's cells (n,) in their order; `cells` count from 0, `seconds` is what each
+    took.
 
-    `figures` by name, (n,) each, NaN where a cell has no such figure; `versions` by name, a text for each cell;
-    `details` what was told of each. `unreadable` says of other cells why they are not among these, and `strays` counts
-    rows that belong to no cell. `damage` is what SQLite finds wrong with the store, empty where nothing.
+    `figures` by name, (n,) each, NaN where a cell has no such figure; `versions` by name, a text
+    for each cell; `details` what was told of each. `unreadable` says of other cells why they are
+    not among these, and `strays` counts rows that belong to no cell. `damage` is what SQLite finds
+    wrong with the store, empty where nothing.
     """
 
     cells: Integers
@@ -491,7 +556,8 @@ class Results:
 
 
 def results(store: Store, sweep: int, count: int | None = None) -> Results:
-    """Results of the first `count` cells of a sweep, or of all; cells that are not done yet are left out.
+    """Results of the first `count` cells of a sweep, or of all; cells that are not done yet are
+    left out.
 
     Each row is checked. Of a damaged store they are the rows that can be read.
 
@@ -501,7 +567,8 @@ def results(store: Store, sweep: int, count: int | None = None) -> Results:
     try:
         if count is None:
             found = store.connection.execute(
-                "SELECT max(number) FROM cell WHERE sweep = ? AND typeof(number) = 'integer'", [sweep]
+                "SELECT max(number) FROM cell WHERE sweep = ? AND typeof(number) = 'integer'",
+                [sweep],
             ).fetchone()[0]
             count = 0 if found is None else min(int(found) + 1, MOST_CELLS)
         reading = read_rows(store.connection, sweep, count, store.has_digests)
@@ -515,7 +582,10 @@ def results(store: Store, sweep: int, count: int | None = None) -> Results:
         reading = salvaged_rows(store.connection, sweep, count or 0, store.has_digests)
     if (wrong or reading.unreadable) and not reading.rows:
         why = wrong or next(iter(reading.unreadable.values()))
-        text = f"none of its cells can be read ({why}); restore a copy, or start anew with ballplate sweep --store"
+        text = (
+            f"none of its cells can be read ({why}); restore a copy, or start anew with ballplate"
+            " sweep --store"
+        )
         raise StoreError(f"{store.path}: is damaged: {text} and a new name")
     rows = reading.rows
     kept_versions = [reading.texts.versions_of(row.versions) for row in rows]
@@ -536,15 +606,27 @@ def results(store: Store, sweep: int, count: int | None = None) -> Results:
     )
 
 
-def unread(path: Path, unreadable: dict[int, str], strays: int, count: int, wrong: str, what_next: str) -> str:
+def unread(
+    path: Path, unreadable: dict[int, str], strays: int, count: int, wrong: str, what_next: str
+) -> str:
     """Words for what of a store could not be read; empty where everything was."""
     if not unreadable and not strays and not wrong:
         return ""
     cells = sorted(unreadable)
-    told = f"{len(cells)} of {count} cells could not be read" if cells else "what it holds is not all as it was stored"
+    told = (
+        f"{len(cells)} of {count} cells could not be read"
+        if cells
+        else "what it holds is not all as it was stored"
+    )
     if cells:
-        some = ", ".join(map(str, cells[:10])) + (f" and {len(cells) - 10} more" if len(cells) > 10 else "")
+        some = ", ".join(map(str, cells[:10])) + (
+            f" and {len(cells) - 10} more" if len(cells) > 10 else ""
+        )
         told += f": {some} ({unreadable[cells[0]]})"
-    told += f"; {strays} {'entry belongs' if strays == 1 else 'entries belong'} to no cell" if strays else ""
+    told += (
+        f"; {strays} {'entry belongs' if strays == 1 else 'entries belong'} to no cell"
+        if strays
+        else ""
+    )
     told += f"; SQLite finds: {wrong}" if wrong else ""
     return in_one_line(f"{path}: {told}; {what_next}")

@@ -1,6 +1,8 @@
-"""The file of a store: what it is, whether it can be used as a database, and what SQLite says of it in words.
+"""The file of a store: what it is, whether it can be used as a database, and what SQLite says of it
+in words.
 
-A store is input like any file: it may be cut off, of another program, of a later version, or no file at all.
+A store is input like any file: it may be cut off, of another program, of a later version, or no
+file at all.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ PATIENCE = 20.0
 MAGIC = b"SQLite format 3\0"
 MEND = "name a store that ballplate sweep has made"
 GO_ON = (
-    "ballplate export and report give what can still be read, and ballplate sweep with --store and a new name "
-    "computes everything anew"
+    "ballplate export and report give what can still be read, and ballplate sweep with --store and"
+    " a new name computes everything anew"
 )
 
 COLUMNS = {
@@ -35,7 +37,19 @@ COLUMNS = {
     "cell": {"sweep", "number", "key"},
     "text": {"id", "value"},
     "result": {
-        *("key", "block", "status", "reason", "seed", "names", "figures", "details", "versions", "seconds", "tally"),
+        *(
+            "key",
+            "block",
+            "status",
+            "reason",
+            "seed",
+            "names",
+            "figures",
+            "details",
+            "versions",
+            "seconds",
+            "tally",
+        ),
     },
 }
 # Tables whose rows have a digest.
@@ -58,9 +72,13 @@ WORDS = {
     "SQLITE_LOCKED": "another process is writing to it; wait for it, or end it",
     "SQLITE_READONLY": "cannot be written ({}); check its permissions and those of its folder",
     "SQLITE_PERM": "cannot be opened ({}); check its permissions and those of its folder",
-    "SQLITE_CANTOPEN": "cannot be opened ({}); check its permissions, its folder's, and those of its -wal and -shm",
+    "SQLITE_CANTOPEN": (
+        "cannot be opened ({}); check its permissions, its folder's, and those of its -wal and -shm"
+    ),
     "SQLITE_NOTADB": f"is no store of ballplate sweep, or its beginning is damaged ({{}}); {MEND}",
-    "SQLITE_CORRUPT": "is damaged ({}); restore a copy, or start anew with ballplate sweep --store and a new name",
+    "SQLITE_CORRUPT": (
+        "is damaged ({}); restore a copy, or start anew with ballplate sweep --store and a new name"
+    ),
 }
 
 
@@ -81,10 +99,11 @@ def in_words(path: Path, error: sqlite3.Error) -> StoreError:
 
 
 def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
-    """A connection to what is a store as far as its beginning tells, and what damage shows; with `create` to a new one.
+    """A connection to what is a store as far as its beginning tells, and what damage shows; with
+    `create` to a new one.
 
-    Without `create` it only reads, also where nothing can be written, or where the end of the file is missing. Nothing
-    blocks, and nothing is written yet.
+    Without `create` it only reads, also where nothing can be written, or where the end of the file
+    is missing. Nothing blocks, and nothing is written yet.
 
     :raises StoreError: no file that is, or may become, a store.
     :raises sqlite3.Error: SQLite cannot open it.
@@ -98,13 +117,20 @@ def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except sqlite3.OperationalError as error:
         connection.close()
-        if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR")):
+        if not error.sqlite_errorname.startswith(
+            ("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR")
+        ):
             raise
         # In a place that cannot be written, or is full, as long as nobody else writes to the store.
         log = Path(f"{path}-wal")
         if log.exists() and log.stat().st_size > 0:
-            words = f"what was written last stands in {log.name}, which cannot be read in this folder ({error})"
-            raise StoreError(f"{path}: {words}; copy both to a folder that can be written") from None
+            words = (
+                f"what was written last stands in {log.name}, which cannot be read in this folder"
+                f" ({error})"
+            )
+            raise StoreError(
+                f"{path}: {words}; copy both to a folder that can be written"
+            ) from None
         connection = _opened(f"{address}?immutable=1")
     except sqlite3.DatabaseError as error:
         if not is_damage(error):
@@ -155,7 +181,8 @@ def is_same_file(one: Path, other: Path) -> bool:
 
 
 def check_place(path: Path, create: bool) -> None:
-    """Refuse what is no file that is a store as its beginning tells or, with `create`, could become one.
+    """Refuse what is no file that is a store as its beginning tells or, with `create`, could become
+    one.
 
     :raises StoreError: it is not.
     """
@@ -168,22 +195,32 @@ def check_place(path: Path, create: bool) -> None:
             start = stream.read(100)
     except FileNotFoundError:
         if path.is_symlink():
-            raise StoreError(f"{path}: is a link to a file that is not there; name a file") from None
+            raise StoreError(
+                f"{path}: is a link to a file that is not there; name a file"
+            ) from None
         start = b""
         if not create:
             words = "there is no such store; make it with ballplate sweep"
             raise StoreError(f"{path}: {words}") from None
     except OSError as error:
-        raise StoreError(f"{path}: cannot be opened ({error.strerror}); check its name and permissions") from None
+        raise StoreError(
+            f"{path}: cannot be opened ({error.strerror}); check its name and permissions"
+        ) from None
     if create and not _is_writable(path.parent):
-        raise StoreError(f"{path}: its folder cannot be written; name another with --store, or see to its permissions")
+        raise StoreError(
+            f"{path}: its folder cannot be written; name another with --store, or see to its"
+            " permissions"
+        )
     if not start and not create:
         raise StoreError(f"{path}: is empty; {MEND}")
     if start and not start.startswith(MAGIC[: len(start)]):
         what = " but a text file" if _is_text(start) else ", or its beginning is damaged"
         raise StoreError(f"{path}: is no store of ballplate sweep{what}; {MEND}")
     if 0 < len(start) < 100:
-        raise StoreError(f"{path}: is cut off after {len(start)} bytes, so that nothing of it can be read; {MEND}")
+        raise StoreError(
+            f"{path}: is cut off after {len(start)} bytes, so that nothing of it can be read;"
+            f" {MEND}"
+        )
 
 
 def _is_writable(folder: Path) -> bool:
@@ -196,9 +233,11 @@ def _is_text(start: bytes) -> bool:
 
 
 def format_of(path: Path, connection: sqlite3.Connection) -> int | None:
-    """The format of a store by its number, after a look at what the database consists of; None of an empty one.
+    """The format of a store by its number, after a look at what the database consists of; None of
+    an empty one.
 
-    :raises StoreError: a database that is no store, a store of a later version, or one without parts that it needs.
+    :raises StoreError: a database that is no store, a store of a later version, or one without
+        parts that it needs.
     :raises sqlite3.Error: SQLite cannot read it.
     """
     parts = connection.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
@@ -208,18 +247,30 @@ def format_of(path: Path, connection: sqlite3.Connection) -> int | None:
     known = None
     if "about" in tables:
         row = connection.execute("SELECT value FROM about WHERE name = 'format'").fetchone()
-        known = re.fullmatch(r"ballplate sweep store ([1-9][0-9]{0,8})", str(row[0]), re.ASCII) if row else None
+        known = (
+            re.fullmatch(r"ballplate sweep store ([1-9][0-9]{0,8})", str(row[0]), re.ASCII)
+            if row
+            else None
+        )
     if known is None:
         names = ", ".join(sorted(map(str, tables))[:4])
-        raise StoreError(f"{path}: is no store of ballplate sweep but a database with the tables {names}; {MEND}")
+        raise StoreError(
+            f"{path}: is no store of ballplate sweep but a database with the tables {names}; {MEND}"
+        )
     number = int(known[1])
     if number > NEWEST:
-        text = f"was made by a later version of ballplate (format {number}, and this version reads up to {NEWEST})"
+        text = (
+            f"was made by a later version of ballplate (format {number}, and this version reads up"
+            f" to {NEWEST})"
+        )
         raise StoreError(f"{path}: {text}; use that version")
     for kind, name, text in parts:
         # Views, triggers and virtual tables could make reading and writing do anything.
         if kind not in ("table", "index") or str(text or "").upper().startswith("CREATE VIRTUAL"):
-            raise StoreError(f"{path}: has a {kind} {name}, which ballplate never makes; do not trust it, and {MEND}")
+            raise StoreError(
+                f"{path}: has a {kind} {name}, which ballplate never makes; do not trust it, and"
+                f" {MEND}"
+            )
     _check_columns(path, connection, number)
     return number
 
@@ -233,14 +284,18 @@ def _check_columns(path: Path, connection: sqlite3.Connection, number: int) -> N
         needed = columns | ({"digest"} if number > 1 and table in WITH_DIGEST else set())
         missing = sorted(needed - {name for _, name, *_ in found})
         if not found:
-            raise StoreError(f"{path}: lacks the table {table}, which every store has; restore a copy, or {MEND}")
+            raise StoreError(
+                f"{path}: lacks the table {table}, which every store has; restore a copy, or {MEND}"
+            )
         if missing:
             words = f"lacks {', '.join(missing)} in the table {table}"
             raise StoreError(f"{path}: {words}, which every store has; restore a copy, or {MEND}")
 
 
 def damage(connection: sqlite3.Connection) -> str:
-    """What SQLite's integrity check finds wrong with a database, in short; empty where it is sound."""
+    """What SQLite's integrity check finds wrong with a database, in short; empty where it is
+    sound.
+    """
     try:
         lines = [str(line) for (line,) in connection.execute("PRAGMA integrity_check(3)")]
     except sqlite3.DatabaseError as error:

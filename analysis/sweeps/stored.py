@@ -1,4 +1,6 @@
-"""Rows of a store, read with doubt: each is checked, and of a damaged file those are found that can still be read."""
+"""Rows of a store, read with doubt: each is checked, and of a damaged file those are found that can
+still be read.
+"""
 
 from __future__ import annotations
 
@@ -115,7 +117,8 @@ def json_of(text: object) -> Any:
 
 
 def checked_definition(number: object, text: object, digest: object) -> dict[str, Any]:
-    """A sweep's definition, in the form that `bundle.definition` gives it; its words without control characters.
+    """A sweep's definition, in the form that `bundle.definition` gives it; its words without
+    control characters.
 
     :raises UnreadableError: not in that form, or not as it was stored.
     """
@@ -125,18 +128,26 @@ def checked_definition(number: object, text: object, digest: object) -> dict[str
     try:
         kept = _Definition.model_validate(found)
     except (ValidationError, RecursionError) as error:
-        first = error.errors(include_url=False)[0] if isinstance(error, ValidationError) else {"loc": (), "msg": "?"}
+        first = (
+            error.errors(include_url=False)[0]
+            if isinstance(error, ValidationError)
+            else {"loc": (), "msg": "?"}
+        )
         place = ".".join(map(str, first["loc"]))
         raise UnreadableError(f"{place}: {first['msg']}") from None
     for axis in kept.axes:
         if axis.unit and len(axis.values) != len(axis.labels):
-            raise UnreadableError(f"the axis {axis.name} has {len(axis.labels)} labels and {len(axis.values)} values")
+            raise UnreadableError(
+                f"the axis {axis.name} has {len(axis.labels)} labels and {len(axis.values)} values"
+            )
     columns = [plain(axis.column) for axis in kept.axes]
     if len(set(columns)) < len(columns) or any(map(is_reserved, columns)):
         raise UnreadableError("the axes have no columns of their own")
     counts = [len(axis.labels) for axis in kept.axes]
     for cell in kept.cells:
-        if len(cell) != len(counts) or any(k >= count for k, count in zip(cell, counts, strict=True)):
+        if len(cell) != len(counts) or any(
+            k >= count for k, count in zip(cell, counts, strict=True)
+        ):
             raise UnreadableError("cells has values that the axes do not have")
     axes = [
         {
@@ -236,10 +247,26 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
     block, status, reason, seed, seconds, names, versions, figures, details, tally, digest = raw
     of_names, _ = texts.names_of(names), texts.versions_of(versions)
     if digest is not None:
-        kept = (key, block, status, reason, seed, texts.raw[names], figures, details, texts.raw[versions], tally)
+        kept = (
+            key,
+            block,
+            status,
+            reason,
+            seed,
+            texts.raw[names],
+            figures,
+            details,
+            texts.raw[versions],
+            tally,
+        )
         if digest != digest_of(*kept):
             raise UnreadableError(OTHER_CONTENT)
-    if not isinstance(block, int) or block < 0 or status not in ("done", "failed") or not isinstance(reason, str):
+    if (
+        not isinstance(block, int)
+        or block < 0
+        or status not in ("done", "failed")
+        or not isinstance(reason, str)
+    ):
         raise UnreadableError("its block, status or reason is none")
     if not isinstance(seed, int) or not isinstance(seconds, float) or not math.isfinite(seconds):
         raise UnreadableError("its seed or duration is no number")
@@ -251,7 +278,9 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
         found = _DETAILS.validate_python(json_of(details)).model_dump(exclude_unset=True)
     except (UnreadableError, ValidationError):
         raise UnreadableError("what was told of it cannot be read") from None
-    return StoredRow(number, key, status, plain(reason), seed, seconds, names, versions, figures, _plain(found))
+    return StoredRow(
+        number, key, status, plain(reason), seed, seconds, names, versions, figures, _plain(found)
+    )
 
 
 def _plain(value: Any) -> Any:
@@ -264,7 +293,8 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Reading:
-    """Rows of a sweep in the order of their cells; `unreadable` says of other cells why they are not among them.
+    """Rows of a sweep in the order of their cells; `unreadable` says of other cells why they are
+    not among them.
 
     `strays` counts entries that belong to no cell of the sweep.
     """
@@ -306,8 +336,8 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
     strays = 0
     of_cell, of_result = ("cell.digest", "result.digest") if has_digests else ("NULL", "NULL")
     found = connection.execute(
-        f"SELECT number, cell.key, {of_cell}, result.key, {OF_RESULT}, {of_result} FROM cell LEFT JOIN result "
-        "ON result.key = cell.key AND block = 0 WHERE sweep = ? ORDER BY number",
+        f"SELECT number, cell.key, {of_cell}, result.key, {OF_RESULT}, {of_result} FROM cell LEFT"
+        " JOIN result ON result.key = cell.key AND block = 0 WHERE sweep = ? ORDER BY number",
         [sweep],
     )
     for number, key, digest, is_there, *raw in found:
@@ -321,10 +351,11 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
         except UnreadableError as error:
             unreadable[number] = str(error)
     if len(rows) + len(unreadable) < count:
-        # The rows of cells that seem not to be done may be there, under keys or blocks that are no longer theirs.
+        # The rows of cells that seem not to be done may be there, under keys or blocks that are no
+        # longer theirs.
         query = (
-            f"SELECT key, {OF_RESULT}, {of_result} FROM result "
-            "WHERE block = 0 AND key NOT IN (SELECT key FROM cell) OR typeof(block) <> 'integer' OR block < 0"
+            f"SELECT key, {OF_RESULT}, {of_result} FROM result WHERE block = 0 AND key NOT IN"
+            " (SELECT key FROM cell) OR typeof(block) <> 'integer' OR block < 0"
         )
         for key, *raw in connection.execute(query):
             try:
@@ -334,7 +365,9 @@ def read_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digest
     return Reading(rows, unreadable, texts, strays)
 
 
-def salvaged_rows(connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool) -> Reading:
+def salvaged_rows(
+    connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
+) -> Reading:
     """The rows of a sweep that can be read in a damaged database, each looked for by itself."""
     texts = _salvaged_texts(connection)
     by_key = _scanned(connection, has_digests)
@@ -376,7 +409,10 @@ def _scanned(connection: sqlite3.Connection, has_digests: bool) -> dict[str, tup
 
 
 def _walked(connection: sqlite3.Connection, digest: str) -> Iterator[tuple[Any, ...]]:
-    query = f"SELECT rowid, key, {OF_RESULT}, {digest} FROM result NOT INDEXED WHERE rowid > ? ORDER BY rowid"
+    query = (
+        f"SELECT rowid, key, {OF_RESULT}, {digest} FROM result NOT INDEXED WHERE rowid > ? ORDER BY"
+        " rowid"
+    )
     place, misses = 0, 0
     while misses < MOST_MISSES:
         try:
@@ -397,7 +433,9 @@ def figures_of(texts: Texts, rows: list[StoredRow]) -> dict[str, Array]:
     for place, row in enumerate(rows):
         of_names.setdefault(row.names, []).append(place)
     for number, places in of_names.items():
-        matrix = np.frombuffer(b"".join(rows[place].figures for place in places), "<f8").reshape(len(places), -1)
+        matrix = np.frombuffer(b"".join(rows[place].figures for place in places), "<f8").reshape(
+            len(places), -1
+        )
         for k, name in enumerate(texts.names_of(number)):
             figures.setdefault(name, np.full(len(rows), np.nan))[places] = matrix[:, k]
     return figures

@@ -40,8 +40,8 @@ KEY_ONLY = -1
 
 @dataclass(frozen=True)
 class Task:
-    """Work on cell `number`: replicate block `block`, counted from 1, or, with 0, everything that is left, or the
-    cell's key alone.
+    """Work on cell `number`: replicate block `block`, counted from 1, or, with 0, everything that
+    is left, or the cell's key alone.
 
     `total` are the sums over all blocks, where the replicates are in several.
     """
@@ -53,11 +53,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a task. `figures` by name, in SI units with the unit in the name; `details` are texts.
+    """What came of a task. `figures` by name, in SI units with the unit in the name; `details` are
+    texts.
 
-    `key` is the number of the method and the fingerprint of the cell, or a hash of its choices where these make no
-    valid experiment. A failed row has its `reason`. `seconds` is the time that it took, `tally` the sums of a replicate
-    block.
+    `key` is the number of the method and the fingerprint of the cell, or a hash of its choices
+    where these make no valid experiment. A failed row has its `reason`. `seconds` is the time that
+    it took, `tally` the sums of a replicate block.
     """
 
     number: int
@@ -106,7 +107,8 @@ def _computed(sweep: Sweep, task: Task) -> Row:
     except ExperimentError as error:
         return Row(number, block, key, "failed", str(error), seed)
     except Exception as error:
-        # Of an error model written in Python anything may come; the other cells do not suffer from it.
+        # Of an error model written in Python anything may come; the other cells do not suffer from
+        # it.
         return Row(number, block, key, "failed", _reason(error), seed)
 
 
@@ -131,7 +133,11 @@ def _whole(sweep: Sweep, experiment: Experiment, task: Task, key: str, seed: int
         else:
             figures |= trial_figures(found.outcome, sweep.record)
             details["not_converged"] = list(found.outcome.failed)
-            details["flags"] = {name: list(one.flags) for name, one in found.outcome.comparisons.items() if one.flags}
+            details["flags"] = {
+                name: list(one.flags)
+                for name, one in found.outcome.comparisons.items()
+                if one.flags
+            }
     return Row(task.number, 0, key, "done", "", seed, figures, details)
 
 
@@ -139,7 +145,14 @@ def lost(sweep: Sweep, task: Task) -> Row:
     """The row of a task whose process ends whenever it is tried."""
     reason = "the process that computed it was ended, by lack of memory perhaps"
     # Without the experiment, which may be what ends the process.
-    return Row(task.number, task.block, invalid_key(sweep, task.number), "failed", reason, versions=versions())
+    return Row(
+        task.number,
+        task.block,
+        invalid_key(sweep, task.number),
+        "failed",
+        reason,
+        versions=versions(),
+    )
 
 
 def key_of(sweep: Sweep, experiment: Experiment) -> str:
@@ -156,12 +169,16 @@ def invalid_key(sweep: Sweep, number: int) -> str:
 
 
 def seed_of(sweep: Sweep, key: str) -> int:
-    """Seed of a cell's data sets: of the sweep's seed and of what is computed, not of its place, nor of the method."""
+    """Seed of a cell's data sets: of the sweep's seed and of what is computed, not of its place,
+    nor of the method.
+    """
     text = f"{sweep.seed} {without_method(key)}"
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
 
-def plan_figures(planned: Prediction, record: tuple[str, ...]) -> tuple[dict[str, float], dict[str, Any]]:
+def plan_figures(
+    planned: Prediction, record: tuple[str, ...]
+) -> tuple[dict[str, float], dict[str, Any]]:
     """Figures and texts of a plan."""
     judged = planned.verdict
     counted = judged.singular_values[: len(judged.singular_values) - judged.deficiency]
@@ -187,7 +204,9 @@ def plan_figures(planned: Prediction, record: tuple[str, ...]) -> tuple[dict[str
     details = {
         "undetermined": [str(direction) for direction in judged.null],
         "weak": [str(direction) for direction in judged.weak],
-        "largest_at": {symbol: one.largest for symbol, one in planned.quantities.items() if one.largest},
+        "largest_at": {
+            symbol: one.largest for symbol, one in planned.quantities.items() if one.largest
+        },
     }
     return figures, details
 

@@ -1,4 +1,6 @@
-"""Values of axes: texts for tables, numbers where they are numbers, ranges, and subsets of lists."""
+"""Values of axes: texts for tables, numbers where they are numbers, ranges, and subsets of
+lists.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def numeric(value: object) -> tuple[float, Unit]:
     """
     if isinstance(value, int | float) and not isinstance(value, bool):
         # Larger whole numbers are not the same as floats.
-        number = float(value) if abs(value) <= (2**53 if isinstance(value, int) else 1e300) else math.nan
+        number = (
+            float(value) if abs(value) <= (2**53 if isinstance(value, int) else 1e300) else math.nan
+        )
         return (number, "1") if math.isfinite(number) else (math.nan, "")
     if isinstance(value, str) and len(value) < 100:
         for unit, parse in KINDS:
@@ -72,8 +76,8 @@ def of_range(
 ) -> list[str | int | float]:
     """Values of a range with the unit of its ends, computed exactly.
 
-    :raises ValueError: ends that are no quantities of one unit, a step that does not lead from one to the other, or
-        more values than `most`.
+    :raises ValueError: ends that are no quantities of one unit, a step that does not lead from one
+        to the other, or more values than `most`.
 
     >>> of_range("300 mm", "750 mm", 4, None, False, 100)
     ['300 mm', '450 mm', '600 mm', '750 mm']
@@ -83,15 +87,22 @@ def of_range(
     low, unit = _exact(first, "from")
     high, unit_of_last = _exact(last, "to")
     if unit_of_last != unit:
-        raise ValueError(f'from and to have the units "{unit}" and "{unit_of_last}"; write both in the same unit')
+        raise ValueError(
+            f'from and to have the units "{unit}" and "{unit_of_last}"; write both in the same unit'
+        )
     if (count is None) == (step is None):
         raise ValueError("a range needs count or step; give one of the two")
     if count is None:
         difference, unit_of_step = _exact(step, "step")
         if unit_of_step != unit:
-            raise ValueError(f'step has the unit "{unit_of_step}", from and to "{unit}"; write all in the same unit')
+            raise ValueError(
+                f'step has the unit "{unit_of_step}", from and to "{unit}"; write all in the same'
+                " unit"
+            )
         if difference == 0 or (high - low) / difference < 0:
-            raise ValueError("step does not lead from from to to; turn its sign round, or exchange the ends")
+            raise ValueError(
+                "step does not lead from from to to; turn its sign round, or exchange the ends"
+            )
         if logarithmic:
             raise ValueError("spacing: logarithmic goes with count; leave step out")
         count = int((high - low) / difference) + 1
@@ -105,7 +116,9 @@ def of_range(
         try:
             ratio = float(high / low) ** (1.0 / (count - 1))
         except OverflowError:
-            raise ValueError("the ends are too far apart; bring them nearer to each other") from None
+            raise ValueError(
+                "the ends are too far apart; bring them nearer to each other"
+            ) from None
         inner = [Fraction(f"{float(low) * ratio**k:.10g}") for k in range(1, count - 1)]
         return [_written(value, unit) for value in (low, *inner, high)]
     return [_written(low + k * difference, unit) for k in range(count)]
@@ -118,7 +131,10 @@ def _exact(value: object, key: str) -> tuple[Fraction, str]:
     text = str(value)
     found = QUANTITY.fullmatch(text.strip()) if len(text) < 100 else None
     if found is None:
-        raise ValueError(f'{key}: "{shorten(text)}" is neither a number nor a quantity; write for example "300 mm"')
+        raise ValueError(
+            f'{key}: "{shorten(text)}" is neither a number nor a quantity; write for example'
+            ' "300 mm"'
+        )
     return exact_number(found[1]), (found[2] or "").strip()
 
 
@@ -149,7 +165,9 @@ def subset_count(total: int, fixed: int, sizes: tuple[int, ...]) -> int:
 def subsets(
     names: list[str], always: tuple[str, ...], among: tuple[str, ...], sizes: tuple[int, ...]
 ) -> list[tuple[str, tuple[str, ...]]]:
-    """Subsets of the entries of a list, each with its label, in the order of sizes and then of the list."""
+    """Subsets of the entries of a list, each with its label, in the order of sizes and then of the
+    list.
+    """
     free = [k for k, name in enumerate(names) if name in among and name not in always]
     fixed = [k for k, name in enumerate(names) if name in always]
     found = []

@@ -19,7 +19,8 @@ TILE = 256
 
 @dataclass(frozen=True)
 class PairSummary:
-    """Running result over pairs: how many, how many open, sum and maximum of the others and where it stands.
+    """Running result over pairs: how many, how many open, sum and maximum of the others and where
+    it stands.
 
     `within` counts those that are no larger than the limit they were compared with.
     """
@@ -47,9 +48,11 @@ class PairSummary:
 
 @dataclass(frozen=True, eq=False)
 class PairTile:
-    """Pairs of places by index, `first` and `second` (m,): `lengths` and `uncertainties` (m,) in metres.
+    """Pairs of places by index, `first` and `second` (m,): `lengths` and `uncertainties` (m,) in
+    metres.
 
-    `is_open` (m,) marks those that an undetermined direction changes, whose uncertainties mean nothing.
+    `is_open` (m,) marks those that an undetermined direction changes, whose uncertainties mean
+    nothing.
     """
 
     first: Integers
@@ -59,8 +62,11 @@ class PairTile:
     is_open: NDArray[np.bool_]
 
 
-def all_pairs(moved: Displacements, labels: Integers, limit: LengthFunction | None = None) -> PairSummary:
-    """Standard uncertainty of the distances between all pairs of n places, as `pair_tiles` gives them.
+def all_pairs(
+    moved: Displacements, labels: Integers, limit: LengthFunction | None = None
+) -> PairSummary:
+    """Standard uncertainty of the distances between all pairs of n places, as `pair_tiles` gives
+    them.
 
     `labels` (n,) name the places in the result.
     """
@@ -68,7 +74,8 @@ def all_pairs(moved: Displacements, labels: Integers, limit: LengthFunction | No
 
 
 def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
-    """Standard uncertainties of the distances between all pairs of places, a tile of pairs at a time.
+    """Standard uncertainties of the distances between all pairs of places, a tile of pairs at a
+    time.
 
     Places that coincide make no pair. Memory is that of a tile.
     """
@@ -79,7 +86,9 @@ def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
 
 
 def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
-    """Standard uncertainties of the distances between some pairs (m, 2) of places that are apart."""
+    """Standard uncertainties of the distances between some pairs (m, 2) of places that are
+    apart.
+    """
     places, common, null, drawn = _relative(moved)
     lengths, variance = np.zeros(len(pairs)), np.zeros(len(pairs))
     change = np.zeros((len(pairs), null.shape[2]))
@@ -101,11 +110,18 @@ def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
 
 
 def _relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
-    """Places, displacements, those along undetermined directions, and places as drawn, without what all do together."""
+    """Places, displacements, those along undetermined directions, and places as drawn, without what
+    all do together.
+    """
     if not len(moved.places):
         return moved.places, moved.common, moved.null, moved.drawn
     places, drawn = moved.places - moved.places.mean(axis=0), moved.drawn - moved.drawn.mean(axis=0)
-    return places, without_rigid_motion(places, moved.common), without_rigid_motion(drawn, moved.null), drawn
+    return (
+        places,
+        without_rigid_motion(places, moved.common),
+        without_rigid_motion(drawn, moved.null),
+        drawn,
+    )
 
 
 def _tiles(n: int) -> Iterator[tuple[slice, slice]]:
@@ -136,7 +152,9 @@ def _tile(
         for j in used[used.index(i) :]:
             product = common[rows, i] @ common[columns, j].T
             product += product if i == j else common[rows, j] @ common[columns, i].T
-            np.subtract(single[rows, None, i, j] + single[None, columns, i, j], product, out=product)
+            np.subtract(
+                single[rows, None, i, j] + single[None, columns, i, j], product, out=product
+            )
             product *= difference[i]
             product *= difference[j]
             weighted += product if i == j else 2.0 * product
@@ -145,12 +163,17 @@ def _tile(
     open_ = np.zeros(len(values), bool)
     if null.shape[2]:
         apart = drawn[rows, None] - drawn[None, columns]
-        change = sum(apart[:, :, i, None] * (null[rows, None, i, :] - null[None, columns, i, :]) for i in range(d))
+        change = sum(
+            apart[:, :, i, None] * (null[rows, None, i, :] - null[None, columns, i, :])
+            for i in range(d)
+        )
         length = (apart**2).sum(axis=2)
         size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
         open_ = size[chosen] > _open_above(null)
     first, second = np.nonzero(chosen)
-    return PairTile(rows.start + first, columns.start + second, np.sqrt(squared[chosen]), values, open_)
+    return PairTile(
+        rows.start + first, columns.start + second, np.sqrt(squared[chosen]), values, open_
+    )
 
 
 def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> PairSummary:
@@ -162,7 +185,12 @@ def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> 
     where = (int(labels[tile.first[top]]), int(labels[tile.second[top]]))
     within = 0 if limit is None else int((~open_ & (values <= limit.at(tile.lengths))).sum())
     return PairSummary(
-        len(values), int(open_.sum()), float(values[~open_].sum()), float(determined.max()), where, within
+        len(values),
+        int(open_.sum()),
+        float(values[~open_].sum()),
+        float(determined.max()),
+        where,
+        within,
     )
 
 

@@ -1,6 +1,8 @@
-"""The quantities whose uncertainties are told: U1 to U6 of NPL Report CISE 15/98, section 6, and measuring tasks.
+"""The quantities whose uncertainties are told: U1 to U6 of NPL Report CISE 15/98, section 6, and
+measuring tasks.
 
-A new one is an entry of `QUANTITIES`: `run`, Monte Carlo, sweeps, plans, reliability, goals and reports read it.
+A new one is an entry of `QUANTITIES`: `run`, Monte Carlo, sweeps, plans, reliability, goals and
+reports read it.
 """
 
 from __future__ import annotations
@@ -10,22 +12,31 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import Balls, Coordinates, Distances, Functions, Parameters, Points
+from ballplate.simulator.estimation.functions import (
+    Balls,
+    Coordinates,
+    Distances,
+    Functions,
+    Parameters,
+    Points,
+)
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Unit
 
 
 @dataclass(frozen=True)
 class QuantityKind:
-    """A kind of quantity: what its standard uncertainties are of, and the function that makes its functions.
+    """A kind of quantity: what its standard uncertainties are of, and the function that makes its
+    functions.
 
-    Functions in several groups are of the same kind, such as distances of several artefacts; a design without any has
-    none of this quantity. `parts` split it by unit, each with a word and a description of its own; `unit` is that of
-    the whole. `are_lengths` tells that it is about distances only, which a plan can make small, and `about_balls` that
-    these are between balls. `effect` says in a few words what reliability looks at changes of, and is empty where it
-    does not. `has_target` tells whether it is compared with the target accuracy of the file, `in_replicates` whether
-    Monte Carlo follows it, and `is_recorded` whether a sweep records it unless told. `needs` is what a design without
-    it lacks.
+    Functions in several groups are of the same kind, such as distances of several artefacts; a
+    design without any has none of this quantity. `parts` split it by unit, each with a word and a
+    description of its own; `unit` is that of the whole. `are_lengths` tells that it is about
+    distances only, which a plan can make small, and `about_balls` that these are between balls.
+    `effect` says in a few words what reliability looks at changes of, and is empty where it does
+    not. `has_target` tells whether it is compared with the target accuracy of the file,
+    `in_replicates` whether Monte Carlo follows it, and `is_recorded` whether a sweep records it
+    unless told. `needs` is what a design without it lacks.
     """
 
     description: str
@@ -57,16 +68,23 @@ def _shared(layout: SharedLayout, columns: slice) -> tuple[Functions, ...]:
     """Some of the shared parameters themselves."""
     own = layout.parameters[columns]
     rows = np.eye(len(layout))[columns]
-    return (Parameters(rows, tuple(p.name for p in own), tuple(p.unit for p in own)),) if own else ()
+    return (
+        (Parameters(rows, tuple(p.name for p in own), tuple(p.unit for p in own)),) if own else ()
+    )
 
 
 def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
-    """The model's parameters as it reports them, less those that are zero in any machine of the model."""
+    """The model's parameters as it reports them, less those that are zero in any machine of the
+    model.
+    """
     reported = design.model.reported()
     quoted = np.flatnonzero(reported.matrix.any(axis=1)).tolist()
     rows = np.zeros((len(quoted), len(layout)))
     rows[:, layout.model] = reported.matrix[quoted]
-    names, units = tuple(reported.names[i] for i in quoted), tuple(reported.units[i] for i in quoted)
+    names, units = (
+        tuple(reported.names[i] for i in quoted),
+        tuple(reported.units[i] for i in quoted),
+    )
     return (Parameters(rows, names, units),) if quoted else ()
 
 
@@ -79,16 +97,24 @@ def _plates(design: Design) -> tuple[Balls, ...]:
 QUANTITIES: dict[str, QuantityKind] = {
     "U1": QuantityKind(
         "ball co-ordinates",
-        lambda design, layout: (Coordinates(Balls(design.plate_balls)),) if len(design.plate_balls) else (),
+        lambda design, layout: (
+            (Coordinates(Balls(design.plate_balls)),) if len(design.plate_balls) else ()
+        ),
     ),
     "U2": QuantityKind(
         "pose parameters",
         lambda design, layout: _shared(layout, layout.poses),
-        parts={"m": ("lengths", "pose parameters: origins"), "rad": ("angles", "pose parameters: rotations")},
+        parts={
+            "m": ("lengths", "pose parameters: origins"),
+            "rad": ("angles", "pose parameters: rotations"),
+        },
         unit="m, rad",
     ),
     "U2 offsets": QuantityKind(
-        "probe offsets", lambda design, layout: _shared(layout, layout.offsets), unit="m", in_replicates=False
+        "probe offsets",
+        lambda design, layout: _shared(layout, layout.offsets),
+        unit="m",
+        in_replicates=False,
     ),
     # Quoted for monomials on [0, 1] of a kinematic model.
     "U3": QuantityKind(
@@ -102,12 +128,16 @@ QUANTITIES: dict[str, QuantityKind] = {
     ),
     "U4": QuantityKind(
         "error function at the evaluation points",
-        lambda design, layout: (Coordinates(evaluation_points(design)),) if len(design.points) else (),
+        lambda design, layout: (
+            (Coordinates(evaluation_points(design)),) if len(design.points) else ()
+        ),
         effect="error function",
     ),
     "U5": QuantityKind(
         "distances between balls",
-        lambda design, layout: tuple(Distances(balls) for balls in _plates(design) if len(balls.index) > 1),
+        lambda design, layout: tuple(
+            Distances(balls) for balls in _plates(design) if len(balls.index) > 1
+        ),
         are_lengths=True,
         about_balls=True,
         effect="distances between balls",
@@ -115,7 +145,9 @@ QUANTITIES: dict[str, QuantityKind] = {
     ),
     "U6": QuantityKind(
         "distances between corrected points",
-        lambda design, layout: (Distances(evaluation_points(design)),) if len(design.points) > 1 else (),
+        lambda design, layout: (
+            (Distances(evaluation_points(design)),) if len(design.points) > 1 else ()
+        ),
         are_lengths=True,
         effect="distances between corrected points",
         has_target=True,
@@ -138,5 +170,8 @@ for _symbol, _kind in QUANTITIES.items():
     DESCRIPTIONS[_symbol] = _kind.description
     DESCRIPTIONS |= {f"{_symbol} {word}": description for word, description in _kind.parts.values()}
 
-# Quantities that a sweep records unless told, those whose symbol has a word of its own with the whole.
-RECORDED = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.is_recorded and " " not in symbol)
+# Quantities that a sweep records unless told, those whose symbol has a word of its own with the
+# whole.
+RECORDED = tuple(
+    symbol for symbol, kind in QUANTITIES.items() if kind.is_recorded and " " not in symbol
+)

@@ -1,7 +1,8 @@
-"""Where a design's scale comes from: certificates, priors, probe offsets, or an error model that cannot stretch.
+"""Where a design's scale comes from: certificates, priors, probe offsets, or an error model that
+cannot stretch.
 
-Readings alone never tell it. Machine, plates, poses and offsets that are all larger by the same ratio give the same
-readings, so that some knowledge of a length must say how large they are.
+Readings alone never tell it. Machine, plates, poses and offsets that are all larger by the same
+ratio give the same readings, so that some knowledge of a length must say how large they are.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from ballplate.simulator.machines.protocol import Array
 from .pairs import PairSummary
 from .summaries import point_pairs
 
-# The standard uncertainty of offsets for which a design that rests on them is told what becomes of it.
+# The standard uncertainty of offsets for which a design that rests on them is told what becomes of
+# it.
 OFFSET_TRIAL = 1e-6
 # What is left out carries scale where the scale is less certain without it by this factor.
 CARRIES = 1.05
@@ -37,9 +39,11 @@ MOST_ARTEFACTS = 3
 
 @dataclass(frozen=True)
 class Carrier:
-    """What carries scale, in words; `without` is the relative standard uncertainty of scale if it were not known.
+    """What carries scale, in words; `without` is the relative standard uncertainty of scale if it
+    were not known.
 
-    Infinite where the scale would then be undetermined; None of the machine's own scales, which are what they are.
+    Infinite where the scale would then be undetermined; None of the machine's own scales, which are
+    what they are.
     """
 
     words: str
@@ -48,7 +52,8 @@ class Carrier:
 
 @dataclass(frozen=True)
 class Loosened:
-    """U6 of a design whose exact probe offsets, but for one, have a standard uncertainty: average and maximum, metres.
+    """U6 of a design whose exact probe offsets, but for one, have a standard uncertainty: average
+    and maximum, metres.
 
     `before` is the average with exact offsets.
     """
@@ -63,10 +68,11 @@ class Loosened:
 class Scale:
     """The relative standard uncertainty of scale, and what carries it, the most important first.
 
-    Scale is the mean relative change of the distances between corrected points, weighted by their squares.
-    `rests_on_offsets`: whether, but for probe offsets that are held exact, it would be undetermined or at least
-    three times as uncertain; `loosened` then tells what becomes of U6. Where the error model cannot stretch the volume
-    by the same ratio in all directions, the machine's own scales carry as well.
+    Scale is the mean relative change of the distances between corrected points, weighted by their
+    squares. `rests_on_offsets`: whether, but for probe offsets that are held exact, it would be
+    undetermined or at least three times as uncertain; `loosened` then tells what becomes of U6.
+    Where the error model cannot stretch the volume by the same ratio in all directions, the
+    machine's own scales carry as well.
     """
 
     uncertainty: float
@@ -76,7 +82,9 @@ class Scale:
 
 
 def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
-    """What carries the scale of a design; None where it is undetermined or the design is evaluated nowhere."""
+    """What carries the scale of a design; None where it is undetermined or the design is evaluated
+    nowhere.
+    """
     uncertainty = float(at.of_shared(scale_row(at)[None])[0])
     if np.isnan(uncertainty):
         return None
@@ -87,9 +95,14 @@ def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
         carriers = [Carrier(groups[0][0], np.inf)]
     else:
         found = sorted(((scale_uncertainty(rest), words) for words, rest in groups), reverse=True)
-        some = [one for one in found if one[0] > CARRIES * uncertainty] or (found if stretches else [])
+        some = [one for one in found if one[0] > CARRIES * uncertainty] or (
+            found if stretches else []
+        )
         carriers = [Carrier(words, without) for without, words in some]
-    rests = any(one.words == EXACT_OFFSETS and (one.without or 0.0) > RESTS * uncertainty for one in carriers)
+    rests = any(
+        one.words == EXACT_OFFSETS and (one.without or 0.0) > RESTS * uncertainty
+        for one in carriers
+    )
     loosened = _loosened(experiment, at) if rests else None
     if not stretches:
         carriers.append(Carrier(OWN_SCALES, None))
@@ -110,21 +123,30 @@ def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
     if experiment.priors:
         yield "priors", replace(experiment, priors=())
     unknown = np.full(experiment.dimension, np.inf)
-    stated = {name: u for name, u in experiment.offset_uncertainties.items() if np.isfinite(u).any()}
+    stated = {
+        name: u for name, u in experiment.offset_uncertainties.items() if np.isfinite(u).any()
+    }
     if stated:
         freed = {**experiment.offset_uncertainties, **dict.fromkeys(stated, unknown)}
-        yield "probe offsets with a standard uncertainty", replace(experiment, offset_uncertainties=freed)
+        yield (
+            "probe offsets with a standard uncertainty",
+            replace(experiment, offset_uncertainties=freed),
+        )
     if exact_offsets(experiment):
         yield EXACT_OFFSETS, with_offsets(experiment, np.inf)
 
 
 def exact_offsets(experiment: Experiment) -> tuple[str, ...]:
     """Probes whose offsets are held exact, but for one: what the others are relative to."""
-    return tuple(name for name in experiment.probes if name not in experiment.offset_uncertainties)[1:]
+    return tuple(name for name in experiment.probes if name not in experiment.offset_uncertainties)[
+        1:
+    ]
 
 
 def with_offsets(experiment: Experiment, uncertainty: float) -> Experiment:
-    """The experiment with a standard uncertainty, in metres, of the offsets that are held exact, but for one."""
+    """The experiment with a standard uncertainty, in metres, of the offsets that are held exact,
+    but for one.
+    """
     own = np.full(experiment.dimension, uncertainty)
     offsets = {**experiment.offset_uncertainties, **dict.fromkeys(exact_offsets(experiment), own)}
     return replace(experiment, offset_uncertainties=offsets)
@@ -140,13 +162,17 @@ def scale_uncertainty(experiment: Experiment) -> float:
 
 
 def scale_row(at: Linearisation) -> Array:
-    """Derivative (s,) of the scale by the shared parameters: of the mean relative change of distances.
+    """Derivative (s,) of the scale by the shared parameters: of the mean relative change of
+    distances.
 
-    Distances between the evaluation points or, where there is but one or none, between the corners of the volume, are
-    weighted by their squares; the sum over all pairs is one over all points, less their centroid.
+    Distances between the evaluation points or, where there is but one or none, between the corners
+    of the volume, are weighted by their squares; the sum over all pairs is one over all points,
+    less their centroid.
     """
     points = _points(at.design)
-    rows = correction_rows(at.design, at.layout, at.state, points, np.full(len(points), at.design.point_probe))
+    rows = correction_rows(
+        at.design, at.layout, at.state, points, np.full(len(points), at.design.point_probe)
+    )
     centred = points - points.mean(axis=0)
     return np.asarray(np.einsum("nd,nds->s", centred, rows) / (centred**2).sum())
 
@@ -181,16 +207,22 @@ def _linearised(experiment: Experiment) -> Linearisation | None:
 
 
 def _loosened(experiment: Experiment, at: Linearisation) -> Loosened | None:
-    """What becomes of U6 once the exact offsets have an uncertainty; None where something of it is undetermined."""
+    """What becomes of U6 once the exact offsets have an uncertainty; None where something of it is
+    undetermined.
+    """
     after = lengths_with_offsets(experiment, OFFSET_TRIAL)
     if after is None:
         return None
     before = point_pairs(at)[1]
-    return Loosened(OFFSET_TRIAL, after.total / after.count, after.maximum, before.total / before.count)
+    return Loosened(
+        OFFSET_TRIAL, after.total / after.count, after.maximum, before.total / before.count
+    )
 
 
 def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSummary | None:
-    """U6 where exact offsets, but for one, have an uncertainty in metres; None where something of it is open."""
+    """U6 where exact offsets, but for one, have an uncertainty in metres; None where something of
+    it is open.
+    """
     at = _linearised(with_offsets(experiment, uncertainty))
     if at is None or not len(at.design.points):
         return None

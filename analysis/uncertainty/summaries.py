@@ -32,11 +32,12 @@ from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points
 class Quantity:
     """Standard uncertainties of one kind: the largest and the mean of those that are determined.
 
-    `count` of them there are, `undetermined` of which the observations leave open; the maximum and the
-    average are NaN when nothing is left, and `largest` then is empty, otherwise it names where the maximum stands.
-    `within_target` is the share of distances whose uncertainty, `coverage_factor` times the standard one, is within the
-    target accuracy, those undetermined counted as not; None where no target is compared with. `places` tell where in
-    the volume the evaluation points are that `largest` names.
+    `count` of them there are, `undetermined` of which the observations leave open; the maximum and
+    the average are NaN when nothing is left, and `largest` then is empty, otherwise it names where
+    the maximum stands. `within_target` is the share of distances whose uncertainty,
+    `coverage_factor` times the standard one, is within the target accuracy, those undetermined
+    counted as not; None where no target is compared with. `places` tell where in the volume the
+    evaluation points are that `largest` names.
     """
 
     symbol: str
@@ -57,12 +58,17 @@ class Quantity:
 
 @single_threaded
 def uncertainties(
-    at: Linearisation, sigma: float = 1.0, target: Target | None = None, symbols: Collection[str] | None = None
+    at: Linearisation,
+    sigma: float = 1.0,
+    target: Target | None = None,
+    symbols: Collection[str] | None = None,
 ) -> dict[str, Quantity]:
-    """All quantities of a linearised design, or those of some `symbols`; those of several units also split by these.
+    """All quantities of a linearised design, or those of some `symbols`; those of several units
+    also split by these.
 
-    `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a fit. The distances
-    between corrected points are compared with the `target` accuracy if there is one, measuring tasks with their own.
+    `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a
+    fit. The distances between corrected points are compared with the `target` accuracy if there is
+    one, measuring tasks with their own.
     """
     found: dict[str, Quantity] = {}
     made: dict[bytes, Displacements] = {}
@@ -77,7 +83,9 @@ def uncertainties(
         return made[key]
 
     for symbol, kind in QUANTITIES.items():
-        functions = kind.functions(at.design, at.layout) if symbols is None or symbol in symbols else ()
+        functions = (
+            kind.functions(at.design, at.layout) if symbols is None or symbol in symbols else ()
+        )
         if not functions:
             continue
         first = functions[0]
@@ -86,15 +94,25 @@ def uncertainties(
         elif isinstance(first, Coordinates):
             found[symbol] = _of_coordinates(at, symbol, first.places, displaced, sigma)
         elif first.pairs is not None:
-            found[symbol] = _of_named(symbol, first, pairs_of(displaced(first.places), first.pairs), sigma)
+            found[symbol] = _of_named(
+                symbol, first, pairs_of(displaced(first.places), first.pairs), sigma
+            )
         else:
-            groups = [(one.places, displaced(one.places)) for one in functions if isinstance(one, Distances)]
-            lengths = _of_pairs(at.design, symbol, groups, sigma, target if kind.has_target else None)
+            groups = [
+                (one.places, displaced(one.places))
+                for one in functions
+                if isinstance(one, Distances)
+            ]
+            lengths = _of_pairs(
+                at.design, symbol, groups, sigma, target if kind.has_target else None
+            )
             found |= {} if lengths is None else {symbol: lengths}
     return found
 
 
-def _of_parameters(at: Linearisation, symbol: str, given: Parameters, sigma: float) -> dict[str, Quantity]:
+def _of_parameters(
+    at: Linearisation, symbol: str, given: Parameters, sigma: float
+) -> dict[str, Quantity]:
     values, kind = sigma * at.of_shared(given.rows), QUANTITIES[symbol]
     unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in given.units)
     found = {symbol: summarise(symbol, values, unit, given.names)}
@@ -107,15 +125,26 @@ def _of_parameters(at: Linearisation, symbol: str, given: Parameters, sigma: flo
 
 
 def _of_coordinates(
-    at: Linearisation, symbol: str, places: Places, displaced: Callable[[Places], Displacements], sigma: float
+    at: Linearisation,
+    symbol: str,
+    places: Places,
+    displaced: Callable[[Places], Displacements],
+    sigma: float,
 ) -> Quantity:
     if isinstance(places, Balls):
-        return summarise(symbol, sigma * at.of_balls()[places.index].ravel(), "m", coordinate_names(at.design, places))
+        return summarise(
+            symbol,
+            sigma * at.of_balls()[places.index].ravel(),
+            "m",
+            coordinate_names(at.design, places),
+        )
     names = coordinate_names(at.design, places)
     found = summarise(symbol, sigma * displaced(places).uncertainties.ravel(), "m", names)
     if not found.largest:
         return found
-    return replace(found, places=(_point(places, names.index(found.largest) // at.design.dimension),))
+    return replace(
+        found, places=(_point(places, names.index(found.largest) // at.design.dimension),)
+    )
 
 
 def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Quantity:
@@ -134,7 +163,11 @@ def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Qu
 
 
 def _of_pairs(
-    design: Design, symbol: str, groups: list[tuple[Places, Displacements]], sigma: float, target: Target | None
+    design: Design,
+    symbol: str,
+    groups: list[tuple[Places, Displacements]],
+    sigma: float,
+    target: Target | None,
 ) -> Quantity | None:
     """Distances between all places of each group; None where all coincide."""
     # Compared before sigma multiplies the uncertainties, so that the limit is divided by it.
@@ -153,7 +186,9 @@ def _of_pairs(
             found = replace(found, places=tuple(_point(places, label) for label in pairs.where))
     if target is None:
         return found
-    return replace(found, within_target=pairs.within / pairs.count, coverage_factor=target.coverage_factor)
+    return replace(
+        found, within_target=pairs.within / pairs.count, coverage_factor=target.coverage_factor
+    )
 
 
 def _point(places: Points, label: int) -> str:
@@ -162,8 +197,12 @@ def _point(places: Points, label: int) -> str:
     return f"point {label + 1} at ({place}) mm"
 
 
-def point_pairs(at: Linearisation, limit: LengthFunction | None = None) -> tuple[Array, PairSummary]:
-    """Uncertainties of the corrected evaluation points' co-ordinates (n, d), and of all distances between them."""
+def point_pairs(
+    at: Linearisation, limit: LengthFunction | None = None
+) -> tuple[Array, PairSummary]:
+    """Uncertainties of the corrected evaluation points' co-ordinates (n, d), and of all distances
+    between them.
+    """
     places = evaluation_points(at.design)
     moved = displacements(at, places)
     return moved.uncertainties, all_pairs(moved, places.labels, limit)
@@ -176,5 +215,11 @@ def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Qu
         return Quantity(symbol, np.nan, np.nan, unit, len(values), len(values))
     top = int(np.nanargmax(comparable(values)))
     return Quantity(
-        symbol, float(np.nanmax(values)), float(np.nanmean(values)), unit, len(values), int(open_.sum()), names[top]
+        symbol,
+        float(np.nanmax(values)),
+        float(np.nanmean(values)),
+        unit,
+        len(values),
+        int(open_.sum()),
+        names[top],
     )

@@ -1,4 +1,6 @@
-"""Standard uncertainties of measuring tasks: lengths between two points that the corrected machine is to measure."""
+"""Standard uncertainties of measuring tasks: lengths between two points that the corrected machine
+is to measure.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ COVERAGE = 2.0
 class TaskUncertainty:
     """A measuring task: its length, standard uncertainty and the one to be reached, in metres.
 
-    The standard uncertainty is NaN where observations leave it open; `target` is None where nothing is to be reached,
-    and otherwise compared with `coverage_factor` times the standard uncertainty.
+    The standard uncertainty is NaN where observations leave it open; `target` is None where nothing
+    is to be reached, and otherwise compared with `coverage_factor` times the standard uncertainty.
     """
 
     name: str
@@ -43,16 +45,23 @@ class TaskUncertainty:
     @property
     def is_within(self) -> bool | None:
         """Whether the uncertainty is within its target; None where there is none."""
-        return None if self.target is None else self.coverage_factor * self.standard_uncertainty <= self.target
+        return (
+            None
+            if self.target is None
+            else self.coverage_factor * self.standard_uncertainty <= self.target
+        )
 
 
 def expansion(coverage_factor: float) -> float:
-    """The coverage factor of an expanded uncertainty that is shown: that of the target, or 2 where that is 1."""
+    """The coverage factor of an expanded uncertainty that is shown: that of the target, or 2 where
+    that is 1.
+    """
     return coverage_factor if coverage_factor > 1.0 else COVERAGE
 
 
 def task_uncertainties(at: Linearisation, sigma: float = 1.0) -> tuple[TaskUncertainty, ...]:
-    """Standard uncertainties of the design's tasks, as U6 is that of all pairs of points; none without tasks.
+    """Standard uncertainties of the design's tasks, as U6 is that of all pairs of points; none
+    without tasks.
 
     `sigma` multiplies all stated uncertainties.
     """
@@ -64,9 +73,13 @@ def task_uncertainties(at: Linearisation, sigma: float = 1.0) -> tuple[TaskUncer
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
     told = zip(given.names, tile.lengths.tolist(), values.tolist(), given.targets, strict=True)
     return tuple(
-        TaskUncertainty(name, length, value, None)
-        if target is None
-        else TaskUncertainty(name, length, value, float(target.stated.at(length)), target.coverage_factor)
+        (
+            TaskUncertainty(name, length, value, None)
+            if target is None
+            else TaskUncertainty(
+                name, length, value, float(target.stated.at(length)), target.coverage_factor
+            )
+        )
         for name, length, value, target in told
     )
 

@@ -1,7 +1,8 @@
 """Volumetric errors of a described machine: on a grid, along a line, and in lengths.
 
-Source: Park, Burdekin and Peggs, section 5. An error is where the tip is, less where the scales say: the correction to
-be added to a reading, opposite in sign to the error of indication. Random parts are standard deviations.
+Source: Park, Burdekin and Peggs, section 5. An error is where the tip is, less where the scales
+say: the correction to be added to a reading, opposite in sign to the error of indication. Random
+parts are standard deviations.
 """
 
 from __future__ import annotations
@@ -37,12 +38,16 @@ DIAGONALS: tuple[tuple[tuple[int, int, int], tuple[int, int, int]], ...] = (
     ((0, 1, 0), (1, 0, 1)),
     ((0, 0, 1), (1, 1, 0)),
 )
-"""The four body diagonals as the document numbers them: lower (0) or upper (1) end of each axis, from and to."""
+"""The four body diagonals as the document numbers them: lower (0) or upper (1) end of each axis,
+from and to.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class VolumetricErrors:
-    """Errors where the axes stand at `points` (m, 3): `systematic` (m, 3) and `deviation` (m, 3) of the random part."""
+    """Errors where the axes stand at `points` (m, 3): `systematic` (m, 3) and `deviation` (m, 3) of
+    the random part.
+    """
 
     points: Array
     systematic: Array
@@ -56,7 +61,9 @@ class VolumetricErrors:
 
 @dataclass(frozen=True, eq=False)
 class LengthErrors:
-    """Errors (m,) of distances from `starts` to `ends` (m, 3): true distances less those that the scales say."""
+    """Errors (m,) of distances from `starts` to `ends` (m, 3): true distances less those that the
+    scales say.
+    """
 
     starts: Array
     ends: Array
@@ -78,7 +85,8 @@ class Volumetric:
 
     @cached_property
     def approach(self) -> tuple[VolumetricModel, tuple[float | Points, ...]]:
-        """The model whose parameters are the values of the functions with a random part, and their deviations.
+        """The model whose parameters are the values of the functions with a random part, and their
+        deviations.
 
         They are drawn anew whenever a point is approached.
         """
@@ -86,19 +94,35 @@ class Volumetric:
         random = [error for error in machine.errors if error.deviation is not None]
         one = Combination(((1.0, PowerSeries((1.0,))),))
         functions = tuple(error_function(error.name, one) for error in random)
-        chain = KinematicModel(machine.arrangement, functions, machine.lower, machine.upper, origin=machine.reference)
-        return VolumetricModel(chain, ()), tuple(error.deviation for error in random if error.deviation is not None)
+        chain = KinematicModel(
+            machine.arrangement, functions, machine.lower, machine.upper, origin=machine.reference
+        )
+        return VolumetricModel(chain, ()), tuple(
+            error.deviation for error in random if error.deviation is not None
+        )
 
     @cached_property
     def lasting(self) -> tuple[VolumetricModel, Array]:
-        """The model of what is wrong alike at all points, with the deviations: squareness and temperatures."""
+        """The model of what is wrong alike at all points, with the deviations: squareness and
+        temperatures.
+        """
         machine = self.machine
-        fields = [(squareness_field(one.name), one.deviation) for one in machine.squareness if one.deviation]
+        fields = [
+            (squareness_field(one.name), one.deviation)
+            for one in machine.squareness
+            if one.deviation
+        ]
         for axis, known in machine.temperature.items():
             if known.uncertainty:
-                fields.append((thermal_field(AXES.index(axis)), abs(known.expansion) * known.uncertainty))
-        chain = KinematicModel(machine.arrangement, (), machine.lower, machine.upper, origin=machine.reference)
-        return VolumetricModel(chain, tuple(one for one, _ in fields)), np.array([size for _, size in fields])
+                fields.append(
+                    (thermal_field(AXES.index(axis)), abs(known.expansion) * known.uncertainty)
+                )
+        chain = KinematicModel(
+            machine.arrangement, (), machine.lower, machine.upper, origin=machine.reference
+        )
+        return VolumetricModel(chain, tuple(one for one, _ in fields)), np.array(
+            [size for _, size in fields]
+        )
 
     @property
     def is_random(self) -> bool:
@@ -111,13 +135,19 @@ class Volumetric:
         return np.asarray(self.truth.model.error(points, self.truth.a, probe) - probe)
 
     def random_roots(self, points: Array) -> tuple[Array, Array]:
-        """Sensitivities times deviations: (m, 3, k) of what each approach draws, and (m, 3, l) of what lasts."""
+        """Sensitivities times deviations: (m, 3, k) of what each approach draws, and (m, 3, l) of
+        what lasts.
+        """
         probe = np.broadcast_to(self.machine.probe, points.shape)
         model, deviations = self.approach
         columns = model.jacobian(points, np.zeros(len(deviations)), probe)
-        for k, (function, deviation) in enumerate(zip(model.chain.functions, deviations, strict=True)):
+        for k, (function, deviation) in enumerate(
+            zip(model.chain.functions, deviations, strict=True)
+        ):
             if isinstance(deviation, Points):
-                columns[:, :, k] *= np.interp(points[:, function.axis], deviation.positions, deviation.values)[:, None]
+                columns[:, :, k] *= np.interp(
+                    points[:, function.axis], deviation.positions, deviation.values
+                )[:, None]
             else:
                 columns[:, :, k] *= deviation
         probing = np.broadcast_to(self.machine.probing * np.eye(3), (len(points), 3, 3))
@@ -136,8 +166,9 @@ class Volumetric:
     def lengths(self, starts: Array, ends: Array) -> LengthErrors:
         """Errors of distances between points (m, 3).
 
-        The two ends are approached one after the other: what an approach draws is independent at the two, also of a
-        function that has the same position at both. Squareness and temperature are wrong alike at both.
+        The two ends are approached one after the other: what an approach draws is independent at
+        the two, also of a function that has the same position at both. Squareness and temperature
+        are wrong alike at both.
         """
         difference = ends - starts
         nominal = np.linalg.norm(difference, axis=1)
@@ -159,7 +190,10 @@ class Volumetric:
     def diagonals(self) -> LengthErrors:
         """Length errors of the four body diagonals."""
         ends = np.array([self.machine.lower, self.machine.upper])
-        starts, stops = (np.array([[ends[one[way][k], k] for k in range(3)] for one in DIAGONALS]) for way in (0, 1))
+        starts, stops = (
+            np.array([[ends[one[way][k], k] for k in range(3)] for one in DIAGONALS])
+            for way in (0, 1)
+        )
         return self.lengths(starts, stops)
 
     def grid(self, counts: tuple[int, int, int]) -> Array:
@@ -183,9 +217,11 @@ def between(start: Array, end: Array, count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class AlongAxis:
-    """A parametric error along its axis: at `positions` (m,), as stated, at the reference point, and deviation.
+    """A parametric error along its axis: at `positions` (m,), as stated, at the reference point,
+    and deviation.
 
-    `stated` and `values` are None of an error that is random alone; `measured` has the positions and values of a table.
+    `stated` and `values` are None of an error that is random alone; `measured` has the positions
+    and values of a table.
     """
 
     error: ParametricError
@@ -209,7 +245,9 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
         positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], ALONG)
         table = error.shape if isinstance(error.shape, Points) else None
         if table is not None:
-            positions = np.union1d(positions, [x for x in table.positions if positions[0] <= x <= positions[-1]])
+            positions = np.union1d(
+                positions, [x for x in table.positions if positions[0] <= x <= positions[-1]]
+            )
         t = machine.scaled(error.axis, positions)
         shape = stated_function(machine, error)
         deviation = error.deviation
@@ -219,11 +257,15 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
                 positions,
                 None if shape is None else shape.values(t)[:, 0],
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
-                None
-                if deviation is None
-                else np.interp(positions, deviation.positions, deviation.values)
-                if isinstance(deviation, Points)
-                else np.full(len(positions), deviation),
+                (
+                    None
+                    if deviation is None
+                    else (
+                        np.interp(positions, deviation.positions, deviation.values)
+                        if isinstance(deviation, Points)
+                        else np.full(len(positions), deviation)
+                    )
+                ),
                 table,
             )
         )

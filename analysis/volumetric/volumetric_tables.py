@@ -17,7 +17,9 @@ from ballplate.simulator.numerics.rounding import comparable
 from ..results.formatting import SHOWN, aligned, number
 from .volumetric_errors import AlongAxis, LengthErrors, Volumetric, VolumetricErrors, along_axes
 
-CONVENTION = "errors are where the tip is, less where the scales say: corrections, to be added to readings"
+CONVENTION = (
+    "errors are where the tip is, less where the scales say: corrections, to be added to readings"
+)
 RANDOM = "random: one standard deviation; what each approach draws and what lasts, in quadrature"
 
 
@@ -32,9 +34,20 @@ def machine_lines(built: Volumetric) -> list[str]:
         factor = 1e6
         random = "" if one.deviation is None else number(factor * float(one.deviation.max()))
         found = "" if one.values is None else number(factor * one.range)
-        cells = [one.error.name, symbol(one.error.name), meaning(one.error.name), found, random, SHOWN[unit]]
+        cells = [
+            one.error.name,
+            symbol(one.error.name),
+            meaning(one.error.name),
+            found,
+            random,
+            SHOWN[unit],
+        ]
         rows.append([*cells, _stated_as(one)])
-    lines += aligned(rows, [False, False, False, True, True, False, False]) if len(rows) > 1 else ["no errors of axes"]
+    lines += (
+        aligned(rows, [False, False, False, True, True, False, False])
+        if len(rows) > 1
+        else ["no errors of axes"]
+    )
     others = _others(built)
     lines += ["", *aligned(others, [False, False, False, True, False])] if others else []
     return [*lines, *(["", RANDOM] if built.is_random else [])]
@@ -42,7 +55,10 @@ def machine_lines(built: Volumetric) -> list[str]:
 
 def _chain(arrangement: Arrangement) -> str:
     sides = []
-    for side, load in ((arrangement.probe_side, "the probe"), (arrangement.workpiece_side, "the workpiece")):
+    for side, load in (
+        (arrangement.probe_side, "the probe"),
+        (arrangement.workpiece_side, "the workpiece"),
+    ):
         if side:
             sides.append(" carries ".join([*side, load]))
     return ", ".join(sides)
@@ -52,7 +68,11 @@ def _stated_as(one: AlongAxis) -> str:
     error = one.error
     if one.values is None:
         return "random"
-    form = f"table of {len(one.measured.positions)} points" if one.measured is not None else "polynomial"
+    form = (
+        f"table of {len(one.measured.positions)} points"
+        if one.measured is not None
+        else "polynomial"
+    )
     if error.line is not None and not error.is_rotation:
         others = [k for k in range(3) if k != error.axis]
         form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)
@@ -62,12 +82,22 @@ def _stated_as(one: AlongAxis) -> str:
 def why_not_along(name: str, built: Volumetric, file: str) -> str:
     """Why there is no parametric error of that name along an axis."""
     stated = {one.name for one in built.machine.errors}
-    value = {parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}" for parameter, size in _numbers(built)}
+    value = {
+        parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}"
+        for parameter, size in _numbers(built)
+    }
     if name in SQUARENESS:
-        told = f"{value[name]} at the reference point, in the table without --error" if name in value else "not stated"
+        told = (
+            f"{value[name]} at the reference point, in the table without --error"
+            if name in value
+            else "not stated"
+        )
         return f"{name} is the {meaning(name)}, a single number: {told}"
     if name in NAMES:
-        return f"{file} does not state {name}, {meaning(name)}; it is zero (stated: {listing(sorted(stated))})"
+        return (
+            f"{file} does not state {name}, {meaning(name)}; it is zero (stated:"
+            f" {listing(sorted(stated))})"
+        )
     return f'{file} states no error "{name}"; {hint(name, stated)}'
 
 
@@ -78,7 +108,13 @@ def _others(built: Volumetric) -> list[list[str]]:
         square = parameter.name.startswith("E")
         unit = "ppm" if parameter.unit == "1" else SHOWN[parameter.unit]
         rows.append(
-            [parameter.name, symbol(parameter.name) if square else "", _told(parameter), number(1e6 * value), unit]
+            [
+                parameter.name,
+                symbol(parameter.name) if square else "",
+                _told(parameter),
+                number(1e6 * value),
+                unit,
+            ]
         )
     return rows
 
@@ -99,18 +135,42 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
 def diagonal_lines(found: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
     is_random = bool(found.deviation.any())
-    rows = [["body diagonal", "from", "to", "length, mm", "error, um", *(["random, um"] if is_random else [])]]
+    rows = [
+        [
+            "body diagonal",
+            "from",
+            "to",
+            "length, mm",
+            "error, um",
+            *(["random, um"] if is_random else []),
+        ]
+    ]
     for k in range(len(found.error)):
-        ends = [f"({', '.join(_millimetres(v) for v in point)})" for point in (found.starts[k], found.ends[k])]
+        ends = [
+            f"({', '.join(_millimetres(v) for v in point)})"
+            for point in (found.starts[k], found.ends[k])
+        ]
         told = [float(found.error[k]), *([float(found.deviation[k])] if is_random else [])]
-        rows.append([str(k + 1), *ends, f"{1e3 * found.nominal[k]:.3f}", *(number(1e6 * value) for value in told)])
+        rows.append(
+            [
+                str(k + 1),
+                *ends,
+                f"{1e3 * found.nominal[k]:.3f}",
+                *(number(1e6 * value) for value in told),
+            ]
+        )
     return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
 
 
 def length_line(found: LengthErrors) -> str:
     """The length error of a single line."""
-    random = f", random {number(1e6 * float(found.deviation[0]))} um" if found.deviation.any() else ""
-    return f"length {1e3 * found.nominal[0]:.3f} mm, length error {number(1e6 * float(found.error[0]))} um{random}"
+    random = (
+        f", random {number(1e6 * float(found.deviation[0]))} um" if found.deviation.any() else ""
+    )
+    return (
+        f"length {1e3 * found.nominal[0]:.3f} mm, length error"
+        f" {number(1e6 * float(found.error[0]))} um{random}"
+    )
 
 
 def error_lines(found: VolumetricErrors) -> list[str]:
@@ -122,7 +182,9 @@ def error_lines(found: VolumetricErrors) -> list[str]:
         found.points, found.systematic, found.resultant, found.deviation, strict=True
     ):
         cells = [_millimetres(value) for value in point]
-        cells += [_fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))]
+        cells += [
+            _fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
+        ]
         rows.append(cells)
     return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(found)]
 
@@ -130,21 +192,31 @@ def error_lines(found: VolumetricErrors) -> list[str]:
 def extreme_lines(found: VolumetricErrors) -> list[str]:
     """Ranges of the components, and the largest resultant."""
     worst = int(comparable(found.resultant).argmax())
-    at = ", ".join(f"{axis} = {format_length(v)}" for axis, v in zip(AXES, found.points[worst].tolist(), strict=True))
+    at = ", ".join(
+        f"{axis} = {format_length(v)}"
+        for axis, v in zip(AXES, found.points[worst].tolist(), strict=True)
+    )
     bands = ", ".join(
-        f"{axis.upper()} {number(1e6 * float(np.ptp(found.systematic[:, k])))}" for k, axis in enumerate(AXES)
+        f"{axis.upper()} {number(1e6 * float(np.ptp(found.systematic[:, k])))}"
+        for k, axis in enumerate(AXES)
     )
     resultant = found.resultant
     return [
-        f"range in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
-        f"largest resultant {number(1e6 * float(resultant[worst]))} um at {at}",
+        (
+            f"range in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
+            f"largest resultant {number(1e6 * float(resultant[worst]))} um at {at}"
+        ),
     ]
 
 
 def along_lines(one: AlongAxis) -> list[str]:
     """A parametric error along its axis."""
     unit = SHOWN["rad" if one.error.is_rotation else "m"]
-    columns = [("stated", one.stated), ("at the reference point", one.values), ("random", one.deviation)]
+    columns = [
+        ("stated", one.stated),
+        ("at the reference point", one.values),
+        ("random", one.deviation),
+    ]
     given = [(name, values) for name, values in columns if values is not None]
     positions = one.positions
     keep = (
@@ -155,10 +227,19 @@ def along_lines(one: AlongAxis) -> list[str]:
     axis = one.error.name[2].lower()
     rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name, _ in given)]]
     for k in keep:
-        rows.append([_millimetres(float(positions[k])), *(_fixed(float(1e6 * values[k]), 3) for _, values in given)])
+        rows.append(
+            [
+                _millimetres(float(positions[k])),
+                *(_fixed(float(1e6 * values[k]), 3) for _, values in given),
+            ]
+        )
     head = f"{one.error.name} {symbol(one.error.name)}: {meaning(one.error.name)}"
     band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"
-    told = [] if one.values is None else [f"stated as {_stated_as(one)}; {_line_stated(one)}".rstrip("; ")]
+    told = (
+        []
+        if one.values is None
+        else [f"stated as {_stated_as(one)}; {_line_stated(one)}".rstrip("; ")]
+    )
     return [head + band, *told, *aligned(rows, [True] * len(rows[0]))]
 
 
@@ -170,8 +251,16 @@ def _line_stated(one: AlongAxis) -> str:
 
 def error_csv(found: VolumetricErrors) -> Iterator[str]:
     """Errors as lines of a CSV file."""
-    yield "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um,random_x_um,random_y_um,random_z_um"
-    columns = (1e3 * found.points, 1e6 * found.systematic, 1e6 * found.resultant[:, None], 1e6 * found.deviation)
+    yield (
+        "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um,"
+        "random_x_um,random_y_um,random_z_um"
+    )
+    columns = (
+        1e3 * found.points,
+        1e6 * found.systematic,
+        1e6 * found.resultant[:, None],
+        1e6 * found.deviation,
+    )
     for row in np.concatenate(columns, axis=1).tolist():
         yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
@@ -182,7 +271,9 @@ def along_csv(one: AlongAxis) -> Iterator[str]:
     columns = [("stated", one.stated), (one.error.name, one.values), ("random", one.deviation)]
     given = [(name, values) for name, values in columns if values is not None]
     yield ",".join(["position_mm", *(f"{name}_{unit}" for name, _ in given)])
-    for row in np.column_stack([1e3 * one.positions, *(1e6 * values for _, values in given)]).tolist():
+    for row in np.column_stack(
+        [1e3 * one.positions, *(1e6 * values for _, values in given)]
+    ).tolist():
         yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
 

@@ -1,15 +1,17 @@
 """Examples that run when the pages are built, so that what the pages show is what the program says.
 
-Each page has a folder of its own with a copy of the designs, in which its examples follow one another:
+Each page has a folder of its own with a copy of the designs, in which its examples follow one
+another:
 
-`{console}`      lines that begin with `$ ` are commands, and their output follows them. `:status:` is the exit status
-                 of the last one, any other ends the build. Of its output `:only:` shows lines with a pattern, `:from:`
-                 what follows the first such line, `:shown:` so many lines.
-`{file} NAME`    writes a file and shows it.
-`{edit} NAME`    changes a file, as a difference: lines with `-` go, lines with `+` come, others stay.
-`{python-run}`   runs a program and shows what it prints. `:continued:` goes on where the page's last program has ended,
-                 with its names, as the cells of a notebook do.
-`{picture} NAME` shows an SVG or PNG file that an example has written, with `:alt:` for those who do not see it and its
+`{console}`      lines that begin with `$ ` are commands, and their output follows them. `:status:`
+                 is the exit status of the last one, any other ends the build. Of its output
+                 `:only:` shows lines with a pattern, `:from:` what follows the first such line,
+                 `:shown:` so many lines.
+`{file} NAME`    writes a file and shows it. `{edit} NAME`    changes a file, as a difference: lines
+with `-` go, lines with `+` come, others stay. `{python-run}`   runs a program and shows what it
+prints. `:continued:` goes on where the page's last program has ended,
+                 with its names, as the cells of a notebook do. `{picture} NAME` shows an SVG or PNG
+file that an example has written, with `:alt:` for those who do not see it and its
                  text below.
 """
 
@@ -35,8 +37,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-# One thread, so that the last digits are the same in every build; NumPy asks for it when it is loaded.
-os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+# One thread, so that the last digits are the same in every build; NumPy asks for it when it is
+# loaded.
+os.environ.update(
+    dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+)
 
 from docutils import nodes
 from docutils.parsers.rst import directives
@@ -50,7 +55,13 @@ PICTURES = {".svg": "image/svg+xml", ".png": "image/png"}
 # Where a program leaves its names for the next one, in the page's folder.
 NAMES = ".names"
 LANGUAGES = {".yaml": "yaml", ".yml": "yaml", ".py": "python"}
-TERMINAL = {"COLUMNS": "100", "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "PYTHONPATH": str(TOP), "TERM": "dumb"}
+TERMINAL = {
+    "COLUMNS": "100",
+    "LC_ALL": "C.UTF-8",
+    "NO_COLOR": "1",
+    "PYTHONPATH": str(TOP),
+    "TERM": "dumb",
+}
 # What the commands load when they are run; loaded before, it takes no time for each of them.
 LOADED_BEFORE = (
     "ballplate.checking.github",
@@ -92,7 +103,11 @@ class _Example(SphinxDirective):
             raise self.refuse(f"{what}\nexit status {status} instead of {expected}:\n{text}")
         text = text.replace("\r\n", "\n").replace(f"{self.folder}/", "")
         # What a progress bar has drawn is cleared again.
-        return [line.rpartition("\r")[2].rstrip() for line in text.rstrip("\n").split("\n")] if text else []
+        return (
+            [line.rpartition("\r")[2].rstrip() for line in text.rstrip("\n").split("\n")]
+            if text
+            else []
+        )
 
 
 class Console(_Example):
@@ -147,7 +162,9 @@ class Edit(_Example):
         old = "".join(f"{line[1:]}\n" for line in self.content if line[:1] in "- ")
         new = "".join(f"{line[1:]}\n" for line in self.content if line[:1] in "+ ")
         if text.count(old) != 1:
-            raise self.refuse(f"{path.name} has these lines {text.count(old)} times instead of once:\n{old}")
+            raise self.refuse(
+                f"{path.name} has these lines {text.count(old)} times instead of once:\n{old}"
+            )
         path.write_text(text.replace(old, new), encoding="utf-8")
         block = nodes.literal_block("", "\n".join(self.content), language="diff")
         return [container_wrapper(self, block, path.name)]
@@ -163,7 +180,9 @@ class PythonRun(_Example):
             names.unlink(missing_ok=True)
         lines = self.execute(source, lambda: _program(source, names))
         blocks: list[nodes.Node] = [nodes.literal_block("", source, language="python")]
-        return blocks + ([nodes.literal_block("", "\n".join(lines), language="text")] if lines else [])
+        return blocks + (
+            [nodes.literal_block("", "\n".join(lines), language="text")] if lines else []
+        )
 
 
 class Picture(_Example):
@@ -173,12 +192,18 @@ class Picture(_Example):
     def run(self) -> list[nodes.Node]:
         path = self.folder / self.arguments[0]
         if "alt" not in self.options or path.suffix not in PICTURES or not path.is_file():
-            raise self.refuse(f"{self.arguments[0]} is no SVG or PNG file that an example has written, or has no :alt:")
-        # As an address the picture keeps its ids to itself, and needs no file that outlives the page's folder.
+            raise self.refuse(
+                f"{self.arguments[0]} is no SVG or PNG file that an example has written, or has no"
+                " :alt:"
+            )
+        # As an address the picture keeps its ids to itself, and needs no file that outlives the
+        # page's folder.
         data = base64.b64encode(path.read_bytes()).decode("ascii")
         alt = html.escape(self.options["alt"], quote=True)
         figure = nodes.figure()
-        figure += nodes.raw("", f'<img src="data:{PICTURES[path.suffix]};base64,{data}" alt="{alt}">', format="html")
+        figure += nodes.raw(
+            "", f'<img src="data:{PICTURES[path.suffix]};base64,{data}" alt="{alt}">', format="html"
+        )
         if self.content:
             caption = nodes.caption()
             parsed, messages = self.parse_inline("\n".join(self.content))
@@ -203,13 +228,21 @@ def _command(command: str) -> Callable[[], int]:
 class _Pickler(pickle.Pickler):
     def reducer_override(self, value: Any) -> Any:
         """Modules are imported again."""
-        return (importlib.import_module, (value.__name__,)) if isinstance(value, ModuleType) else NotImplemented
+        return (
+            (importlib.import_module, (value.__name__,))
+            if isinstance(value, ModuleType)
+            else NotImplemented
+        )
 
 
 def _program(source: str, path: Path) -> int:
-    """Run a program with the names that the last one has left in a file, and leave its own, but for what stays open."""
+    """Run a program with the names that the last one has left in a file, and leave its own, but for
+    what stays open.
+    """
     kept: dict[str, bytes] = pickle.loads(path.read_bytes()) if path.exists() else {}
-    names: dict[str, Any] = {"__name__": "__main__"} | {name: pickle.loads(value) for name, value in kept.items()}
+    names: dict[str, Any] = {"__name__": "__main__"} | {
+        name: pickle.loads(value) for name, value in kept.items()
+    }
     exec(source, names)
     for name in [name for name in names if not name.startswith("__")]:
         found = io.BytesIO()
@@ -230,7 +263,9 @@ def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
             os.chdir(folder)
             os.environ.update(TERMINAL, PATH=f"{tools}:{os.environ['PATH']}")
             os.environ.pop("GITHUB_WORKSPACE", None)
-            sys.stdout, sys.stderr = (os.fdopen(i, "w", buffering=1, encoding="utf-8") for i in (1, 2))
+            sys.stdout, sys.stderr = (
+                os.fdopen(i, "w", buffering=1, encoding="utf-8") for i in (1, 2)
+            )
             sys.path.insert(0, str(TOP))
             status = action()
             sys.stdout.flush()
@@ -266,7 +301,9 @@ def _tools() -> str:
         _TOOLS.append(tempfile.TemporaryDirectory(prefix="ballplate-docs-"))
         program = Path(_TOOLS[0].name, "ballplate")
         code = "import sys; from ballplate.cli import main; sys.exit(main())"
-        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -c {shlex.quote(code)} "$@"\n', "utf-8")
+        program.write_text(
+            f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -c {shlex.quote(code)} "$@"\n', "utf-8"
+        )
         program.chmod(0o755)
     return _TOOLS[0].name
 

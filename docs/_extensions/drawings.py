@@ -1,7 +1,8 @@
 """The drawings of docs/pictures: `python docs/_extensions/drawings.py` draws them anew.
 
-Positions of plates, names of balls, chains of axes and uncertainties are those that the program computes. Drawings are
-dark on white, so that they can be read in light and dark pages and on paper, and no meaning rests on colour alone.
+Positions of plates, names of balls, chains of axes and uncertainties are those that the program
+computes. Drawings are dark on white, so that they can be read in light and dark pages and on paper,
+and no meaning rests on colour alone.
 """
 
 from __future__ import annotations
@@ -43,10 +44,13 @@ class Drawing:
             f'<rect width="{width}" height="{height}" fill="white"/>',
         ]
 
-    def line(self, points: Sequence[Point], colour: str = INK, width: float = 1.2, dash: str = "") -> None:
+    def line(
+        self, points: Sequence[Point], colour: str = INK, width: float = 1.2, dash: str = ""
+    ) -> None:
         dashes = f' stroke-dasharray="{dash}"' if dash else ""
         self.elements.append(
-            f'<polyline points="{_places(points)}" fill="none" stroke="{colour}" stroke-width="{width}"{dashes}/>'
+            f'<polyline points="{_places(points)}" fill="none" stroke="{colour}"'
+            f' stroke-width="{width}"{dashes}/>'
         )
 
     def area(self, points: Sequence[Point], colour: str = PLATE, opacity: float = 0.6) -> None:
@@ -55,10 +59,13 @@ class Drawing:
             f'fill-opacity="{opacity}" stroke="{colour}" stroke-width="1.2"/>'
         )
 
-    def circle(self, place: Point, radius: float, fill: str = INK, edge: str = "none", dash: str = "") -> None:
+    def circle(
+        self, place: Point, radius: float, fill: str = INK, edge: str = "none", dash: str = ""
+    ) -> None:
         dashes = f' stroke-dasharray="{dash}"' if dash else ""
         self.elements.append(
-            f'<circle cx="{place[0]:.1f}" cy="{place[1]:.1f}" r="{radius:.1f}" fill="{fill}" stroke="{edge}"{dashes}/>'
+            f'<circle cx="{place[0]:.1f}" cy="{place[1]:.1f}" r="{radius:.1f}" fill="{fill}"'
+            f' stroke="{edge}"{dashes}/>'
         )
 
     def text(
@@ -82,7 +89,8 @@ class Drawing:
         neck = end - 8 * along
         self.line([start, neck], colour, width)
         self.elements.append(
-            f'<polygon points="{_places([end, neck + 4 * across, neck - 4 * across])}" fill="{colour}"/>'
+            f'<polygon points="{_places([end, neck + 4 * across, neck - 4 * across])}"'
+            f' fill="{colour}"/>'
         )
 
     def dimension(self, start: Point, end: Point, colour: str = WARM) -> None:
@@ -151,7 +159,9 @@ def _grid(columns: int, rows: int, width: str, height: str) -> BallLayout:
 
 
 def placement() -> Drawing:
-    """Plane, level and corner in the volume; corner, centre and quarter turns seen along the normal."""
+    """Plane, level and corner in the volume; corner, centre and quarter turns seen along the
+    normal.
+    """
     drawing = Drawing(860, 600, "Plane, level, corner, centre, quarter turns and names of balls")
     layout = _grid(4, 3, "600 mm", "400 mm")
     examples = (("z", 0.5, (0.25, 0.3)), ("x", 0.5, (0.3, 0.25)), ("y", 0.5, (0.25, 0.3)))
@@ -160,7 +170,10 @@ def placement() -> Drawing:
     drawing.line([(20, 325), (840, 325)], PALE, 0.8)
     for turns in range(4):
         _turn_panel(drawing, 30 + 210 * turns, layout, turns)
-    note = "Seen against the plane's normal. The corner is where the turned plate has its smallest co-ordinates."
+    note = (
+        "Seen against the plane's normal. The corner is where the turned plate has its smallest"
+        " co-ordinates."
+    )
     drawing.text((20, 588), note, NOTE, 11)
     return drawing
 
@@ -258,8 +271,8 @@ def arrangements() -> Drawing:
         _chain_panel(drawing, 10 + 170 * column, 10 + 252 * row, name)
     drawing.text(
         (20, 522),
-        "Each block stands on what carries it and moves everything above it. Arrows show how it moves: "
-        "x to the right, y away from you, z up.",
+        "Each block stands on what carries it and moves everything above it. Arrows show how it"
+        " moves: x to the right, y away from you, z up.",
         NOTE,
         12,
     )
@@ -292,7 +305,9 @@ def _chain_panel(drawing: Drawing, left: float, top: float, name: str) -> None:
         drawing.line([(left + x + 6, ground), (left + x, ground + 7)], PALE, 0.8)
 
 
-def _axis_block(drawing: Drawing, middle: float, top: float, height: float, axis: str, colour: str) -> None:
+def _axis_block(
+    drawing: Drawing, middle: float, top: float, height: float, axis: str, colour: str
+) -> None:
     corners = ((-34, 0), (34, 0), (34, height), (-34, height))
     drawing.area([(middle + x, top + y) for x, y in corners], colour, 1)
     drawing.text((middle - 24, top + height / 2 + 6), axis, size=16, weight="bold")
@@ -344,7 +359,10 @@ def _error_panel(drawing: Drawing, left: float, corrected: bool) -> None:
         drawing.circle(scale, 3.5, INK)
         drawing.text(true + np.array([16.0, -6.0]), "e(x)", WARM, 14)
         drawing.text(scale + np.array([-8.0, 15.0]), "x", INK, 14, "end")
-        words = ("Dashed: what the scales say; blue: where", "the tip is. U4 counts each component of e(x).")
+        words = (
+            "Dashed: what the scales say; blue: where",
+            "the tip is. U4 counts each component of e(x).",
+        )
     else:
         ends = [at(_bent(point)) for point in ((0.12, 0.2), (0.83, 0.7))]
         drawing.line(ends, WARM, 2.2)
@@ -352,7 +370,10 @@ def _error_panel(drawing: Drawing, left: float, corrected: bool) -> None:
             drawing.circle(end, 9, FILLS[WARM], WARM, "3 2")
             drawing.circle(end, 3.5, INK)
         drawing.text((ends[0] + ends[1]) / 2 + np.array([-14.0, -8.0]), "length", WARM, 14, "end")
-        words = ("Two readings, each corrected by e(x). The", "choice of the frame does not matter.")
+        words = (
+            "Two readings, each corrected by e(x). The",
+            "choice of the frame does not matter.",
+        )
     for number, line in enumerate(words):
         drawing.text((left - 10, 290 + 16 * number), line, NOTE, 11)
 
@@ -401,7 +422,9 @@ def _bars(drawing: Drawing, left: float, experiment: ballplate.Experiment) -> No
     drawing.text((left, 30), "The uncertainty it will achieve", size=15, weight="bold")
     for number, (symbol, words) in enumerate(rows):
         top = 62 + 72 * number
-        average, maximum = (1e6 * value for value in (quantities[symbol].average, quantities[symbol].maximum))
+        average, maximum = (
+            1e6 * value for value in (quantities[symbol].average, quantities[symbol].maximum)
+        )
         drawing.text((left, top), f"{symbol}  {words}", size=13)
         box = ((0, 8), (1, 8), (1, 28), (0, 28))
         drawing.area([(left + scale * maximum * x, top + y) for x, y in box], PALE, 1)
@@ -409,7 +432,10 @@ def _bars(drawing: Drawing, left: float, experiment: ballplate.Experiment) -> No
         drawing.text((left + scale * average - 5, top + 23), f"{average:.2f}", INK, 12, "end")
         drawing.text((left + scale * maximum + 5, top + 23), f"{maximum:.2f} µm", INK, 12)
     for line, words in enumerate(
-        ("Standard uncertainty: average (blue) and largest (grey).", "Every reading repeats to 0.2 µm.")
+        (
+            "Standard uncertainty: average (blue) and largest (grey).",
+            "Every reading repeats to 0.2 µm.",
+        )
     ):
         drawing.text((left, 365 + 16 * line), words, NOTE, 12)
 

@@ -1,4 +1,5 @@
-"""Reference pages made from the program itself: what stands in their place is never written by hand.
+"""Reference pages made from the program itself: what stands in their place is never written by
+hand.
 
 A page says `<!-- file format -->` or `<!-- commands -->` where the reference is to stand.
 """
@@ -94,11 +95,15 @@ def _keys(whole: Schema) -> str:
 
 def units() -> str:
     """The units of quantities as Markdown."""
-    return "\n".join(f"- {kind}: {', '.join(f'`{unit}`' for unit in names)}" for kind, names in UNITS.items())
+    return "\n".join(
+        f"- {kind}: {', '.join(f'`{unit}`' for unit in names)}" for kind, names in UNITS.items()
+    )
 
 
 def _sections(whole: Schema) -> Iterator[tuple[str, list[str]]]:
-    """Names of the sections with the paths at which they stand, in the order in which a reader meets them."""
+    """Names of the sections with the paths at which they stand, in the order in which a reader
+    meets them.
+    """
     paths: dict[str, list[str]] = {}
 
     def visit(part: Schema, path: str) -> None:
@@ -126,7 +131,9 @@ def _references(part: Schema, path: str) -> Iterator[tuple[str, str]]:
 
 def _table(part: Schema, whole: Schema, sections: dict[str, list[str]]) -> list[str]:
     # Of the whole file the variants may supply what it leaves out.
-    required = part.get("required") or next((one["required"] for one in part.get("anyOf", ())[1:]), [])
+    required = part.get("required") or next(
+        (one["required"] for one in part.get("anyOf", ())[1:]), []
+    )
     lines = ["| key | value | default | meaning |", "|---|---|---|---|"]
     for name, below in part["properties"].items():
         if "default" in below and below["default"] not in ([], {}):
@@ -161,12 +168,18 @@ def _form(part: Schema, whole: Schema) -> str:
         return _list_form(part, whole)
     if kind == "object":
         below = part.get("additionalProperties")
-        return f"name → {_form(below, whole)}" if isinstance(below, dict) and below else "name → any value"
+        return (
+            f"name → {_form(below, whole)}"
+            if isinstance(below, dict) and below
+            else "name → any value"
+        )
     if kind == "string":
         return QUANTITIES.get(part.get("pattern", ""), "text")
     if kind == ["string", "integer"]:
         return "text"
-    words = {"integer": "whole number", "number": "number", "boolean": "`true` or `false`"}.get(str(kind), "any value")
+    words = {"integer": "whole number", "number": "number", "boolean": "`true` or `false`"}.get(
+        str(kind), "any value"
+    )
     return words + _range(part)
 
 
@@ -198,7 +211,9 @@ def _anchor(name: str, whole: Schema) -> str:
 def commands() -> str:
     """All commands with their options, as Markdown."""
     top = command_line()
-    (subparsers,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    (subparsers,) = (
+        action for action in top._actions if isinstance(action, argparse._SubParsersAction)
+    )
     lines = [*_usage(top), "", top.epilog or ""]
     for name, parser in subparsers.choices.items():
         lines += ["", f"## ballplate {name}", "", *_usage(parser), "", parser.description or ""]
@@ -218,7 +233,9 @@ def _usage(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def _invocation(action: argparse.Action) -> str:
-    value = action.metavar or (f"{{{','.join(action.choices)}}}" if action.choices else action.dest.upper())
+    value = action.metavar or (
+        f"{{{','.join(action.choices)}}}" if action.choices else action.dest.upper()
+    )
     value = "" if action.nargs == 0 else value
     return ", ".join(f"{option} {value}".strip() for option in action.option_strings) or str(value)
 

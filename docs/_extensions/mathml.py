@@ -1,4 +1,6 @@
-"""Formulas as MathML, which browsers show by themselves: without a script, and without a network."""
+"""Formulas as MathML, which browsers show by themselves: without a script, and without a
+network.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ def _inline(translator: Any, node: nodes.math) -> None:
 def _displayed(translator: Any, node: nodes.math_block) -> None:
     label = f' id="{escape(str(node["ids"][0]))}"' if node.get("ids") else ""
     number = f'<span class="eqno">({node["number"]})</span>' if node.get("number") else ""
-    translator.body.append(f'<div class="math"{label}>{number}{convert(node.astext(), display="block")}</div>')
+    translator.body.append(
+        f'<div class="math"{label}>{number}{convert(node.astext(), display="block")}</div>'
+    )
     raise nodes.SkipNode
 
 

@@ -1,4 +1,6 @@
-"""A laid-out experiment: every ball, position, probe, reading and calibration item as arrays in SI units."""
+"""A laid-out experiment: every ball, position, probe, reading and calibration item as arrays in SI
+units.
+"""
 
 from __future__ import annotations
 
@@ -24,15 +26,16 @@ class Design:
     """What an experiment consists of, in SI units and integer indices.
 
     Shapes: `repeatability` (d,), `probes` (l, d), `balls` (n, d) in the frame of their artefact,
-    `rotations` (k, d, d) and `origins` (k, d) with x = R y + o for nominal poses, `held` (k, pose size)
-    marking the pose parameters (origin, then rotation about the machine's axes) that fix a frame or that
-    turn an artefact of collinear balls about its own axis.
-    Balls and positions of length standards stand in the same lists; `is_plate` (artefacts,) tells which
-    artefacts are plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose pivots are:
-    the origins of their positions. `free_offsets` (l, d) marks the probe offsets that are parameters, None where none
-    is. `length_names` and `drawn_lengths` (in metres) are those of length standards without certificates, which are
-    parameters. `task_points` (t, 2, d) are what the scales say at the ends of the lengths that the machine is to
-    measure, `task_probes` (t, 2) what measures there, and `task_targets` (t,) what uncertainties are to be within.
+    `rotations` (k, d, d) and `origins` (k, d) with x = R y + o for nominal poses, `held` (k, pose
+    size) marking the pose parameters (origin, then rotation about the machine's axes) that fix a
+    frame or that turn an artefact of collinear balls about its own axis. Balls and positions of
+    length standards stand in the same lists; `is_plate` (artefacts,) tells which artefacts are
+    plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose
+    pivots are: the origins of their positions. `free_offsets` (l, d) marks the probe offsets that
+    are parameters, None where none is. `length_names` and `drawn_lengths` (in metres) are those of
+    length standards without certificates, which are parameters. `task_points` (t, 2, d) are what
+    the scales say at the ends of the lengths that the machine is to measure, `task_probes` (t, 2)
+    what measures there, and `task_targets` (t,) what uncertainties are to be within.
     """
 
     model: ErrorModel
@@ -104,7 +107,8 @@ class Design:
 
     @property
     def observations(self) -> int:
-        """Number of scalar observations: co-ordinates of all readings of plates, and calibration items.
+        """Number of scalar observations: co-ordinates of all readings of plates, and calibration
+        items.
 
         Of lengths that are read together only those count that do not follow from the others.
         """
@@ -114,11 +118,19 @@ class Design:
 
     @property
     def parameter_count(self) -> int:
-        """Number of free parameters: balls, poses less what is held, machine errors, probe offsets, unknown lengths."""
+        """Number of free parameters: balls, poses less what is held, machine errors, probe offsets,
+        unknown lengths.
+        """
         poses = int((~self.held[self.posed_positions]).sum())
         offsets = 0 if self.free_offsets is None else int(self.free_offsets.sum())
         lengths = len(self.length_names)
-        return self.dimension * len(self.plate_balls) + poses + len(self.model.parameters) + offsets + lengths
+        return (
+            self.dimension * len(self.plate_balls)
+            + poses
+            + len(self.model.parameters)
+            + offsets
+            + lengths
+        )
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
@@ -129,9 +141,11 @@ class Design:
 
 @dataclass(frozen=True)
 class State:
-    """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a` (parameters,).
+    """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a`
+    (parameters,).
 
-    `probes` (l, d) are the probe offsets, and `lengths` the unknown lengths, None where they are those of the design.
+    `probes` (l, d) are the probe offsets, and `lengths` the unknown lengths, None where they are
+    those of the design.
     """
 
     balls: Array
@@ -153,7 +167,9 @@ def probe_offsets(design: Design, state: State) -> Array:
 
 
 def reading_uncertainties(design: Design, readings: Readings) -> Array:
-    """Standard uncertainties (m, d) of each co-ordinate of a single one of each reading's repeats, in metres."""
+    """Standard uncertainties (m, d) of each co-ordinate of a single one of each reading's repeats,
+    in metres.
+    """
     if readings.uncertainty is not None:
         return readings.uncertainty
     return np.broadcast_to(design.repeatability, (len(readings), design.dimension))
@@ -161,7 +177,9 @@ def reading_uncertainties(design: Design, readings: Readings) -> Array:
 
 def nominal_state(design: Design) -> State:
     """The design as drawn, on a machine without errors."""
-    return State(design.balls, design.rotations, design.origins, np.zeros(len(design.model.parameters)))
+    return State(
+        design.balls, design.rotations, design.origins, np.zeros(len(design.model.parameters))
+    )
 
 
 def locations(design: Design, state: State, readings: Readings) -> Array:

@@ -1,10 +1,12 @@
-"""Whitening of lengths between balls that are read together, of which some share readings and some certificates.
+"""Whitening of lengths between balls that are read together, of which some share readings and some
+certificates.
 
-Lengths of one position and probe are v = B n - E u e to first order, measured less certified: n is the noise of the
-readings, B the directions of the lengths at their two ends, e the error of each certificate in its uncertainty u,
-and E tells which certificate a length has. B has a smaller rank than rows wherever there are more lengths than the
-balls have independent distances. What lies outside its range is free of noise and of anything that moves a ball: it
-tells how far certificates contradict one another, once for all positions that read the same lengths.
+Lengths of one position and probe are v = B n - E u e to first order, measured less certified: n is
+the noise of the readings, B the directions of the lengths at their two ends, e the error of each
+certificate in its uncertainty u, and E tells which certificate a length has. B has a smaller rank
+than rows wherever there are more lengths than the balls have independent distances. What lies
+outside its range is free of noise and of anything that moves a ball: it tells how far certificates
+contradict one another, once for all positions that read the same lengths.
 """
 
 from __future__ import annotations
@@ -21,18 +23,21 @@ from .whitening import Whitening, whitening
 if TYPE_CHECKING:
     from .observations import Lengths
 
-# Displacements that change lengths by less than this, compared with what changes them most, count as changing none:
-# how straight or flat a standard is, is not known so well, and their effect is of second order.
+# Displacements that change lengths by less than this, compared with what changes them most, count
+# as changing none: how straight or flat a standard is, is not known so well, and their effect is of
+# second order.
 FLAT = 1e-4
 
-# Certificates whose errors are below this fraction of the readings' noise are exact: whether they contradict one
-# another is beyond what lengths show to first order.
+# Certificates whose errors are below this fraction of the readings' noise are exact: whether they
+# contradict one another is beyond what lengths show to first order.
 EXACT_CERTIFICATE = 1e-3
 
-# Smaller uncertainties than this fraction of the noise, beside larger ones, make no difference any more.
+# Smaller uncertainties than this fraction of the noise, beside larger ones, make no difference any
+# more.
 SMALLEST = 1e-6
 
-# Singular values of equations about certificates below this fraction of the largest are those of equations told twice.
+# Singular values of equations about certificates below this fraction of the largest are those of
+# equations told twice.
 TOLD_TWICE = 1e-9
 
 
@@ -40,8 +45,9 @@ TOLD_TWICE = 1e-9
 class Together:
     """Lengths `rows` (m,) of one position and probe, in the order of their certificates.
 
-    `root` (m, r) makes of them r lengths whose noise is uncorrelated and has unit variance. `by_error` (r, m) is what
-    the errors of the certificates, in their uncertainties, change these by, less what the m lengths tell of them.
+    `root` (m, r) makes of them r lengths whose noise is uncorrelated and has unit variance.
+    `by_error` (r, m) is what the errors of the certificates, in their uncertainties, change these
+    by, less what the m lengths tell of them.
     """
 
     rows: Integers
@@ -53,7 +59,8 @@ class Together:
 class Consistency:
     """What lengths of the same certificates tell about the latter, wherever they are read together.
 
-    `rows` (k, m) are the same m lengths in k positions, `equations` (e, m) what of their mean is free of noise.
+    `rows` (k, m) are the same m lengths in k positions, `equations` (e, m) what of their mean is
+    free of noise.
     """
 
     rows: Integers
@@ -64,10 +71,11 @@ class Consistency:
 class JointWhitening:
     """Whitening of the lengths of one standard whose readings they share.
 
-    Of the errors of certificates, in their uncertainties, lengths that are read together tell q combinations without
-    noise: `known` (q, equations) makes these of the equations in `consistencies`. They come last, and `by_known` (r, q)
-    is what they take from the r rows before. `shared` (r, k) with `gain` (k,) is the root of what the other errors
-    leave correlated, (1 - shared diag(gain) shared').
+    Of the errors of certificates, in their uncertainties, lengths that are read together tell q
+    combinations without noise: `known` (q, equations) makes these of the equations in
+    `consistencies`. They come last, and `by_known` (r, q) is what they take from the r rows before.
+    `shared` (r, k) with `gain` (k,) is the root of what the other errors leave correlated, (1 -
+    shared diag(gain) shared').
     """
 
     together: tuple[Together, ...]
@@ -84,7 +92,10 @@ class JointWhitening:
         """Of all lengths' `rows` (lengths, k) uncorrelated ones (len, k) of unit variance."""
         told = [one.equations @ rows[one.rows].mean(axis=0) for one in self.consistencies]
         known = self.known @ np.concatenate([np.zeros((0, rows.shape[1])), *told])
-        first = np.concatenate([one.root.T @ rows[one.rows] for one in self.together]) - self.by_known @ known
+        first = (
+            np.concatenate([one.root.T @ rows[one.rows] for one in self.together])
+            - self.by_known @ known
+        )
         first = first - self.shared @ (self.gain[:, None] * (self.shared.T @ first))
         return np.concatenate([first, known])
 
@@ -109,8 +120,9 @@ class JointWhitening:
 class ByPosition:
     """Rows of lengths, position by position, in units of the readings' noise alone.
 
-    `length` (r,) is a length of each row's position, `rows` (r, k) are uncorrelated and of unit variance but for the
-    errors of certificates, in their uncertainties, and `by_error` (r, certificates) is the derivative by these.
+    `length` (r,) is a length of each row's position, `rows` (r, k) are uncorrelated and of unit
+    variance but for the errors of certificates, in their uncertainties, and `by_error` (r,
+    certificates) is the derivative by these.
     """
 
     length: Integers
@@ -120,7 +132,8 @@ class ByPosition:
 
 @dataclass(frozen=True)
 class LengthWhitening:
-    """Whitening of all lengths (m,) of a design: those `alone` (k,), by themselves, then each standard's `joint` ones.
+    """Whitening of all lengths (m,) of a design: those `alone` (k,), by themselves, then each
+    standard's `joint` ones.
 
     `scatter` (m,) is what the readings contribute to the standard uncertainty of each length.
     """
@@ -139,11 +152,16 @@ class LengthWhitening:
         if not self.joint:
             return self.single.whitened(rows)
         flat = rows.reshape(len(rows), -1)
-        parts = [self.single.whitened(flat[self.alone]), *(one.whitened(flat) for one in self.joint)]
+        parts = [
+            self.single.whitened(flat[self.alone]),
+            *(one.whitened(flat) for one in self.joint),
+        ]
         return np.concatenate(parts).reshape(-1, *rows.shape[1:])
 
     def pulled(self, rows: Array) -> Array:
-        """The transpose of `whitened`, which leads from whitened residuals (len, ...) to gradients (m, ...)."""
+        """The transpose of `whitened`, which leads from whitened residuals (len, ...) to gradients
+        (m, ...).
+        """
         if not self.joint:
             return self.single.pulled(rows)
         flat = rows.reshape(len(rows), -1)
@@ -158,15 +176,17 @@ class LengthWhitening:
     def by_position(self, given: Lengths, rows: Array) -> ByPosition:
         """Rows (r, k) of each position by itself, of lengths' `rows` (m, k).
 
-        No position makes use of what others tell of certificates that contradict one another; where all read the same
-        lengths of a standard there is nothing more to be told.
+        No position makes use of what others tell of certificates that contradict one another; where
+        all read the same lengths of a standard there is nothing more to be told.
         """
         alone = self.alone
         weight = 1.0 / np.where(given.with_repeatability, self.scatter, given.uncertainty)[alone]
         of_errors = np.zeros((len(alone), int(given.certificate.max(initial=-1)) + 1))
         scatters = np.flatnonzero(given.with_repeatability[alone])
         common = alone[scatters]
-        of_errors[scatters, given.certificate[common]] = -weight[scatters] * given.uncertainty[common]
+        of_errors[scatters, given.certificate[common]] = (
+            -weight[scatters] * given.uncertainty[common]
+        )
         length, found, by_error = [alone], [weight[:, None] * rows[alone]], [of_errors]
         for each in (one for joint in self.joint for one in joint.together):
             count = each.root.shape[1]
@@ -177,13 +197,18 @@ class LengthWhitening:
         return ByPosition(np.concatenate(length), np.concatenate(found), np.concatenate(by_error))
 
 
-def length_whitening(given: Lengths, noise: Array, standard: Integers, place: Integers) -> LengthWhitening:
-    """Whitening of lengths (m,) whose readings have the standard uncertainties `noise` (readings, d), in metres.
+def length_whitening(
+    given: Lengths, noise: Array, standard: Integers, place: Integers
+) -> LengthWhitening:
+    """Whitening of lengths (m,) whose readings have the standard uncertainties `noise` (readings,
+    d), in metres.
 
-    `standard` and `place` (m,) number the artefact, and the position and probe, of each length. Directions are the
-    nominal ones, so that weights stay what they are while parameters change.
+    `standard` and `place` (m,) number the artefact, and the position and probe, of each length.
+    Directions are the nominal ones, so that weights stay what they are while parameters change.
     """
-    variance = noise[given.first] ** 2 + np.where(given.to_pivot[:, None], 0.0, noise[given.second] ** 2)
+    variance = noise[given.first] ** 2 + np.where(
+        given.to_pivot[:, None], 0.0, noise[given.second] ** 2
+    )
     scatter = np.sqrt((given.direction**2 * variance).sum(axis=1)) * given.with_repeatability
     is_joint = given.with_repeatability & _shares_readings(given, standard)
     alone = np.flatnonzero(~is_joint)
@@ -205,7 +230,9 @@ def _shares_readings(given: Lengths, standard: Integers) -> NDArray[np.bool_]:
     return np.isin(standard, standard[shared]) & ~given.to_pivot
 
 
-def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integers) -> JointWhitening:
+def joint_whitening(
+    given: Lengths, noise: Array, place: Integers, chosen: Integers
+) -> JointWhitening:
     """Whitening of the lengths `chosen` (m,), all of one standard."""
     numbers, inverse = np.unique(given.certificate[chosen], return_inverse=True)
     certificate, count = inverse.ravel(), len(numbers)
@@ -229,7 +256,9 @@ def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integ
         own = certificate[np.searchsorted(chosen, same[0])]
         outside = _outside(groups[members[0]][1], uncertainty, size)
         if len(outside):
-            consistencies.append(Consistency(same, outside / np.maximum(uncertainty, SMALLEST * size)))
+            consistencies.append(
+                Consistency(same, outside / np.maximum(uncertainty, SMALLEST * size))
+            )
             told.append(np.zeros((len(outside), count)))
             told[-1][:, own] = outside
         for k in members:
@@ -247,10 +276,11 @@ def joint_whitening(given: Lengths, noise: Array, place: Integers, chosen: Integ
 
 
 def equation_root(given: Lengths, rows: Integers) -> Array:
-    """Root (m, r) that makes uncorrelated equations of those of the squares of lengths `rows` (m,) read together.
+    """Root (m, r) that makes uncorrelated equations of those of the squares of lengths `rows` (m,)
+    read together.
 
-    Noise is the same in all readings. An equation that shared no reading would keep the weight 1, were its length the
-    root mean square of all.
+    Noise is the same in all readings. An equation that shared no reading would keep the weight 1,
+    were its length the root mean square of all.
     """
     size = given.value[rows] / np.sqrt(2.0 * (given.value[rows] ** 2).mean())
     readings = int(max(given.first.max(), given.second.max())) + 1
@@ -258,8 +288,11 @@ def equation_root(given: Lengths, rows: Integers) -> Array:
     return np.asarray(np.linalg.solve(triangle.T, within.T).T)
 
 
-def _range_and_noise(given: Lengths, noise: Array, rows: Integers, size: Array | float = 1.0) -> tuple[Array, Array]:
-    """Basis (m, r) of what readings change of lengths `rows` (m,), each times its `size`, with a triangle (r, r).
+def _range_and_noise(
+    given: Lengths, noise: Array, rows: Integers, size: Array | float = 1.0
+) -> tuple[Array, Array]:
+    """Basis (m, r) of what readings change of lengths `rows` (m,), each times its `size`, with a
+    triangle (r, r).
 
     The noise of basis' lengths has the covariance triangle' triangle.
     """
@@ -270,7 +303,9 @@ def _range_and_noise(given: Lengths, noise: Array, rows: Integers, size: Array |
 
 
 def _directions(given: Lengths, noise: Array, rows: Integers) -> tuple[Array, Array]:
-    """What displacements of the readings change lengths `rows` (m,) by, (m, readings d): by a metre, and by noise."""
+    """What displacements of the readings change lengths `rows` (m,) by, (m, readings d): by a
+    metre, and by noise.
+    """
     ends = np.stack([given.first[rows], given.second[rows]])
     read, place = np.unique(ends, return_inverse=True)
     place = place.reshape(ends.shape)
@@ -288,7 +323,8 @@ def _range(along: Array) -> Array:
 
 
 def _outside(within: Array, uncertainty: Array, size: float) -> Array:
-    """Orthonormal combinations (m - r, m) of m errors, in their `uncertainty` (m,), that no reading bears upon.
+    """Orthonormal combinations (m - r, m) of m errors, in their `uncertainty` (m,), that no reading
+    bears upon.
 
     `within` (m, r) is the range of what readings change. None, where all certificates are exact.
     """
@@ -299,7 +335,8 @@ def _outside(within: Array, uncertainty: Array, size: float) -> Array:
 
 
 def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
-    """What makes of `equations` (e, c), some told twice, orthonormal ones: a matrix (q, e), and the latter (c, q).
+    """What makes of `equations` (e, c), some told twice, orthonormal ones: a matrix (q, e), and the
+    latter (c, q).
 
     Those `told_once`, of a single set of lengths, are orthonormal as they are.
     """

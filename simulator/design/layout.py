@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..experiment.model import CoordinateCalibration, DistanceCalibration, Experiment, Prior, RadiusCalibration
+from ..experiment.model import (
+    CoordinateCalibration,
+    DistanceCalibration,
+    Experiment,
+    Prior,
+    RadiusCalibration,
+)
 from ..geometry.artefacts import BryanGaugeSettings
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
@@ -20,7 +26,8 @@ from .observations import Coordinates, Distances, Priors, Readings
 DEFAULT_POINTS = 200
 DEFAULT_SEED = 1
 
-# Directions below this fraction of the largest do not count when a frame is fixed or a line recognised.
+# Directions below this fraction of the largest do not count when a frame is fixed or a line
+# recognised.
 FLAT = 1e-9
 
 
@@ -35,7 +42,9 @@ def lay_out(experiment: Experiment) -> Design:
     """
     machine, d = experiment.machine, experiment.dimension
     lower, upper = machine.volume.lower, machine.volume.upper
-    model = build_error_model(experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper)))
+    model = build_error_model(
+        experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper))
+    )
     artefacts = list(experiment.artefacts)
     layouts = [experiment.layouts[name] for name in artefacts]
     sizes = [len(layout.names) for layout in layouts]
@@ -44,7 +53,8 @@ def lay_out(experiment: Experiment) -> Design:
     for item in experiment.calibration:
         if isinstance(item, RadiusCalibration):
             own = slice(
-                first_ball[item.artefact], first_ball[item.artefact] + len(experiment.layouts[item.artefact].names)
+                first_ball[item.artefact],
+                first_ball[item.artefact] + len(experiment.layouts[item.artefact].names),
             )
             balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
     is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
@@ -93,12 +103,16 @@ def lay_out(experiment: Experiment) -> Design:
         point_probe=probe_index[experiment.evaluation.probe],
         priors=_priors(experiment, held, len(model.parameters)),
         free_offsets=_free_offsets(experiment),
-        is_gauge=np.array([isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]),
+        is_gauge=np.array(
+            [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+        ),
         length_names=length_names,
         drawn_lengths=drawn,
         task_names=tuple(task.name for task in tasks),
         task_points=np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
-        task_probes=np.array([[probe_index[name] for name in task.probes] for task in tasks], np.int64).reshape(-1, 2),
+        task_probes=np.array(
+            [[probe_index[name] for name in task.probes] for task in tasks], np.int64
+        ).reshape(-1, 2),
         task_targets=tuple(task.target for task in tasks),
     )
 
@@ -121,7 +135,10 @@ def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) ->
     messages = []
     for prior in given:
         if prior.position is not None and held[places.index(prior.position), prior.component]:
-            text = f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other positions'
+            text = (
+                f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other'
+                " positions"
+            )
             messages.append(prior.mark.message(prior.path, text))
     if messages:
         raise ExperimentError(messages)
@@ -130,7 +147,9 @@ def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) ->
         for axis in np.flatnonzero(np.isfinite(uncertainty)):
             value, u = float(experiment.probes[name][axis]), float(uncertainty[axis])
             label = f"probe {name}: offset {'xyz'[axis]}"
-            given.append(Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere))
+            given.append(
+                Prior(label, None, name, int(axis), np.zeros(parameters), value, u, nowhere)
+            )
     probes = list(experiment.probes)
     return Priors(
         tuple(prior.name for prior in given),
@@ -149,8 +168,12 @@ def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
     return np.asarray(lower + (upper - lower) * generator.random((count, len(lower))))
 
 
-def _readings(experiment: Experiment, first_ball: dict[str, int], probe_index: dict[str, int]) -> Readings:
-    """All readings in the order of the file, the same one named twice merged into one with more repeats."""
+def _readings(
+    experiment: Experiment, first_ball: dict[str, int], probe_index: dict[str, int]
+) -> Readings:
+    """All readings in the order of the file, the same one named twice merged into one with more
+    repeats.
+    """
     rows = []
     uncertainties = [experiment.machine.repeatability]
     for k, place in enumerate(experiment.positions):
@@ -162,12 +185,16 @@ def _readings(experiment: Experiment, first_ball: dict[str, int], probe_index: d
                 kind = len(uncertainties)
                 uncertainties.append(group.standard_uncertainty)
             for name in group.probes:
-                columns = np.full((len(balls), 5), (0, k, probe_index[name], kind, group.repeats), np.int64)
+                columns = np.full(
+                    (len(balls), 5), (0, k, probe_index[name], kind, group.repeats), np.int64
+                )
                 columns[:, 0] = balls
                 rows.append(columns)
     table = np.concatenate(rows)
     unique, first, inverse = np.unique(table[:, :4], axis=0, return_index=True, return_inverse=True)
-    repeats = np.bincount(inverse.ravel(), weights=table[:, 4], minlength=len(unique)).astype(np.int64)
+    repeats = np.bincount(inverse.ravel(), weights=table[:, 4], minlength=len(unique)).astype(
+        np.int64
+    )
     order = np.argsort(first, kind="stable")
     ball, position, probe, kind_of = unique[order].T
     uncertainty = np.array(uncertainties)[kind_of] if len(uncertainties) > 1 else None
@@ -191,7 +218,8 @@ def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
     plates = [
         (item, np.asarray(item.pairs + first_ball[item.artefact], np.int64))
         for item in experiment.calibration
-        if isinstance(item, DistanceCalibration) and experiment.artefacts[item.artefact].role == "plate"
+        if isinstance(item, DistanceCalibration)
+        and experiment.artefacts[item.artefact].role == "plate"
     ]
     return Distances(
         _integers([pairs[:, 0] for _, pairs in plates]),
@@ -212,10 +240,10 @@ def _held(
 ) -> NDArray[np.bool_]:
     """Which pose parameters are held (k, pose size).
 
-    An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it. As many
-    parameters of the artefact's first pose are held as are left free: all of them when only distances are
-    known, none with co-ordinates of three balls. Balls on one line leave the turn about it open in every pose, a
-    single ball every turn.
+    An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it.
+    As many parameters of the artefact's first pose are held as are left free: all of them when only
+    distances are known, none with co-ordinates of three balls. Balls on one line leave the turn
+    about it open in every pose, a single ball every turn.
     """
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
     for artefact in np.unique(position_artefact):
@@ -240,7 +268,9 @@ def _idle_turns(balls: Array) -> Array:
     """Motions (pose size, k) of an artefact about its centre that move none of its balls (n, d)."""
     d = balls.shape[1]
     centred = balls - balls.mean(axis=0)
-    moves = _motion_of_coordinates(np.repeat(centred, d, axis=0), np.tile(np.arange(d), len(balls)), d)
+    moves = _motion_of_coordinates(
+        np.repeat(centred, d, axis=0), np.tile(np.arange(d), len(balls)), d
+    )
     size = np.abs(centred).max(initial=0.0)
     if size == 0.0:
         return np.eye(pose_size(d))[:, d:]
@@ -249,7 +279,9 @@ def _idle_turns(balls: Array) -> Array:
 
 
 def _in_machine_axes(motions: Array, rotation: Array) -> Array:
-    """Motions (pose size, k) of an artefact's frame as changes of the pose that undo them: a shift and a turn."""
+    """Motions (pose size, k) of an artefact's frame as changes of the pose that undo them: a shift
+    and a turn.
+    """
     d = len(rotation)
     turned = rotation @ motions[d:] if d == 3 else motions[d:]
     return np.concatenate([rotation @ motions[:d], turned])
@@ -272,7 +304,8 @@ def _null_space(rows: Array) -> Array:
     """Orthonormal columns that span what the rows leave free."""
     if not len(rows):
         return np.eye(rows.shape[1])
-    # What the triangular factor leaves free, the rows do; their own decomposition grows with their number squared.
+    # What the triangular factor leaves free, the rows do; their own decomposition grows with their
+    # number squared.
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     _, values, directions = np.linalg.svd(triangle)
     rank = int((values > FLAT * values[0]).sum())
@@ -280,7 +313,9 @@ def _null_space(rows: Array) -> Array:
 
 
 def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
-    """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first, then largest."""
+    """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first,
+    then largest.
+    """
     chosen = np.zeros(len(motions), bool)
     waiting = [] if already is None else np.flatnonzero(already).tolist()
     left = motions.copy()

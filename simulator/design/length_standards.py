@@ -16,7 +16,9 @@ from .observations import Lengths, Readings
 
 @dataclass(frozen=True)
 class _Row:
-    """A length: indices of the readings of its ends (-1: pivot), its direction, and what is known of it."""
+    """A length: indices of the readings of its ends (-1: pivot), its direction, and what is known
+    of it.
+    """
 
     value: float
     certificate: tuple[object, int]
@@ -39,18 +41,21 @@ def standard_lengths(
 ) -> tuple[Lengths, tuple[str, ...], Array]:
     """The lengths of all standards, and names and drawn values of those that are unknown.
 
-    A length standard contributes each of its calibrated distances once for every position and probe with
-    which both its balls are read. The error of a certificate is the same in all of them, but where the readings'
-    repeatability is ignored: then the stated uncertainty stands for all that a length may be off, each time anew.
-    A Bryan gauge contributes its radius with every reading. Without a certificate the length of a ball bar and the
-    radius of a gauge are unknown, and the same wherever they are read.
+    A length standard contributes each of its calibrated distances once for every position and probe
+    with which both its balls are read. The error of a certificate is the same in all of them, but
+    where the readings' repeatability is ignored: then the stated uncertainty stands for all that a
+    length may be off, each time anew. A Bryan gauge contributes its radius with every reading.
+    Without a certificate the length of a ball bar and the radius of a gauge are unknown, and the
+    same wherever they are read.
     """
     artefacts = list(experiment.artefacts)
     rows: list[_Row] = []
     names: list[str] = []
     drawn: list[float] = []
     read: dict[tuple[int, int, int], int] = {}
-    standards = [k for k, one in enumerate(experiment.artefacts.values()) if one.role == "length_standard"]
+    standards = [
+        k for k, one in enumerate(experiment.artefacts.values()) if one.role == "length_standard"
+    ]
     for i in np.flatnonzero(np.isin(position_artefact[readings.position], standards)).tolist():
         read[int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])] = i
     anew = count()
@@ -66,7 +71,9 @@ def standard_lengths(
                     unit = along / np.sqrt(along @ along)
                     # What repeatability does not excuse is off anew each time.
                     own = kind.certificate if kind.scatters else ("anew", next(anew))
-                    yield replace(kind, first=first, second=second, direction=tuple(unit), certificate=own)
+                    yield replace(
+                        kind, first=first, second=second, direction=tuple(unit), certificate=own
+                    )
 
     def unknown(name: str, what: str, value: float) -> _Row:
         names.append(f"{name}: {what}")
@@ -76,8 +83,13 @@ def standard_lengths(
     certified = set()
     for i, item in enumerate(experiment.calibration):
         certified.add(item.artefact)
-        if isinstance(item, DistanceCalibration) and experiment.artefacts[item.artefact].role == "length_standard":
-            given = zip(item.pairs, item.values.tolist(), item.standard_uncertainties.tolist(), strict=True)
+        if (
+            isinstance(item, DistanceCalibration)
+            and experiment.artefacts[item.artefact].role == "length_standard"
+        ):
+            given = zip(
+                item.pairs, item.values.tolist(), item.standard_uncertainties.tolist(), strict=True
+            )
             is_projected, scatters = item.form == "projection", item.repeatability == "included"
             kinds = [
                 (_Row(value, (i, j), u, is_projected, scatters), first_ball[item.artefact] + pair)
@@ -85,12 +97,20 @@ def standard_lengths(
             ]
             rows += between(artefacts.index(item.artefact), kinds)
     for number, (name, settings) in enumerate(experiment.artefacts.items()):
-        if isinstance(settings, TwoSpheresSettings) and settings.role == "length_standard" and name not in certified:
+        if (
+            isinstance(settings, TwoSpheresSettings)
+            and settings.role == "length_standard"
+            and name not in certified
+        ):
             kind = unknown(name, "length", settings.length)
             rows += between(number, [(kind, first_ball[name] + np.array([0, 1]))])
         elif isinstance(settings, BryanGaugeSettings):
             known = [one for one in experiment.calibration if one.artefact == name]
-            kind = unknown(name, "radius", settings.radius) if not known else _certified_radius(name, known[0])
+            kind = (
+                unknown(name, "radius", settings.radius)
+                if not known
+                else _certified_radius(name, known[0])
+            )
             for k in np.flatnonzero(position_artefact[readings.position] == number):
                 along = rotations[readings.position[k]] @ balls[readings.ball[k]]
                 unit = along / np.sqrt(along @ along)

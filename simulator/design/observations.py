@@ -15,8 +15,8 @@ from ..machines.protocol import Array, Integers
 class Readings:
     """Which ball is read in which position with which probe, and how often; all arrays (m,).
 
-    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None where all
-    have the machine's repeatability.
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None
+    where all have the machine's repeatability.
     """
 
     ball: Integers
@@ -31,7 +31,13 @@ class Readings:
     def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
         """The readings at the given indices."""
         uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
-        return Readings(self.ball[chosen], self.position[chosen], self.probe[chosen], self.repeats[chosen], uncertainty)
+        return Readings(
+            self.ball[chosen],
+            self.position[chosen],
+            self.probe[chosen],
+            self.repeats[chosen],
+            uncertainty,
+        )
 
     def expanded(self) -> Readings:
         """One row for each repeat."""
@@ -73,12 +79,13 @@ class Coordinates:
 class Lengths:
     """Lengths of length standards read in the volume; arrays (m,), metres.
 
-    `first` and `second` index the readings that a length takes part in; `second` is -1 where the other end is the
-    pivot of a Bryan gauge, which is not read: the origin of the first reading's position. `projected` says whether the
-    difference of the corrected points is projected on the standard's nominal direction (m, d) instead of its
-    norm being taken; `with_repeatability` whether the readings' own scatter along that direction adds to
-    `uncertainty`. Lengths of the same `certificate`, counted from 0, share that error wherever they are read.
-    `free` is the number of the design's unknown length that a length is, -1 where its `value` is known.
+    `first` and `second` index the readings that a length takes part in; `second` is -1 where the
+    other end is the pivot of a Bryan gauge, which is not read: the origin of the first reading's
+    position. `projected` says whether the difference of the corrected points is projected on the
+    standard's nominal direction (m, d) instead of its norm being taken; `with_repeatability`
+    whether the readings' own scatter along that direction adds to `uncertainty`. Lengths of the
+    same `certificate`, counted from 0, share that error wherever they are read. `free` is the
+    number of the design's unknown length that a length is, -1 where its `value` is known.
     """
 
     first: Integers
@@ -101,7 +108,9 @@ class Lengths:
 
     def select(self, chosen: NDArray[np.bool_] | Integers) -> Lengths:
         """The lengths at the given indices."""
-        values: dict[str, Any] = {name: None if v is None else v[chosen] for name, v in vars(self).items()}
+        values: dict[str, Any] = {
+            name: None if v is None else v[chosen] for name, v in vars(self).items()
+        }
         return Lengths(**values)
 
 
@@ -109,10 +118,10 @@ class Lengths:
 class Priors:
     """What is known beforehand of shared parameters; arrays (m,), metres, radians or ratios.
 
-    Each row is about a pose parameter (`position` and `component`, by place among origin and rotation), about a probe
-    offset (`probe` and `component`), or about a linear function of the model's parameters, `by_model` (m, n);
-    indices that do not apply are -1. Origins and offsets are told as co-ordinates, pose angles as deviations
-    from the nominal pose.
+    Each row is about a pose parameter (`position` and `component`, by place among origin and
+    rotation), about a probe offset (`probe` and `component`), or about a linear function of the
+    model's parameters, `by_model` (m, n); indices that do not apply are -1. Origins and offsets are
+    told as co-ordinates, pose angles as deviations from the nominal pose.
     """
 
     names: tuple[str, ...]

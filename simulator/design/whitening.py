@@ -11,12 +11,13 @@ from ..machines.protocol import Array, Integers
 
 @dataclass(frozen=True)
 class Whitening:
-    """The symmetric root of an inverse covariance, diagonal but for errors that the rows of a group share.
+    """The symmetric root of an inverse covariance, diagonal but for errors that the rows of a group
+    share.
 
-    The covariance of m rows is diag(s^2) + u u' within a group, where u are standard uncertainties of the shared error.
-    With v = u / s its inverse root is (1 - c v v') diag(1/s), taken group by group, where
-    c = (1 - 1 / sqrt(1 + v'v)) / v'v.
-    `own` (m,) are the s, `direction` (m,) the v times the square root of c, `group` (m,) counts from 0.
+    The covariance of m rows is diag(s^2) + u u' within a group, where u are standard uncertainties
+    of the shared error. With v = u / s its inverse root is (1 - c v v') diag(1/s), taken group by
+    group, where c = (1 - 1 / sqrt(1 + v'v)) / v'v. `own` (m,) are the s, `direction` (m,) the v
+    times the square root of c, `group` (m,) counts from 0.
     """
 
     own: Array
@@ -31,7 +32,9 @@ class Whitening:
         return self._projected(rows / _along(self.own, rows))
 
     def pulled(self, rows: Array) -> Array:
-        """The transpose of `whitened`, which leads from whitened residuals (m, ...) to gradients."""
+        """The transpose of `whitened`, which leads from whitened residuals (m, ...) to
+        gradients.
+        """
         return np.asarray(self._projected(rows) / _along(self.own, rows))
 
     def _projected(self, rows: Array) -> Array:
@@ -49,9 +52,11 @@ def _along(values: Array, rows: Array) -> Array:
 
 
 def whitening(own: Array, shared: Array, group: Integers) -> Whitening:
-    """From standard uncertainties (m,) of each row's own error and of the error that it shares with its group.
+    """From standard uncertainties (m,) of each row's own error and of the error that it shares with
+    its group.
 
-    A row that is alone in its group, or has no error of its own, counts its shared error as its own.
+    A row that is alone in its group, or has no error of its own, counts its shared error as its
+    own.
 
     >>> found = whitening(np.array([3.0, 3.0]), np.array([4.0, 4.0]), np.array([0, 0]))
     >>> rows = found.whitened(np.eye(2))

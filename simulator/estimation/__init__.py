@@ -1,1 +1,3 @@
-"""From a design and its readings to estimates: blocks, elimination, Gauss-Newton, starting values."""
+"""From a design and its readings to estimates: blocks, elimination, Gauss-Newton, starting
+values.
+"""

@@ -11,18 +11,21 @@ from ..geometry.motions import fit_motion
 from ..machines.protocol import Array
 from ..numerics.rounding import comparable
 
-# Subsets tried, and the points that each is judged by. With a third of the points wrong, three right ones are
-# drawn together more than once in four draws.
+# Subsets tried, and the points that each is judged by. With a third of the points wrong, three
+# right ones are drawn together more than once in four draws.
 SUBSETS = 200
 JUDGES = 400
 
 
-def consensus_motion(source: Array, target: Array, reach: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def consensus_motion(
+    source: Array, target: Array, reach: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Rotation (d, d), origin (d,) and which points (m,) agree with them.
 
-    The motion brings as many points `source` (m, d) as possible within `reach` (m,) of `target` (m, d). Motions
-    of small subsets of widely spread points are tried, the best of them is refined by all points that agree with
-    it. The same points give the same answer: subsets are drawn from a fixed seed.
+    The motion brings as many points `source` (m, d) as possible within `reach` (m,) of `target` (m,
+    d). Motions of small subsets of widely spread points are tried, the best of them is refined by
+    all points that agree with it. The same points give the same answer: subsets are drawn from a
+    fixed seed.
     """
     judges = np.unique(np.linspace(0, len(source) - 1, min(len(source), JUDGES)).astype(np.int64))
     subsets = _subsets(source)
@@ -68,9 +71,13 @@ def _subsets(source: Array) -> NDArray[np.int64]:
 
 
 def _motions(source: Array, target: Array) -> tuple[Array, Array]:
-    """Rotations (c, d, d) and origins (c, d) that fit c pairs of point sets (c, k, d), all at once."""
+    """Rotations (c, d, d) and origins (c, d) that fit c pairs of point sets (c, k, d), all at
+    once.
+    """
     centre_source, centre_target = source.mean(axis=1), target.mean(axis=1)
-    spread = (target - centre_target[:, None]).transpose(0, 2, 1) @ (source - centre_source[:, None])
+    spread = (target - centre_target[:, None]).transpose(0, 2, 1) @ (
+        source - centre_source[:, None]
+    )
     u, _, vh = np.linalg.svd(spread)
     u[:, :, -1] *= np.sign(np.linalg.det(u @ vh))[:, None]
     rotations = u @ vh

@@ -1,4 +1,6 @@
-"""How corrected points depend on the shared parameters: the rows behind U4, U6 and measuring tasks."""
+"""How corrected points depend on the shared parameters: the rows behind U4, U6 and measuring
+tasks.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,19 @@ from .parameters import SharedLayout
 
 
 def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:
-    """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of indices (m,), metres."""
-    return np.asarray(points + design.model.error(points, state.a, probe_offsets(design, state)[probes]))
+    """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of
+    indices (m,), metres.
+    """
+    return np.asarray(
+        points + design.model.error(points, state.a, probe_offsets(design, state)[probes])
+    )
 
 
-def correction_rows(design: Design, layout: SharedLayout, state: State, points: Array, probes: Integers) -> Array:
-    """Derivative (m, d, s) of the corrected points by the shared parameters, estimated probe offsets included.
+def correction_rows(
+    design: Design, layout: SharedLayout, state: State, points: Array, probes: Integers
+) -> Array:
+    """Derivative (m, d, s) of the corrected points by the shared parameters, estimated probe
+    offsets included.
 
     `points` (m, d) are scale readings with probes of indices `probes` (m,).
     """
@@ -31,5 +40,7 @@ def correction_rows(design: Design, layout: SharedLayout, state: State, points: 
         estimated = layout.offset_columns[probe] >= 0
         own = np.flatnonzero(probes == probe)
         columns = layout.offset_columns[probe][estimated]
-        rows[own[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[own][:, :, estimated]
+        rows[own[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[own][
+            :, :, estimated
+        ]
     return rows

@@ -1,11 +1,11 @@
 """Orthogonal elimination of the balls, a batch of them at a time.
 
-The Jacobian of all readings is block-angular (NPL Report CISE 15/98, section 3.5.3): the rows of one ball
-involve that ball and the shared parameters, poses and machine errors. Each ball's rows are multiplied by an
-orthogonal matrix that leaves three rows for the ball and the rest for the shared parameters alone; the rest
-goes into one small triangular factor. Neither the whole Jacobian nor any normal equation is ever formed, so
-that time and memory grow in proportion to the readings. Balls tied to one another by calibrated distances
-are kept and eliminated together at the end.
+The Jacobian of all readings is block-angular (NPL Report CISE 15/98, section 3.5.3): the rows of
+one ball involve that ball and the shared parameters, poses and machine errors. Each ball's rows are
+multiplied by an orthogonal matrix that leaves three rows for the ball and the rest for the shared
+parameters alone; the rest goes into one small triangular factor. Neither the whole Jacobian nor any
+normal equation is ever formed, so that time and memory grow in proportion to the readings. Balls
+tied to one another by calibrated distances are kept and eliminated together at the end.
 """
 
 from __future__ import annotations
@@ -41,13 +41,16 @@ DISTANCES_AT_ONCE = 1024
 SMALL = 500
 
 
-# Weights of rows that differ by more than this are beyond what plain orthogonal transformations keep apart.
+# Weights of rows that differ by more than this are beyond what plain orthogonal transformations
+# keep apart.
 ALIKE = 1e4
 
 
 @dataclass(frozen=True)
 class Orders:
-    """Parameters that the columns of a factor's triangles belong to: `ball` (e, d), `kept` (d k,), `shared` (s,)."""
+    """Parameters that the columns of a factor's triangles belong to: `ball` (e, d), `kept` (d k,),
+    `shared` (s,).
+    """
 
     ball: Integers
     kept: Integers
@@ -58,15 +61,16 @@ class Orders:
 class Factor:
     """Triangular factor of the whitened observations, with the right-hand side z = Q' r beside it.
 
-    With d dimensions, s shared parameters, e balls eliminated singly and k kept balls:
-    `ball_root` (e, d, d) and `ball_shared` (e, d, s) with `ball_side` (e, d) are the rows of the balls
-    `eliminated`; `kept_root` (d k, d k), `kept_shared` (d k, s), `kept_side` (d k,) those of the balls
-    `kept`; `root` (s, s) and `side` (s,) those of the shared parameters. `sum_of_squares` is S^2 at the point
-    of linearisation.
+    With d dimensions, s shared parameters, e balls eliminated singly and k kept balls: `ball_root`
+    (e, d, d) and `ball_shared` (e, d, s) with `ball_side` (e, d) are the rows of the balls
+    `eliminated`; `kept_root` (d k, d k), `kept_shared` (d k, s), `kept_side` (d k,) those of the
+    balls `kept`; `root` (s, s) and `side` (s,) those of the shared parameters. `sum_of_squares` is
+    S^2 at the point of linearisation.
 
-    Where the weights of rows differ so much that columns have to be taken in an order that depends on them, `orders`
-    tells the columns of all roots, and `alike` is the factor of the same rows with about equal weights, which has the
-    same rank and the same null space. Otherwise columns stand in the order of the parameters.
+    Where the weights of rows differ so much that columns have to be taken in an order that depends
+    on them, `orders` tells the columns of all roots, and `alike` is the factor of the same rows
+    with about equal weights, which has the same rank and the same null space. Otherwise columns
+    stand in the order of the parameters.
     """
 
     layout: SharedLayout
@@ -89,8 +93,8 @@ class Factor:
 def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | None = None) -> Factor:
     """Factor the observations of a design at `state`.
 
-    `x` (readings, d) holds a scale reading for each of the design's readings, in order. Without it the machine is taken
-    to read without error, as for planning.
+    `x` (readings, d) holds a scale reading for each of the design's readings, in order. Without it
+    the machine is taken to read without error, as for planning.
     """
     if _differ(design, layout, state):
         return _eliminate_graded(design, layout, state, x)
@@ -133,7 +137,8 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     columns = d * len(kept)
     distances = distance_rows(design, state)
     total += float(distances.residual @ distances.residual)
-    # Triangular already but for the distances, which are absorbed some at a time: there may be far more than columns.
+    # Triangular already but for the distances, which are absorbed some at a time: there may be far
+    # more than columns.
     triangle = np.zeros((columns + s + 1, columns + s + 1), order="F")
     for place, own in enumerate(root[is_kept]):
         triangle[d * place : d * place + d, d * place : d * place + d] = own
@@ -196,7 +201,9 @@ def _weighted_alike(design: Design, layout: SharedLayout, state: State) -> Desig
     return replace(
         design,
         repeatability=np.ones(design.dimension),
-        readings=replace(design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)),
+        readings=replace(
+            design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)
+        ),
         distances=replace(design.distances, uncertainty=np.ones(len(design.distances))),
         coordinates=replace(design.coordinates, uncertainty=np.ones(len(design.coordinates))),
         lengths=replace(
@@ -205,11 +212,15 @@ def _weighted_alike(design: Design, layout: SharedLayout, state: State) -> Desig
             with_repeatability=np.zeros(len(given), bool),
             certificate=np.arange(len(given)),
         ),
-        priors=replace(known, uncertainty=known.uncertainty * np.where(weights > 0.0, weights, 1.0)),
+        priors=replace(
+            known, uncertainty=known.uncertainty * np.where(weights > 0.0, weights, 1.0)
+        ),
     )
 
 
-def _eliminate_graded(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
+def _eliminate_graded(
+    design: Design, layout: SharedLayout, state: State, x: Array | None
+) -> Factor:
     """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
     d, s = design.dimension, len(layout)
     kept = np.unique(np.concatenate([design.distances.first, design.distances.second]))
@@ -224,14 +235,18 @@ def _eliminate_graded(design: Design, layout: SharedLayout, state: State, x: Arr
         for batch, by_ball, rest in _batches(design, layout, state, x, chosen):
             total += float((rest[:, :, -1] ** 2).sum())
             rest *= scale
-            weights = np.maximum(np.abs(by_ball).max(axis=2), np.abs(rest[:, :, :-1]).max(axis=2, initial=0.0))
+            weights = np.maximum(
+                np.abs(by_ball).max(axis=2), np.abs(rest[:, :, :-1]).max(axis=2, initial=0.0)
+            )
             root, order, top, left = without_balls(by_ball, rest, weights)
             shared.add(left.reshape(-1, s + 1))
             if is_tied:
                 rows = np.zeros((len(batch), d, columns + s + 1))
                 ball, row = np.ogrid[: len(batch), :d]
                 for axis in range(d):
-                    rows[ball, row, (d * place_of[batch] + order[:, axis])[:, None]] = root[:, :, axis]
+                    rows[ball, row, (d * place_of[batch] + order[:, axis])[:, None]] = root[
+                        :, :, axis
+                    ]
                 rows[:, :, columns:] = top
                 tied.add(rows.reshape(len(batch) * d, -1))
                 continue
@@ -250,8 +265,14 @@ def _eliminate_graded(design: Design, layout: SharedLayout, state: State, x: Arr
     distances = distance_rows(design, state)
     total += float(distances.residual @ distances.residual)
     for start in range(0, len(design.distances), DISTANCES_AT_ONCE):
-        rows = _distance_columns(design, distances, place_of, slice(start, start + DISTANCES_AT_ONCE))
-        tied.add(np.concatenate([rows, np.zeros((len(rows), s)), distances.residual[start:][: len(rows), None]], 1))
+        rows = _distance_columns(
+            design, distances, place_of, slice(start, start + DISTANCES_AT_ONCE)
+        )
+        tied.add(
+            np.concatenate(
+                [rows, np.zeros((len(rows), s)), distances.residual[start:][: len(rows), None]], 1
+            )
+        )
     of_kept = tied.found()
     shared.add(of_kept.rest)
     of_shared = shared.found()
@@ -270,12 +291,16 @@ def _eliminate_graded(design: Design, layout: SharedLayout, state: State, x: Arr
         root=of_shared.root / layout.scale[of_shared.order],
         side=of_shared.side[:, 0],
         sum_of_squares=total,
-        orders=Orders(np.concatenate([np.zeros((0, d), np.int64), *orders]), of_kept.order, of_shared.order),
+        orders=Orders(
+            np.concatenate([np.zeros((0, d), np.int64), *orders]), of_kept.order, of_shared.order
+        ),
         alike=_eliminate_alike(_weighted_alike(design, layout, state), layout, state, x),
     )
 
 
-def _distance_columns(design: Design, distances: BallRows, place_of: Integers, some: slice) -> Array:
+def _distance_columns(
+    design: Design, distances: BallRows, place_of: Integers, some: slice
+) -> Array:
     """Derivatives (m, d k) of some calibrated distances by the balls that they tie together."""
     d, first, second = design.dimension, design.distances.first[some], design.distances.second[some]
     rows = np.zeros((len(first), d * (int(place_of.max()) + 1)))
@@ -296,17 +321,23 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
 
 
 def _with_rows(triangle: Array, rows: Array) -> Array:
-    """Triangular factor of a square `triangle` with `rows` below it, in place of both where they are large."""
+    """Triangular factor of a square `triangle` with `rows` below it, in place of both where they
+    are large.
+    """
     if len(triangle) < SMALL:
         return _square(_triangle(np.concatenate([triangle, rows])), len(triangle))
     return _by_panels(triangle, rows, 2 * PANEL)
 
 
 def _by_panels(triangle: Array, rows: Array, panel: int) -> Array:
-    """Triangular factor of a square `triangle` with `rows` below it, both in Fortran's order and in place of both."""
+    """Triangular factor of a square `triangle` with `rows` below it, both in Fortran's order and in
+    place of both.
+    """
     found: Array
     dtpqrt = scipy_linalg().lapack.dtpqrt
-    found, _, _, _ = dtpqrt(0, min(panel, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1)
+    found, _, _, _ = dtpqrt(
+        0, min(panel, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1
+    )
     return found
 
 
@@ -324,7 +355,8 @@ def _square(triangle: Array, size: int) -> Array:
 def _batches(
     design: Design, layout: SharedLayout, state: State, x: Array | None, balls: Integers
 ) -> Iterator[tuple[Integers, Array, Array]]:
-    """Balls a batch at a time: their indices (b,), rows by the ball (b, rows, d), by the rest (b, rows, s + 1).
+    """Balls a batch at a time: their indices (b,), rows by the ball (b, rows, d), by the rest (b,
+    rows, s + 1).
 
     Balls with fewer rows than the most in their batch are filled up with rows of zeros.
     """
@@ -354,10 +386,14 @@ def _batches(
         which = np.where(present, start[batch][:, None] + np.arange(m), 0)
         if m:
             index = chosen[which.ravel()]
-            rows_of = reading_blocks(design, state, readings.select(index), None if x is None else x[index])
+            rows_of = reading_blocks(
+                design, state, readings.select(index), None if x is None else x[index]
+            )
             columns = layout.pose_columns[readings.position[index]]
             if rows_of.by_offset is not None:
-                columns = np.concatenate([columns, layout.offset_columns[readings.probe[index]]], axis=1)
+                columns = np.concatenate(
+                    [columns, layout.offset_columns[readings.probe[index]]], axis=1
+                )
             _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout.model, present)
         if c:
             member = np.arange(c) < extra[batch][:, None]

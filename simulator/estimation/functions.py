@@ -1,7 +1,8 @@
-"""Functions of a design's parameters whose uncertainties are asked for: of parameters, of places, and of distances.
+"""Functions of a design's parameters whose uncertainties are asked for: of parameters, of places,
+and of distances.
 
-They are told without numbers of a particular state, so that a plan, a fit, replicates and a search for mistakes can
-each make what they need of the same description.
+They are told without numbers of a particular state, so that a plan, a fit, replicates and a search
+for mistakes can each make what they need of the same description.
 """
 
 from __future__ import annotations
@@ -84,9 +85,11 @@ class Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """Distances between all `places` or, with `pairs` (m, 2) of their indices, between those, which have `names`.
+    """Distances between all `places` or, with `pairs` (m, 2) of their indices, between those, which
+    have `names`.
 
-    `targets` are the uncertainties that each of these is to have, None where nothing is to be reached.
+    `targets` are the uncertainties that each of these is to have, None where nothing is to be
+    reached.
     """
 
     places: Places
@@ -106,7 +109,9 @@ def coordinate_names(design: Design, places: Places) -> list[str]:
 
 
 def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
-    """Name of a co-ordinate by the label of its place and its axis, or of a distance by the labels of both places."""
+    """Name of a co-ordinate by the label of its place and its axis, or of a distance by the labels
+    of both places.
+    """
     assert not isinstance(functions, Parameters)
     places = functions.places
     if isinstance(functions, Coordinates):
@@ -119,11 +124,11 @@ def function_name(design: Design, functions: Functions, first: int, second: int)
 
 @dataclass(frozen=True, eq=False)
 class Displacements:
-    """How `places` (n, d) are displaced: by `common` (n, d, r) times r standard normal variables that all share, and
-    `own` (n, d, d) times d of their own.
+    """How `places` (n, d) are displaced: by `common` (n, d, r) times r standard normal variables
+    that all share, and `own` (n, d, d) times d of their own.
 
-    `null` (n, d, k) moves them along undetermined directions from where they are `drawn` (n, d), by what is no mere
-    rounding of `size` (n, d).
+    `null` (n, d, k) moves them along undetermined directions from where they are `drawn` (n, d), by
+    what is no mere rounding of `size` (n, d).
     """
 
     places: Array
@@ -148,15 +153,18 @@ class Displacements:
 def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Displacements:
     """Displacements of places, in units of the standard deviation of a unit-weight observation.
 
-    With `narrow` those of points have variables of their own, no more than there are parameters that move points;
-    otherwise those of the linearisation, which balls and observations have in common.
+    With `narrow` those of points have variables of their own, no more than there are parameters
+    that move points; otherwise those of the linearisation, which balls and observations have in
+    common.
     """
     design, drawn = at.design, at.as_drawn.state
     if isinstance(places, Balls):
         own, index = at.balls.own[places.index], places.index
         size = np.full((len(index), design.dimension), MICROMETRE)
         where = places.at(design, at.state), places.at(design, drawn)
-        return Displacements(where[0], at.balls.common[index], own, at.ball_null[index], where[1], size)
+        return Displacements(
+            where[0], at.balls.common[index], own, at.ball_null[index], where[1], size
+        )
     n, d = places.points.shape
     columns = moving_columns(at.layout, places)
     root = at.shared[columns]
@@ -168,7 +176,9 @@ def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Dis
     for some, rows in point_rows(design, at.layout, at.state, places):
         common[some, :, : root.shape[1]] = rows[:, :, columns] @ root
         if at.drawn is not None:
-            rows = correction_rows(design, at.layout, drawn, places.points[some], places.probes[some])
+            rows = correction_rows(
+                design, at.layout, drawn, places.points[some], places.probes[some]
+            )
         null[some] = rows @ at.shared_null
         size[some] = np.sqrt(((rows * at.spectrum.scale) ** 2).sum(axis=2))
     corrected = places.at(design, at.state)
@@ -182,7 +192,9 @@ def moving_columns(layout: SharedLayout, places: Points) -> Integers:
     return np.concatenate([np.arange(len(layout))[layout.model], np.sort(offsets[offsets >= 0])])
 
 
-def point_rows(design: Design, layout: SharedLayout, state: State, places: Points) -> Iterator[tuple[slice, Array]]:
+def point_rows(
+    design: Design, layout: SharedLayout, state: State, places: Points
+) -> Iterator[tuple[slice, Array]]:
     """Derivatives (m, d, s) of corrected points by the shared parameters, some points at a time."""
     for start in range(0, len(places.points), PLACES_AT_ONCE):
         some = slice(start, start + PLACES_AT_ONCE)
@@ -190,7 +202,9 @@ def point_rows(design: Design, layout: SharedLayout, state: State, places: Point
 
 
 def linear_functions(at: Linearisation, functions: Functions) -> LinearFunctions:
-    """Derivatives of all functions: dense, for some of them rather than for all distances of a large plate."""
+    """Derivatives of all functions: dense, for some of them rather than for all distances of a
+    large plate.
+    """
     found = _derivatives(at, at.state, functions)
     if at.drawn is None or isinstance(functions, Parameters):
         return found
@@ -204,7 +218,9 @@ def _derivatives(at: Linearisation, state: State, functions: Functions) -> Linea
     where = places.at(design, state)
     n, d = where.shape
     if isinstance(places, Points):
-        by_shared = np.concatenate([rows for _, rows in point_rows(design, at.layout, state, places)])
+        by_shared = np.concatenate(
+            [rows for _, rows in point_rows(design, at.layout, state, places)]
+        )
         by_balls = np.zeros((n, d, 0))
     else:
         by_shared = np.zeros((n, d, len(at.layout)))

@@ -21,7 +21,8 @@ from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
 Status = Literal["converged", "not converged", "diverged"]
 
-# A step of more than this (m, rad) along what the drawn design leaves open has left the neighbourhood of the drawing.
+# A step of more than this (m, rad) along what the drawn design leaves open has left the
+# neighbourhood of the drawing.
 NEIGHBOURHOOD = 0.01
 
 
@@ -29,8 +30,8 @@ NEIGHBOURHOOD = 0.01
 class GaussNewtonSettings:
     """When to stop.
 
-    An iteration is the last when the step, each parameter scaled to its effect in the volume, is below
-    `smallest_step` metres, or when it no longer shrinks because rounding is all that is left.
+    An iteration is the last when the step, each parameter scaled to its effect in the volume, is
+    below `smallest_step` metres, or when it no longer shrinks because rounding is all that is left.
     """
 
     iterations: int = 20
@@ -41,7 +42,8 @@ class GaussNewtonSettings:
 class Iteration:
     """One line of the record: Euclidean length of the step that led here, and S^2 here.
 
-    The length mixes metres and radians, as the report's tables do; that of the starting point is zero.
+    The length mixes metres and radians, as the report's tables do; that of the starting point is
+    zero.
     """
 
     step: float
@@ -50,7 +52,9 @@ class Iteration:
 
 @dataclass(frozen=True)
 class Solution:
-    """Where the iteration ended: the state, the factor and spectrum there, the record and the verdict."""
+    """Where the iteration ended: the state, the factor and spectrum there, the record and the
+    verdict.
+    """
 
     state: State
     factor: Factor
@@ -69,9 +73,9 @@ def gauss_newton(
 ) -> Solution:
     """Minimise S^2 over balls, poses and machine errors, from `start`.
 
-    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not moved in; with
-    `held`, see `as_drawn`, these are its null directions, whatever the state. A failure to converge is a status, not an
-    exception.
+    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not
+    moved in; with `held`, see `as_drawn`, these are its null directions, whatever the state. A
+    failure to converge is a status, not an exception.
     """
     settings = settings or GaussNewtonSettings()
     layout = shared_layout(design)
@@ -91,10 +95,20 @@ def gauss_newton(
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found)
-        size = max(float(np.abs(shared / layout.scale).max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+        size = max(
+            float(np.abs(shared / layout.scale).max(initial=0.0)),
+            float(np.abs(balls).max(initial=0.0)),
+        )
         length = float(np.sqrt(shared @ shared + (balls**2).sum()))
         state = moved(
-            design, state, layout.pose_columns, shared, balls, layout.model, layout.offset_columns, layout.lengths
+            design,
+            state,
+            layout.pose_columns,
+            shared,
+            balls,
+            layout.model,
+            layout.offset_columns,
+            layout.lengths,
         )
         rounding = size > 0.5 * previous and size < 1e-9
         if size < settings.smallest_step or rounding:
@@ -106,10 +120,11 @@ def gauss_newton(
 def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = None) -> Solution:
     """The estimate from scale readings `x` (readings, d) and starting values of their own.
 
-    What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as in NPL Report CISE
-    15/98, section 5.4, where the iteration wanders along it without leaving the neighbourhood, and held if that fails
-    or goes far: poses a little off their nominal ones call for steps of metres. Rank and null space of the solution are
-    those of the design as drawn in any case.
+    What is open as drawn is held where there are bars or gauges. Of plates alone it is followed, as
+    in NPL Report CISE 15/98, section 5.4, where the iteration wanders along it without leaving the
+    neighbourhood, and held if that fails or goes far: poses a little off their nominal ones call
+    for steps of metres. Rank and null space of the solution are those of the design as drawn in any
+    case.
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
@@ -123,18 +138,24 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
 
 
 def as_drawn(design: Design) -> Spectrum:
-    """The spectrum of a design in its nominal poses on a machine without errors: rank and null space are those here.
+    """The spectrum of a design in its nominal poses on a machine without errors: rank and null
+    space are those here.
 
-    With errors, noise and poses that are not quite as drawn the same readings seem to tell a little of what they leave
-    open. To follow that may lead far astray: where no length is known, S^2 is least when all lengths are zero.
+    With errors, noise and poses that are not quite as drawn the same readings seem to tell a little
+    of what they leave open. To follow that may lead far astray: where no length is known, S^2 is
+    least when all lengths are zero.
     """
     return linearise(design).spectrum
 
 
 def linearised_fit(design: Design, solution: Solution) -> Linearisation:
-    """The linearisation at an estimate; what is undetermined is what the design as drawn leaves open."""
+    """The linearisation at an estimate; what is undetermined is what the design as drawn leaves
+    open.
+    """
     drawn = linearise(design) if solution.spectrum.deficiency else None
-    return Linearisation(design, solution.factor.layout, solution.state, solution.factor, solution.spectrum, drawn)
+    return Linearisation(
+        design, solution.factor.layout, solution.state, solution.factor, solution.spectrum, drawn
+    )
 
 
 def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:

@@ -1,10 +1,11 @@
 """Orthogonal elimination of rows whose weights differ by many orders of magnitude.
 
-Where one row outweighs others a millionfold, a plain triangular decomposition mixes its rounding into them, and what
-little they tell is lost. With the rows sorted by weight, heaviest first, and the columns taken in the order of what is
-left in them, every row keeps its own relative accuracy: M. J. D. Powell, J. K. Reid, *On applying Householder
-transformations to linear least squares problems*, 1968; A. J. Cox, N. J. Higham, *Stability of Householder QR
-factorization for weighted least squares problems*, 1998.
+Where one row outweighs others a millionfold, a plain triangular decomposition mixes its rounding
+into them, and what little they tell is lost. With the rows sorted by weight, heaviest first, and
+the columns taken in the order of what is left in them, every row keeps its own relative accuracy:
+M. J. D. Powell, J. K. Reid, *On applying Householder transformations to linear least squares
+problems*, 1968; A. J. Cox, N. J. Higham, *Stability of Householder QR factorization for weighted
+least squares problems*, 1998.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ COLLECTED = 8
 
 @dataclass(frozen=True)
 class Triangle:
-    """Rows brought to a triangle: `root` (n, n) is upper triangular in the columns `order` (n,), `side` (n, m).
+    """Rows brought to a triangle: `root` (n, n) is upper triangular in the columns `order` (n,),
+    `side` (n, m).
 
-    `rest` (k, m) are the transformed right-hand sides of rows that have nothing left in the columns.
+    `rest` (k, m) are the transformed right-hand sides of rows that have nothing left in the
+    columns.
     """
 
     root: Array
@@ -41,7 +44,9 @@ class Triangle:
 
 
 def triangle(rows: Array, sides: Array) -> Triangle:
-    """Bring `rows` (k, n), scaled so that columns compare, to a triangle, with right-hand sides (k, m)."""
+    """Bring `rows` (k, n), scaled so that columns compare, to a triangle, with right-hand sides (k,
+    m).
+    """
     n = rows.shape[1]
     sorted_ = np.argsort(-np.abs(rows).max(axis=1, initial=0.0), kind="stable")
     rows, sides = rows[sorted_], sides[sorted_]
@@ -84,11 +89,14 @@ class Collected:
         return triangle(rows[:, : self._columns], rows[:, self._columns :])
 
 
-def without_balls(by_ball: Array, rest: Array, weights: Array) -> tuple[Array, Integers, Array, Array]:
-    """Eliminate a batch of balls from rows by them (b, m, d) and by the rest (b, m, c), sorted by `weights` (b, m).
+def without_balls(
+    by_ball: Array, rest: Array, weights: Array
+) -> tuple[Array, Integers, Array, Array]:
+    """Eliminate a batch of balls from rows by them (b, m, d) and by the rest (b, m, c), sorted by
+    `weights` (b, m).
 
-    Gives for each ball a root (b, d, d), triangular in its co-ordinates `order` (b, d), with the rest of these
-    rows (b, d, c), and what is left of all others (b, m - d, c).
+    Gives for each ball a root (b, d, d), triangular in its co-ordinates `order` (b, d), with the
+    rest of these rows (b, d, c), and what is left of all others (b, m - d, c).
     """
     b, m, d = by_ball.shape
     heaviest = np.argsort(-weights, axis=1, kind="stable")[:, :, None]
@@ -107,6 +115,9 @@ def without_balls(by_ball: Array, rest: Array, weights: Array) -> tuple[Array, I
         square = (column**2).sum(axis=1)
         half = np.where(square > 0.0, 2.0 / np.where(square > 0.0, square, 1.0), 0.0)
         for array in (by_ball[:, step:, step:], rest[:, step:]):
-            array -= column[:, :, None] * (half[:, None] * np.einsum("bm,bmc->bc", column, array))[:, None]
+            array -= (
+                column[:, :, None]
+                * (half[:, None] * np.einsum("bm,bmc->bc", column, array))[:, None]
+            )
         by_ball[:, step + 1 :, step] = 0.0
     return by_ball[:, :d], order, rest[:, :d], rest[:, d:]

@@ -1,9 +1,9 @@
 """Rows of the hat matrix's root: what the estimate takes up of each observation, in batches.
 
-With the square root G of the covariance and the whitened Jacobian J, the columns of Q = J G are orthonormal, and
-H = Q Q' is the hat matrix. As G has one block for each ball, a row of Q has a part that it may share with all
-others and one of d columns that only rows of the same ball have. Neither J nor H is formed; nothing here needs full
-rank.
+With the square root G of the covariance and the whitened Jacobian J, the columns of Q = J G are
+orthonormal, and H = Q Q' is the hat matrix. As G has one block for each ball, a row of Q has a part
+that it may share with all others and one of d columns that only rows of the same ball have. Neither
+J nor H is formed; nothing here needs full rank.
 """
 
 from __future__ import annotations
@@ -18,13 +18,20 @@ from ..machines.protocol import Array, Integers
 from ..numerics.threads import single_threaded
 from .elimination import ROWS_AT_ONCE
 from .linearisation import Linearisation
-from .observations import coordinate_rows, distance_rows, length_shared_rows, prior_rows, reading_blocks
+from .observations import (
+    coordinate_rows,
+    distance_rows,
+    length_shared_rows,
+    prior_rows,
+    reading_blocks,
+)
 from .parameters import SharedLayout
 
 
 @dataclass(frozen=True)
 class RowPlaces:
-    """Where the whitened rows of each kind stand: d for each reading of a plate, one for each other observation.
+    """Where the whitened rows of each kind stand: d for each reading of a plate, one for each other
+    observation.
 
     Of lengths read together there are as many rows as lengths that do not follow from others.
     """
@@ -41,7 +48,9 @@ class RowPlaces:
 
 @dataclass(frozen=True)
 class HatRows:
-    """Some `rows` (b,) of Q: `common` (b, r), and `own` (b, d) in the columns of `ball` (b,), -1 without one."""
+    """Some `rows` (b,) of Q: `common` (b, r), and `own` (b, d) in the columns of `ball` (b,), -1
+    without one.
+    """
 
     rows: Integers
     common: Array
@@ -62,11 +71,17 @@ def row_places(design: Design) -> RowPlaces:
     return RowPlaces(*(slice(end - count, end) for end, count in zip(ends, counts, strict=True)))
 
 
-def whitened_residuals(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
+def whitened_residuals(
+    design: Design, layout: SharedLayout, state: State, x: Array | None
+) -> Array:
     """Residuals (rows,) of all observations, in units of their standard uncertainties."""
     chosen = design.plate_readings
-    of_readings = reading_blocks(design, state, design.readings.select(chosen), None if x is None else x[chosen])
-    of_lengths = length_shared_rows(design, layout, state, x)[0] if len(design.lengths) else np.zeros(0)
+    of_readings = reading_blocks(
+        design, state, design.readings.select(chosen), None if x is None else x[chosen]
+    )
+    of_lengths = (
+        length_shared_rows(design, layout, state, x)[0] if len(design.lengths) else np.zeros(0)
+    )
     return np.concatenate(
         [
             of_readings.residual.ravel(),
@@ -100,13 +115,21 @@ def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
         common = widened(shared) + by_ball @ balls.common[ball]
         own = by_ball @ balls.own[ball]
         rows = d * some[:, None] + np.arange(d)
-        yield HatRows(rows.ravel(), common.reshape(d * len(ball), width), own.reshape(-1, d), np.repeat(ball, d))
+        yield HatRows(
+            rows.ravel(),
+            common.reshape(d * len(ball), width),
+            own.reshape(-1, d),
+            np.repeat(ball, d),
+        )
     if len(design.lengths):
         yield by_shared(places.lengths.start, length_shared_rows(design, layout, state, x)[1])
     if len(design.priors):
         yield by_shared(places.priors.start, prior_rows(design, layout, state)[1])
     for part in _slices(len(design.coordinates)):
-        ball, derivative = design.coordinates.ball[part], coordinate_rows(design, state).derivative[part, None]
+        ball, derivative = (
+            design.coordinates.ball[part],
+            coordinate_rows(design, state).derivative[part, None],
+        )
         own = (derivative @ balls.own[ball])[:, 0]
         rows = places.coordinates.start + np.arange(part.start, part.stop)
         yield HatRows(rows, (derivative @ balls.common[ball])[:, 0], own, ball)
@@ -120,7 +143,9 @@ def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
 
 
 def _slices(count: int) -> list[slice]:
-    return [slice(start, min(start + ROWS_AT_ONCE, count)) for start in range(0, count, ROWS_AT_ONCE)]
+    return [
+        slice(start, min(start + ROWS_AT_ONCE, count)) for start in range(0, count, ROWS_AT_ONCE)
+    ]
 
 
 def _reading_batches(design: Design) -> Iterator[Integers]:

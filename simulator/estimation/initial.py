@@ -1,8 +1,8 @@
 """Starting values for balls and poses, found from the readings alone.
 
-Two positions that share enough balls determine their relative pose. The positions of an artefact are joined one
-after the other to what is known already, so that none of them need read all balls (NPL Report CISE 15/98,
-section 4.1). The machine is taken to be without errors.
+Two positions that share enough balls determine their relative pose. The positions of an artefact
+are joined one after the other to what is known already, so that none of them need read all balls
+(NPL Report CISE 15/98, section 4.1). The machine is taken to be without errors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from ..machines.protocol import Array, Integers
 from ..numerics.rounding import comparable
 from .spheres import fit_sphere
 
-# Points whose spread across their main line is below this fraction of their length do not fix a pose.
+# Points whose spread across their main line is below this fraction of their length do not fix a
+# pose.
 FLAT = 1e-3
 
 
@@ -54,7 +55,11 @@ def initial_state(design: Design, x: Array) -> State:
         if rows.any():
             origins[k] = fit_sphere(x[rows] + design.probes[readings.probe[rows]], origins[k])[0]
     return State(
-        balls, rotations, origins, np.zeros(len(design.model.parameters)), lengths=_measured_lengths(design, origins, x)
+        balls,
+        rotations,
+        origins,
+        np.zeros(len(design.model.parameters)),
+        lengths=_measured_lengths(design, origins, x),
     )
 
 
@@ -65,7 +70,9 @@ def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
         return None
     seen = x + design.probes[design.readings.probe]
     other = np.where(
-        given.to_pivot[:, None], origins[design.readings.position[given.first]], seen[np.maximum(given.second, 0)]
+        given.to_pivot[:, None],
+        origins[design.readings.position[given.first]],
+        seen[np.maximum(given.second, 0)],
     )
     length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
     found = design.drawn_lengths.copy()
@@ -86,7 +93,9 @@ def _mean_locations(design: Design, x: Array) -> Array:
 
 
 def _assemble(seen: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Array, Array]]]:
-    """Shape (n, d) of an artefact in the frame of its best-read position, and the poses from there."""
+    """Shape (n, d) of an artefact in the frame of its best-read position, and the poses from
+    there.
+    """
     present = ~np.isnan(seen[:, :, 0])
     first = int(present.sum(axis=1).argmax())
     shape = np.where(present[first][:, None], seen[first], np.nan)
@@ -112,7 +121,9 @@ def _assemble(seen: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Ar
 
 
 def _strength(points: Array, d: int) -> float:
-    """How well points (n, d) fix a pose: 0 if not at all, otherwise their extent across their main line."""
+    """How well points (n, d) fix a pose: 0 if not at all, otherwise their extent across their main
+    line.
+    """
     if len(points) < 2:
         return 0.0
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -131,7 +142,11 @@ def _by_nominal(seen: Array, shape: Array, nominal: Array) -> tuple[Array, Array
 
 
 def _into_frame(
-    design: Design, shape: Array, poses: list[tuple[Array, Array]], places: list[int], members: Integers
+    design: Design,
+    shape: Array,
+    poses: list[tuple[Array, Array]],
+    places: list[int],
+    members: Integers,
 ) -> tuple[Array, Array]:
     """Motion that takes the assembled shape into the artefact's own frame."""
     held = [k for k in places if design.held[k].all()]

@@ -1,21 +1,25 @@
-"""The length equations of US 4,437,151 (Hurt and Foss): a machine's metric from bars and gauges, without weights.
+"""The length equations of US 4,437,151 (Hurt and Foss): a machine's metric from bars and gauges,
+without weights.
 
-With D the difference of two readings a known length d apart, and G = 1 + E the metric tensor of the machine's axes,
+With D the difference of two readings a known length d apart, and G = 1 + E the metric tensor of the
+machine's axes,
 
-    d^2 = D' G D = (1 + e1) Dx^2 + 2 e2 Dx Dy + 2 e3 Dx Dz + (1 + e4) Dy^2 + 2 e5 Dy Dz + (1 + e6) Dz^2,
+    d^2 = D' G D = (1 + e1) Dx^2 + 2 e2 Dx Dy + 2 e3 Dx Dz + (1 + e4) Dy^2 + 2 e5 Dy Dz + (1 + e6)
+    Dz^2,
 
-equations (100) and (110), are solved for e1 to e6 by least squares, all with the same weight. Those of lengths that
-share readings are first reduced to as many as do not follow from others, uncorrelated where all readings have the same
-noise. Of a Bryan gauge one end is the pivot c, which is not read, and d its radius r. Two ways to the centre:
+equations (100) and (110), are solved for e1 to e6 by least squares, all with the same weight. Those
+of lengths that share readings are first reduced to as many as do not follow from others,
+uncorrelated where all readings have the same noise. Of a Bryan gauge one end is the pivot c, which
+is not read, and d its radius r. Two ways to the centre:
 
-sphere-then-metric
-    the patent's: first c, and r where it is not known, from the equations of a sphere (108), |x - c|^2 = r^2, as if
-    the machine were right; then E with c and r held, and the lengths of bars beside where they are not known.
-length-equations
-    E, c, and r where it is not known, from equations (110) together. They are linear in E alone; Gauss-Newton does it.
+sphere-then-metric the patent's: first c, and r where it is not known, from the equations of a
+    sphere (108), |x - c|^2 = r^2, as if the machine were right; then E with c and r held, and the
+    lengths of bars beside where they are not known.
+length-equations E, c, and r where it is not known, from equations (110) together. They are linear
+    in E alone; Gauss-Newton does it.
 
-For ball bars, which have no centre, both are the same, and linear. An orthogonal factorisation stands for the patent's
-normal equations.
+For ball bars, which have no centre, both are the same, and linear. An orthogonal factorisation
+stands for the patent's normal equations.
 """
 
 from __future__ import annotations
@@ -43,20 +47,23 @@ SMALLEST_STEP = 1e-13
 
 
 class NotAMetricError(ValueError):
-    """The length equations give some differences of readings no length: the readings are not those of the design."""
+    """The length equations give some differences of readings no length: the readings are not those
+    of the design.
+    """
 
 
 @dataclass(frozen=True)
 class LengthSolution:
     """What the length equations give.
 
-    `factors` (6,) are e1 to e6, `parameters` (6,) the scale errors of X, Y and Z and the squareness errors C0Y, B0Z
-    and A0Z that they amount to, `spread` (6, r) a square root of the covariance of the latter as the scatter about
-    the equations has it, the same for all, NaN without redundancy. `deficiency` and `null` (6, deficiency) tell
-    what of the parameters the equations for everything together leave open. `centres` (positions, 3) has NaN where
-    there is no gauge; `lengths` are those that were unknown. Of factors, centres and lengths, `open_factors`,
-    `open_centres` and `open_lengths` say which have a value only because what is open is held. `scatter` is the
-    root of the sum of squares over the degrees of freedom, in square metres.
+    `factors` (6,) are e1 to e6, `parameters` (6,) the scale errors of X, Y and Z and the squareness
+    errors C0Y, B0Z and A0Z that they amount to, `spread` (6, r) a square root of the covariance of
+    the latter as the scatter about the equations has it, the same for all, NaN without redundancy.
+    `deficiency` and `null` (6, deficiency) tell what of the parameters the equations for everything
+    together leave open. `centres` (positions, 3) has NaN where there is no gauge; `lengths` are
+    those that were unknown. Of factors, centres and lengths, `open_factors`, `open_centres` and
+    `open_lengths` say which have a value only because what is open is held. `scatter` is the root
+    of the sum of squares over the degrees of freedom, in square metres.
     """
 
     estimator: LengthEstimator
@@ -78,7 +85,9 @@ class LengthSolution:
 
 
 @single_threaded
-def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "length-equations") -> LengthSolution:
+def length_estimate(
+    design: Design, x: Array, estimator: LengthEstimator = "length-equations"
+) -> LengthSolution:
     """Solve the length equations of a three-dimensional design for scale readings x (readings, 3).
 
     Where no length is known, scale errors are relative to their mean.
@@ -143,10 +152,12 @@ def length_estimate(design: Design, x: Array, estimator: LengthEstimator = "leng
 
 @dataclass(frozen=True)
 class _Equations:
-    """Rows: the difference of both ends or, of a gauge, the place read (m, 3); pivot, or -1, and length of each.
+    """Rows: the difference of both ends or, of a gauge, the place read (m, 3); pivot, or -1, and
+    length of each.
 
-    `direction` (m, 3) is the design's. `known` (m,) are lengths in metres, `free` (m,) numbers of unknown ones,
-    -1 where the length is known. Of each group in `together`, rows and a root (m, r), r rows are made.
+    `direction` (m, 3) is the design's. `known` (m,) are lengths in metres, `free` (m,) numbers of
+    unknown ones, -1 where the length is known. Of each group in `together`, rows and a root (m, r),
+    r rows are made.
     """
 
     place: Array
@@ -160,7 +171,11 @@ class _Equations:
         """The equations of Bryan gauges, whose lengths share no readings."""
         chosen = self.pivot >= 0
         return _Equations(
-            self.place[chosen], self.direction[chosen], self.pivot[chosen], self.known[chosen], self.free[chosen]
+            self.place[chosen],
+            self.direction[chosen],
+            self.pivot[chosen],
+            self.known[chosen],
+            self.free[chosen],
         )
 
     def reduced(self, rows: Array) -> Array:
@@ -169,7 +184,10 @@ class _Equations:
             return rows
         joint = np.concatenate([chosen for chosen, _ in self.together])
         return np.concatenate(
-            [np.delete(rows, joint, axis=0), *(root.T @ rows[chosen] for chosen, root in self.together)]
+            [
+                np.delete(rows, joint, axis=0),
+                *(root.T @ rows[chosen] for chosen, root in self.together),
+            ]
         )
 
     @property
@@ -201,7 +219,9 @@ def _equations(design: Design, x: Array) -> _Equations:
 
 
 def _start(design: Design, x: Array) -> _Unknowns:
-    """The centres and lengths that a sphere through the readings has, on a machine without errors."""
+    """The centres and lengths that a sphere through the readings has, on a machine without
+    errors.
+    """
     state = initial_state(design, x)
     lengths = design.drawn_lengths if state.lengths is None else state.lengths
     pivots = design.gauge_positions
@@ -232,7 +252,9 @@ def _differences(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
 
 
 def _rows(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
-    """D' G D - d^2 (r,) and its derivative by all unknowns (r, n), reduced to uncorrelated equations."""
+    """D' G D - d^2 (r,) and its derivative by all unknowns (r, n), reduced to uncorrelated
+    equations.
+    """
     difference, length = _differences(equations, at)
     pulled = difference @ _tensor(at.values[:6])
     residual = (pulled * difference).sum(axis=1) - length**2
@@ -240,7 +262,9 @@ def _rows(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
     return equations.reduced(residual), equations.reduced(derivative)
 
 
-def _derivative(equations: _Equations, at: _Unknowns, difference: Array, pulled: Array, length: Array) -> Array:
+def _derivative(
+    equations: _Equations, at: _Unknowns, difference: Array, pulled: Array, length: Array
+) -> Array:
     pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
     rows = np.zeros((len(length), len(at.values)))
     for column, (i, j) in enumerate(PLACES):
@@ -252,22 +276,28 @@ def _derivative(equations: _Equations, at: _Unknowns, difference: Array, pulled:
 
 
 def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
-    """Orthonormal directions (n, k), in micrometres and parts per million, that the equations leave open.
+    """Orthonormal directions (n, k), in micrometres and parts per million, that the equations leave
+    open.
 
-    They are those of a machine without errors that reads without noise in the design's directions. What else equations
-    seem to tell of them leads astray: where no length is known, all of them hold if all lengths are zero.
+    They are those of a machine without errors that reads without noise in the design's directions.
+    What else equations seem to tell of them leads astray: where no length is known, all of them
+    hold if all lengths are zero.
     """
     _, length = _differences(equations, at)
     exact = equations.direction * length[:, None]
     rows = equations.reduced(_derivative(equations, at, exact, exact, length)) * MICROMETRE
-    _, values, vh = np.linalg.svd(np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows)
+    _, values, vh = np.linalg.svd(
+        np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    )
     return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
 
 
 def _solved(
     equations: _Equations, start: _Unknowns, columns: np.ndarray, held: Array | None = None
 ) -> tuple[_Unknowns, Array, int, bool]:
-    """Least squares over some of the unknowns: where it ends, a square root (n, rank) of (J'J)^+, iterations."""
+    """Least squares over some of the unknowns: where it ends, a square root (n, rank) of (J'J)^+,
+    iterations.
+    """
     at, previous = start, np.inf
     for iteration in range(1, ITERATIONS + 1):
         residual, rows = _rows(equations, at)
@@ -290,9 +320,13 @@ def _solved(
 
 
 def _by_factor() -> Array:
-    """Derivative (6, 6) of the scale and squareness errors by e1 to e6 at a machine without errors."""
+    """Derivative (6, 6) of the scale and squareness errors by e1 to e6 at a machine without
+    errors.
+    """
     derivative = np.zeros((6, 6))
-    for row, (column, value) in enumerate(((0, 0.5), (3, 0.5), (5, 0.5), (1, -1.0), (2, 1.0), (4, -1.0))):
+    for row, (column, value) in enumerate(
+        ((0, 0.5), (3, 0.5), (5, 0.5), (1, -1.0), (2, 1.0), (4, -1.0))
+    ):
         derivative[row, column] = value
     return derivative
 

@@ -1,6 +1,8 @@
-"""Standards all of whose lengths are read too long or too short by one factor: their length is not what is stated.
+"""Standards all of whose lengths are read too long or too short by one factor: their length is not
+what is stated.
 
-A machine's scale errors would explain that as well, so that no fit shows it; but no scale is off by so much.
+A machine's scale errors would explain that as well, so that no fit shows it; but no scale is off by
+so much.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from ..design.arrays import Design
 from ..machines.protocol import Array
 from .spheres import FLAT, fit_sphere
 
-# Departures of the factor from one that are doubtful, and that no machine has; a length that is only drawn may be off.
+# Departures of the factor from one that are doubtful, and that no machine has; a length that is
+# only drawn may be off.
 DOUBTFUL, IMPOSSIBLE = 1e-3, 1e-2
 OFF_DRAWING = 0.3
 
@@ -23,7 +26,8 @@ AGREEMENT = 0.25
 
 @dataclass(frozen=True)
 class LengthRatio:
-    """Read lengths of an artefact over stated ones, the same `ratio` for all; the first has been read in `reading`.
+    """Read lengths of an artefact over stated ones, the same `ratio` for all; the first has been
+    read in `reading`.
 
     Lengths that are not known have been drawn.
     """
@@ -42,7 +46,8 @@ class LengthRatio:
 
 
 def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
-    """Artefacts whose stated lengths are off by a common factor of more than 0.1 %, from readings x (readings, d).
+    """Artefacts whose stated lengths are off by a common factor of more than 0.1 %, from readings x
+    (readings, d).
 
     Of unknown lengths the drawn ones, if they are off by more than 30 %.
     """
@@ -74,7 +79,9 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
 
 
 def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
-    """Radii of the spheres through the readings over the stated one, without those that the readings hardly show."""
+    """Radii of the spheres through the readings over the stated one, without those that the
+    readings hardly show.
+    """
     given = design.lengths
     position = design.readings.position[given.first[rows]]
     found = []
@@ -83,8 +90,14 @@ def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
         centre, radius = fit_sphere(points, design.origins[k])
         away = points - centre
         size = np.sqrt((away**2).sum(axis=1))
-        _, values, vh = np.linalg.svd(np.column_stack([away / size[:, None], np.ones(len(size))]), full_matrices=False)
-        if len(values) < points.shape[1] + 1 or len(points) <= len(values) or values[-1] < FLAT * values[0]:
+        _, values, vh = np.linalg.svd(
+            np.column_stack([away / size[:, None], np.ones(len(size))]), full_matrices=False
+        )
+        if (
+            len(values) < points.shape[1] + 1
+            or len(points) <= len(values)
+            or values[-1] < FLAT * values[0]
+        ):
             continue
         scatter = np.sqrt(((size - radius) ** 2).sum() / (len(points) - len(values)))
         uncertainty = scatter * np.sqrt(((vh[:, -1] / values) ** 2).sum())

@@ -1,4 +1,6 @@
-"""An experiment linearised at a state: the one place where layout, factor, spectrum and covariance come together."""
+"""An experiment linearised at a state: the one place where layout, factor, spectrum and covariance
+come together.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,9 @@ from .parameters import SharedLayout, shared_layout
 
 @dataclass(frozen=True, eq=False)
 class LinearFunctions:
-    """Derivatives of m functions: `shared` (m, s) by the shared parameters, `balls` (m, n, d) by those of all balls,
-    None where no ball has a part in them; `drawn` are the same at the design as drawn, None where these are.
+    """Derivatives of m functions: `shared` (m, s) by the shared parameters, `balls` (m, n, d) by
+    those of all balls, None where no ball has a part in them; `drawn` are the same at the design as
+    drawn, None where these are.
     """
 
     shared: Array
@@ -30,9 +33,10 @@ class LinearFunctions:
 class Linearisation:
     """A design at a `state`, with its `factor` and `spectrum` there.
 
-    Square roots of covariances are in units of the standard deviation of a unit-weight observation. After a fit what is
-    undetermined is what the design leaves open as it is drawn: `drawn` then is the linearisation there, at whose state
-    functions are looked at to see whether a null direction changes them. It is None where that is this one.
+    Square roots of covariances are in units of the standard deviation of a unit-weight observation.
+    After a fit what is undetermined is what the design leaves open as it is drawn: `drawn` then is
+    the linearisation there, at whose state functions are looked at to see whether a null direction
+    changes them. It is None where that is this one.
     """
 
     design: Design
@@ -67,7 +71,9 @@ class Linearisation:
 
     @cached_property
     def balls(self) -> BallCovariance:
-        """Square root of the covariance of the balls; it takes most of the time, and is made when it is asked for."""
+        """Square root of the covariance of the balls; it takes most of the time, and is made when
+        it is asked for.
+        """
         return ball_covariance(self.design, self.factor, self.spectrum)
 
     @property
@@ -76,7 +82,8 @@ class Linearisation:
         return self.as_drawn.balls.null
 
     def of_shared(self, rows: Array, drawn: Array | None = None) -> Array:
-        """Standard deviations (m,) of `rows` (m, s) applied to the shared parameters; NaN where open.
+        """Standard deviations (m,) of `rows` (m, s) applied to the shared parameters; NaN where
+        open.
 
         `drawn` (m, s) are the same functions linearised as drawn, if they are others there.
         """
@@ -103,7 +110,9 @@ class Linearisation:
         return np.asarray(first[:, :width] @ second[:, :width].T)
 
     def _root(self, functions: LinearFunctions) -> Array:
-        """Derivatives (m, r) by standard normal variables: those of what is shared, of kept balls, of each ball."""
+        """Derivatives (m, r) by standard normal variables: those of what is shared, of kept balls,
+        of each ball.
+        """
         common = functions.shared @ self.shared
         if functions.balls is None:
             return np.asarray(common)
@@ -120,10 +129,14 @@ class Linearisation:
 
 @single_threaded
 def linearise(
-    design: Design, state: State | None = None, x: Array | None = None, drawn: Spectrum | None = None
+    design: Design,
+    state: State | None = None,
+    x: Array | None = None,
+    drawn: Spectrum | None = None,
 ) -> Linearisation:
-    """Linearise a design at a `state`, as it is drawn unless told, with scale readings `x` (readings, d) or error-free
-    ones. With a spectrum `drawn` rank and null space are those, see `spectrum`.
+    """Linearise a design at a `state`, as it is drawn unless told, with scale readings `x`
+    (readings, d) or error-free ones. With a spectrum `drawn` rank and null space are those, see
+    `spectrum`.
     """
     state = nominal_state(design) if state is None else state
     layout = shared_layout(design)

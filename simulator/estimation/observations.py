@@ -1,8 +1,8 @@
 """Whitened residuals and derivatives of every kind of observation.
 
-The model is that of NPL Report CISE 15/98, section 3: reading i of ball j in position k with probe l obeys
-x + e(x, a, p) = R y + o + noise. No caller divides by an uncertainty: rows leave here in units of their own
-standard uncertainty.
+The model is that of NPL Report CISE 15/98, section 3: reading i of ball j in position k with probe
+l obeys x + e(x, a, p) = R y + o + noise. No caller divides by an uncertainty: rows leave here in
+units of their own standard uncertainty.
 """
 
 from __future__ import annotations
@@ -11,7 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import Design, State, locations, pose_size, probe_offsets, reading_uncertainties, unknown_lengths
+from ..design.arrays import (
+    Design,
+    State,
+    locations,
+    pose_size,
+    probe_offsets,
+    reading_uncertainties,
+    unknown_lengths,
+)
 from ..design.observations import Readings
 from ..geometry.motions import vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel, Integers
@@ -23,9 +31,11 @@ OFFSET_STEP = 0.1
 
 @dataclass(frozen=True)
 class ReadingBlocks:
-    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m, d, n).
+    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m,
+    d, n).
 
-    `by_offset` (m, d, d) is the derivative by the probe's offset, None where no offset is a parameter.
+    `by_offset` (m, d, d) is the derivative by the probe's offset, None where no offset is a
+    parameter.
     """
 
     residual: Array
@@ -37,7 +47,9 @@ class ReadingBlocks:
 
 @dataclass(frozen=True)
 class BallRows:
-    """Rows that concern ball co-ordinates alone: residual (m,) and the derivative by one ball each (m, d)."""
+    """Rows that concern ball co-ordinates alone: residual (m,) and the derivative by one ball each
+    (m, d).
+    """
 
     residual: Array
     derivative: Array
@@ -49,16 +61,19 @@ def expected_readings(design: Design, state: State, readings: Readings) -> Array
 
 
 def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
-    """Derivative (m, d, d) of the error by the probe offset: identity plus what the machine's rotations add.
+    """Derivative (m, d, d) of the error by the probe offset: identity plus what the machine's
+    rotations add.
 
-    A rotation acts on the offset linearly, so that a central difference over a whole machine arm is exact to rounding
-    for every model of rigid axes.
+    A rotation acts on the offset linearly, so that a central difference over a whole machine arm is
+    exact to rounding for every model of rigid axes.
     """
     columns = []
     for axis in range(x.shape[1]):
         step = np.zeros(x.shape[1])
         step[axis] = OFFSET_STEP
-        columns.append((model.error(x, a, p + step) - model.error(x, a, p - step)) / (2.0 * OFFSET_STEP))
+        columns.append(
+            (model.error(x, a, p + step) - model.error(x, a, p - step)) / (2.0 * OFFSET_STEP)
+        )
     return np.stack(columns, axis=2)
 
 
@@ -83,8 +98,12 @@ def reading_weights(design: Design, readings: Readings) -> Array:
     return np.asarray(np.sqrt(readings.repeats)[:, None] / reading_uncertainties(design, readings))
 
 
-def reading_blocks(design: Design, state: State, readings: Readings, x: Array | None) -> ReadingBlocks:
-    """Rows of readings of plates, with scale readings x (m, d), or error-free ones where x is None."""
+def reading_blocks(
+    design: Design, state: State, readings: Readings, x: Array | None
+) -> ReadingBlocks:
+    """Rows of readings of plates, with scale readings x (m, d), or error-free ones where x is
+    None.
+    """
     d = design.dimension
     p = probe_offsets(design, state)[readings.probe]
     rotation = state.rotations[readings.position]
@@ -117,20 +136,26 @@ def coordinate_rows(design: Design, state: State) -> BallRows:
 
 
 def distance_rows(design: Design, state: State) -> BallRows:
-    """Rows of calibrated distances; `derivative` is by the first ball, its negative by the second."""
+    """Rows of calibrated distances; `derivative` is by the first ball, its negative by the
+    second.
+    """
     given = design.distances
     difference = state.balls[given.first] - state.balls[given.second]
     difference = difference * (np.arange(design.dimension) < given.dimensions[:, None])
     length = np.sqrt((difference**2).sum(axis=1))
-    return BallRows((length - given.value) / given.uncertainty, difference / (length * given.uncertainty)[:, None])
+    return BallRows(
+        (length - given.value) / given.uncertainty,
+        difference / (length * given.uncertainty)[:, None],
+    )
 
 
 def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
-    """Rows of length standards read in the volume: residual (r,) and derivative by the model (r, n).
+    """Rows of length standards read in the volume: residual (r,) and derivative by the model (r,
+    n).
 
-    There are as many rows as lengths that do not follow from others. `x` (readings, d) holds the scale readings of all
-    readings, or is None for an error-free machine; the length between corrected points, or its projection, is
-    compared with the known one (NPL section 3.2.2).
+    There are as many rows as lengths that do not follow from others. `x` (readings, d) holds the
+    scale readings of all readings, or is None for an error-free machine; the length between
+    corrected points, or its projection, is compared with the known one (NPL section 3.2.2).
     """
     residual, found = _length_residuals(design, state, x)
     rows = np.zeros((len(design.lengths), len(state.a)))
@@ -140,10 +165,14 @@ def length_rows(design: Design, state: State, x: Array | None) -> tuple[Array, A
     return residual, design.length_whitening.whitened(rows)
 
 
-def length_shared_rows(design: Design, layout: SharedLayout, state: State, x: Array | None) -> tuple[Array, Array]:
+def length_shared_rows(
+    design: Design, layout: SharedLayout, state: State, x: Array | None
+) -> tuple[Array, Array]:
     """The same residuals (r,), with the derivative (r, s) by all shared parameters."""
     residual, found = _length_residuals(design, state, x)
-    return residual, design.length_whitening.whitened(_length_derivative(design, layout, state, found))
+    return residual, design.length_whitening.whitened(
+        _length_derivative(design, layout, state, found)
+    )
 
 
 def length_derivative(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Array:
@@ -151,7 +180,9 @@ def length_derivative(design: Design, layout: SharedLayout, state: State, x: Arr
     return _length_derivative(design, layout, state, _measured_lengths(design, state, x))
 
 
-def _length_derivative(design: Design, layout: SharedLayout, state: State, found: _Measured) -> Array:
+def _length_derivative(
+    design: Design, layout: SharedLayout, state: State, found: _Measured
+) -> Array:
     given = design.lengths
     # What is held goes to the extra column.
     rows = np.zeros((len(given), len(layout) + 1))
@@ -162,9 +193,15 @@ def _length_derivative(design: Design, layout: SharedLayout, state: State, found
         if design.free_offsets is not None:
             by_offset = offset_sensitivity(design.model, end.points, state.a, end.offsets)
             columns = layout.offset_columns[end.probe]
-            np.add.at(rows, (end.rows[:, None], columns), end.sign * np.einsum("md,mdj->mj", along, by_offset))
+            np.add.at(
+                rows,
+                (end.rows[:, None], columns),
+                end.sign * np.einsum("md,mdj->mj", along, by_offset),
+            )
     pivoted = np.flatnonzero(given.to_pivot)
-    columns = layout.pose_columns[design.readings.position[given.first[pivoted]], : design.dimension]
+    columns = layout.pose_columns[
+        design.readings.position[given.first[pivoted]], : design.dimension
+    ]
     np.add.at(rows, (pivoted[:, None], columns), -found.unit[pivoted])
     if given.free is not None:
         free = np.flatnonzero(given.free >= 0)
@@ -174,7 +211,9 @@ def _length_derivative(design: Design, layout: SharedLayout, state: State, found
 
 @dataclass(frozen=True)
 class _End:
-    """Ends of lengths `rows` (k,) that are read: scale readings and probe offsets (k, d), probes (k,)."""
+    """Ends of lengths `rows` (k,) that are read: scale readings and probe offsets (k, d), probes
+    (k,).
+    """
 
     sign: float
     rows: Integers
@@ -185,7 +224,9 @@ class _End:
 
 @dataclass(frozen=True)
 class _Measured:
-    """Lengths between corrected points (m,), their directions (m, d), and the ends that are read."""
+    """Lengths between corrected points (m,), their directions (m, d), and the ends that are
+    read.
+    """
 
     length: Array
     unit: Array
@@ -212,7 +253,9 @@ def _measured_lengths(design: Design, state: State, x: Array | None) -> _Measure
                 # Where the ball of a gauge was, which need not be where it was to be.
                 reach = length_values(design, state)[pivoted, None] * given.direction[pivoted]
                 points[pivoted] = pivot + reach - p[pivoted]
-        difference[rows] += sign * (points + (p if x is None else design.model.error(points, state.a, p)))
+        difference[rows] += sign * (
+            points + (p if x is None else design.model.error(points, state.a, p))
+        )
         ends.append(_End(sign, rows, points, p, readings.probe))
     difference[pivoted] -= pivot
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
@@ -228,7 +271,8 @@ def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Ar
 
 
 def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
-    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself, in metres.
+    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself,
+    in metres.
 
     Without scale readings x the machine is taken to read without error.
     """
@@ -236,7 +280,9 @@ def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Ar
         return np.zeros(0), np.ones(0)
     found = _measured_lengths(design, state, x)
     scatter = design.length_whitening.scatter
-    return found.length - length_values(design, state), np.hypot(scatter, design.lengths.uncertainty)
+    return found.length - length_values(design, state), np.hypot(
+        scatter, design.lengths.uncertainty
+    )
 
 
 def length_directions(design: Design, state: State, x: Array | None) -> Array:
@@ -247,7 +293,9 @@ def length_directions(design: Design, state: State, x: Array | None) -> Array:
 
 
 def length_values(design: Design, state: State) -> Array:
-    """Values (m,) at `state` that lengths of standards are compared with: those certified, or the unknown ones."""
+    """Values (m,) at `state` that lengths of standards are compared with: those certified, or the
+    unknown ones.
+    """
     given = design.lengths
     if given.free is None or not len(design.length_names):
         return given.value
@@ -271,7 +319,9 @@ def _pose_values(design: Design, state: State) -> Array:
 
 
 def prior_rows(design: Design, layout: SharedLayout, state: State) -> tuple[Array, Array]:
-    """Rows of what is known beforehand: residual (m,) and derivative by the shared parameters (m, s)."""
+    """Rows of what is known beforehand: residual (m,) and derivative by the shared parameters (m,
+    s).
+    """
     given, d = design.priors, design.dimension
     derivative = np.zeros((len(given), len(layout)))
     if not len(given):
@@ -283,7 +333,9 @@ def prior_rows(design: Design, layout: SharedLayout, state: State) -> tuple[Arra
     derivative[rows, layout.pose_columns[given.position[rows], given.component[rows]]] = 1.0
     rows = np.flatnonzero((given.position >= 0) & (given.component >= d))
     place = given.position[rows]
-    rate = vector_rate(_pose_values(design, state)[place, d:])[np.arange(len(rows)), given.component[rows] - d]
+    rate = vector_rate(_pose_values(design, state)[place, d:])[
+        np.arange(len(rows)), given.component[rows] - d
+    ]
     columns = layout.pose_columns[place, d:]
     # What is held does not move.
     row, turn = np.nonzero(columns >= 0)

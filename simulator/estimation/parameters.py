@@ -25,12 +25,13 @@ def pose_parameter_names(dimension: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class SharedLayout:
-    """Columns of the shared parameters: the free ones of poses, machine errors, free probe offsets, unknown lengths.
+    """Columns of the shared parameters: the free ones of poses, machine errors, free probe offsets,
+    unknown lengths.
 
-    `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or belongs to a
-    length standard, and `offset_columns` (l, d) the same for probe offsets; `lengths` are the columns of unknown
-    lengths. `scale` (columns,) is the size of each
-    parameter, in its own unit, that moves a point somewhere by about one metre.
+    `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or
+    belongs to a length standard, and `offset_columns` (l, d) the same for probe offsets; `lengths`
+    are the columns of unknown lengths. `scale` (columns,) is the size of each parameter, in its own
+    unit, that moves a point somewhere by about one metre.
     """
 
     parameters: tuple[Parameter, ...]

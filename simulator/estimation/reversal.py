@@ -1,12 +1,15 @@
-"""Squareness and scale difference of two axes from a plate read before and after a quarter turn (NBSIR 79-1752).
+"""Squareness and scale difference of two axes from a plate read before and after a quarter turn
+(NBSIR 79-1752).
 
-With (x1, y1) the readings of a ball in the first position, (x2, y2) those after a turn by 90 degrees + beta, clockwise
-as seen against z, and (ex, ey) the offset between the two, to first order in all of alpha, beta and gamma,
+With (x1, y1) the readings of a ball in the first position, (x2, y2) those after a turn by 90
+degrees + beta, clockwise as seen against z, and (ex, ey) the offset between the two, to first order
+in all of alpha, beta and gamma,
 
     x1 = -(beta + alpha) x2 - (1 + gamma) y2 + ex,    y1 = (1 - gamma) x2 + (alpha - beta) y2 + ey,
 
-equations (15) with the sign of gamma put right in the first. They hold for any share of gamma that the scales of x and
-y are given (appendix B), and are linear: five parameters, or three without the offset (appendix A).
+equations (15) with the sign of gamma put right in the first. They hold for any share of gamma that
+the scales of x and y are given (appendix B), and are linear: five parameters, or three without the
+offset (appendix A).
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ from ..machines.metric import MetricModel, Scale
 from ..machines.protocol import Array
 from ..numerics.threads import single_threaded
 
-# Balls whose spread across their main line is below this fraction of their length count as on one line.
+# Balls whose spread across their main line is below this fraction of their length count as on one
+# line.
 ON_A_LINE = 1e-4
 # Of an angle far from 90 degrees a third, at 45 degrees, is left wrong by each step.
 STEPS = 40
@@ -36,15 +40,17 @@ class UndeterminedError(ValueError):
 class Reversal:
     """What the first-order equations give for n balls; angles in radians, lengths in metres.
 
-    `offset` (2,) is zero where it is no parameter. `residuals` (n, 2) are the readings of the first position less what
-    those of the second predict; `sigma` is their root mean square over `degrees_of_freedom`, NaN without any. The
-    error of two readings is in each, so that a single reading scatters by sigma / sqrt(2). `coordinates` (n, 2) are
-    the balls along the machine's axes in the first position, up to a shift: the mean of both positions, corrected.
+    `offset` (2,) is zero where it is no parameter. `residuals` (n, 2) are the readings of the first
+    position less what those of the second predict; `sigma` is their root mean square over
+    `degrees_of_freedom`, NaN without any. The error of two readings is in each, so that a single
+    reading scatters by sigma / sqrt(2). `coordinates` (n, 2) are the balls along the machine's axes
+    in the first position, up to a shift: the mean of both positions, corrected.
 
-    `neglected` (n, 2) is what the first-order equations leave out, up to a shift. It is taken at the parameters with
-    which nothing is left out; `exact_beta`, `exact_coordinates` (n, 2) and `exact_offset` (2,) are theirs, and
-    `scatter` the standard deviation of a reading about them, which `sigma` overstates where much is neglected.
-    `bias` is the most that neglecting it changes any parameter or co-ordinate by, in standard uncertainties.
+    `neglected` (n, 2) is what the first-order equations leave out, up to a shift. It is taken at
+    the parameters with which nothing is left out; `exact_beta`, `exact_coordinates` (n, 2) and
+    `exact_offset` (2,) are theirs, and `scatter` the standard deviation of a reading about them,
+    which `sigma` overstates where much is neglected. `bias` is the most that neglecting it changes
+    any parameter or co-ordinate by, in standard uncertainties.
     """
 
     alpha: float
@@ -69,9 +75,11 @@ class Reversal:
 
 
 def turn_between(first: Array, second: Array) -> float:
-    """Angle in radians that takes readings (n, 2) in the first position to those in the second, counter-clockwise.
+    """Angle in radians that takes readings (n, 2) in the first position to those in the second,
+    counter-clockwise.
 
-    >>> round(turn_between(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.0, 1.0], [0.0, 0.0]])), 12)
+    >>> first, second = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.0, 1.0], [0.0, 0.0]])
+    >>> round(turn_between(first, second), 12)
     -1.570796326795
     """
     rotation, _ = fit_motion(first, second)
@@ -80,17 +88,21 @@ def turn_between(first: Array, second: Array) -> float:
 
 @single_threaded
 def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> Reversal:
-    """Fit readings (n, 2) of the same balls in two positions, the second about 90 degrees clockwise from the first.
+    """Fit readings (n, 2) of the same balls in two positions, the second about 90 degrees clockwise
+    from the first.
 
-    `scale` tells which axis takes the scale difference when co-ordinates are corrected. With "none" neither does; it is
-    fitted all the same, as the report does. Without `offsets` both positions have to be read from the same ball.
+    `scale` tells which axis takes the scale difference when co-ordinates are corrected. With "none"
+    neither does; it is fitted all the same, as the report does. Without `offsets` both positions
+    have to be read from the same ball.
 
     :raises UndeterminedError: the balls lie on one line.
     """
     # Without offsets a line has to go through the origin to leave anything open.
     arms = second - second.mean(axis=0) if offsets else second
     if _spread(arms) < ON_A_LINE:
-        raise UndeterminedError("the balls lie on one line, and do not show both squareness and scale difference")
+        raise UndeterminedError(
+            "the balls lie on one line, and do not show both squareness and scale difference"
+        )
     x2, y2 = second.T
     zero, one = np.zeros(len(x2)), np.ones(len(x2))
     by_x = np.stack([-x2, -x2, -y2, one, zero], axis=1)
@@ -102,7 +114,9 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     weights = np.array([size, size, size, 1.0, 1.0])[: rows.shape[1]]
 
     def solved(neglected: Array) -> tuple[Array, Array, Array, float]:
-        """Parameters, the offset (2,), residuals (n, 2) and sigma with what is neglected (n, 2) taken out."""
+        """Parameters, the offset (2,), residuals (n, 2) and sigma with what is neglected (n, 2)
+        taken out.
+        """
         aim = wanted - neglected.T.ravel()
         found = np.linalg.lstsq(rows / weights, aim, rcond=None)[0] / weights
         left = aim - rows @ found
@@ -132,7 +146,12 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
         _corrected(first - residuals / 2.0 - offset / 2.0, scale, alpha, gamma),
         neglected,
         float(exact[1]),
-        _corrected(first - exact_residuals / 2.0 - exact_offset / 2.0, scale, float(exact[0]), float(exact[2])),
+        _corrected(
+            first - exact_residuals / 2.0 - exact_offset / 2.0,
+            scale,
+            float(exact[0]),
+            float(exact[2]),
+        ),
         exact_offset,
         exact_sigma / float(np.sqrt(2.0)),
         _bias(neglected, np.abs(found - exact)[3:] / lengths[3:], exact_sigma),
@@ -140,11 +159,13 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
 
 
 def _bias(neglected: Array, offset: Array, sigma: float) -> float:
-    """Most that neglecting terms (n, 2) changes any parameter or co-ordinate by, in its own standard uncertainties.
+    """Most that neglecting terms (n, 2) changes any parameter or co-ordinate by, in its own
+    standard uncertainties.
 
-    A linear function of the readings with the coefficients l has the standard uncertainty s |l|, s = sigma / sqrt(2),
-    and changes by no more than |l| |n| where the readings change by n: no more than |n| / s for any. A shift of all is
-    no part of n, so that what the offset changes by is told apart; (2,), or (0,) without, for coefficients of length 1.
+    A linear function of the readings with the coefficients l has the standard uncertainty s |l|, s
+    = sigma / sqrt(2), and changes by no more than |l| |n| where the readings change by n: no more
+    than |n| / s for any. A shift of all is no part of n, so that what the offset changes by is told
+    apart; (2,), or (0,) without, for coefficients of length 1.
     """
     sigma = max(sigma, float(np.sqrt(2.0)) * FINEST)
     size = max(float(np.sqrt(2.0 * (neglected**2).sum())), float(offset.max(initial=0.0)))
@@ -152,7 +173,9 @@ def _bias(neglected: Array, offset: Array, sigma: float) -> float:
 
 
 def _spread(arms: Array) -> float:
-    """Extent of points (n, 2) across their main line through the origin, as a fraction of that along it."""
+    """Extent of points (n, 2) across their main line through the origin, as a fraction of that
+    along it.
+    """
     extent = np.linalg.svd(arms, compute_uv=False)
     return float(extent[1] / extent[0]) if len(extent) == 2 and extent[0] > 0.0 else 0.0
 
@@ -168,4 +191,6 @@ def _left_out(alpha: float, beta: float, gamma: float) -> Array:
     inverse = _corrected(np.eye(2), "split", alpha, gamma).T
     c, s = np.cos(beta), np.sin(beta)
     exact = np.linalg.inv(inverse) @ np.array([[-s, -c], [c, -s]]) @ inverse
-    return np.asarray(exact - np.array([[-(beta + alpha), -(1.0 + gamma)], [1.0 - gamma, alpha - beta]]))
+    return np.asarray(
+        exact - np.array([[-(beta + alpha), -(1.0 + gamma)], [1.0 - gamma, alpha - beta]])
+    )

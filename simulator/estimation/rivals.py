@@ -1,27 +1,29 @@
-"""Estimators that use distances alone, to be compared with the full one (NPL Report CISE 15/98, section 3.4).
+"""Estimators that use distances alone, to be compared with the full one (NPL Report CISE 15/98,
+section 3.4).
 
-All of them know the machine by its parameters a only. With x*_ik the corrected point of ball i in position k with the
-probe it was read with (each probe's readings count as a position of their own), L_ijk = |x*_ik - x*_jk|, s_ijk its
-standard uncertainty taken from the readings' along the line of the two balls, and D_c the calibrated distance of pair
-c with uncertainty u_c, they minimise over a, for a stated set of pairs (i, j):
+All of them know the machine by its parameters a only. With x*_ik the corrected point of ball i in
+position k with the probe it was read with (each probe's readings count as a position of their own),
+L_ijk = |x*_ik - x*_jk|, s_ijk its standard uncertainty taken from the readings' along the line of
+the two balls, and D_c the calibrated distance of pair c with uncertainty u_c, they minimise over a,
+for a stated set of pairs (i, j):
 
-distances
-    sum over ij, k of ((L_ijk - d_ij) / s_ijk)^2 + sum over c of ((d_c - D_c) / u_c)^2, over the distances d_ij as well:
-    equation (12).
-cresto
-    sum over ij, k < l of (L_ijk - L_ijl)^2 / (s_ijk^2 + s_ijl^2) + sum over c, k of (L_ck - D_c)^2 / (s_ck^2 + u_c^2):
-    a distance does not change with the position; calibrated ones are prescribed in every position.
-kruth
-    sum over ij, k > 0 of (L_ijk - L_ij0)^2 / (s_ijk^2 + s_ij0^2) + sum over c of (L_c0 - D_c)^2 / (s_c0^2 + u_c^2):
-    the plate is what the corrected points of its initial position 0 say, the first one in which both balls are
-    read; calibrated distances are additional measurements of it (Kruth, Vanherck and de Jonge).
+distances sum over ij, k of ((L_ijk - d_ij) / s_ijk)^2 + sum over c of ((d_c - D_c) / u_c)^2, over
+    the distances d_ij as well: equation (12).
+cresto sum over ij, k < l of (L_ijk - L_ijl)^2 / (s_ijk^2 + s_ijl^2) + sum over c, k of (L_ck -
+    D_c)^2 / (s_ck^2 + u_c^2): a distance does not change with the position; calibrated ones are
+    prescribed in every position.
+kruth sum over ij, k > 0 of (L_ijk - L_ij0)^2 / (s_ijk^2 + s_ij0^2) + sum over c of (L_c0 - D_c)^2 /
+    (s_c0^2 + u_c^2): the plate is what the corrected points of its initial position 0 say, the
+    first one in which both balls are read; calibrated distances are additional measurements of it
+    (Kruth, Vanherck and de Jonge).
 
-Where a position is read with several probes, the two balls of a distance may also have been read with different ones;
-with `across_probes` such distances count like those of one probe. The report does not say which it used.
+Where a position is read with several probes, the two balls of a distance may also have been read
+with different ones; with `across_probes` such distances count like those of one probe. The report
+does not say which it used.
 
-Each treats its terms as independent, though they share readings; that is what makes them worse than the full
-estimator. Known lengths of length standards, and priors on the machine's parameters, enter all of them as they do
-there; calibrated co-ordinates, poses and probe offsets cannot.
+Each treats its terms as independent, though they share readings; that is what makes them worse than
+the full estimator. Known lengths of length standards, and priors on the machine's parameters, enter
+all of them as they do there; calibrated co-ordinates, poses and probe offsets cannot.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ RivalName = Literal["distances", "cresto", "kruth"]
 
 @dataclass(frozen=True)
 class RivalSolution:
-    """Parameters a (n,) of the machine, the record of iterations, and undetermined directions of a (n, deficiency).
+    """Parameters a (n,) of the machine, the record of iterations, and undetermined directions of a
+    (n, deficiency).
 
     `observations` counts the terms of the sum of squares.
     """
@@ -63,7 +66,8 @@ class RivalSolution:
 
 @dataclass(frozen=True)
 class _Points:
-    """Points read, one for each ball, position and probe: scale readings (r, d) and their variances (r, d).
+    """Points read, one for each ball, position and probe: scale readings (r, d) and their variances
+    (r, d).
 
     `place` (r,) numbers the positions and probes, `position` (places,) tells the position of each.
     """
@@ -78,9 +82,11 @@ class _Points:
 
 @dataclass(frozen=True)
 class _Measured:
-    """Distances between two points of the same position (m,): pair (m,), points, and variance of each.
+    """Distances between two points of the same position (m,): pair (m,), points, and variance of
+    each.
 
-    `calibrated`, `value` and `uncertainty` (c,) tell pairs whose distance is known. Sorted by pair, then place.
+    `calibrated`, `value` and `uncertainty` (c,) tell pairs whose distance is known. Sorted by pair,
+    then place.
     """
 
     pair: Integers
@@ -93,7 +99,8 @@ class _Measured:
     uncertainty: Array
 
 
-# From lengths (m,) and their derivatives (m, n) to whitened rows: residuals (rows,) and derivatives (rows, n).
+# From lengths (m,) and their derivatives (m, n) to whitened rows: residuals (rows,) and derivatives
+# (rows, n).
 _Rows = Callable[[_Measured, Array, Array], tuple[Array, Array]]
 
 
@@ -107,10 +114,11 @@ def rival_estimate(
     settings: GaussNewtonSettings | None = None,
     start: Array | None = None,
 ) -> RivalSolution:
-    """Minimise the objective of a rival estimator by Gauss-Newton, from `start` or a machine without errors.
+    """Minimise the objective of a rival estimator by Gauss-Newton, from `start` or a machine
+    without errors.
 
-    `x` (readings, d) holds the scale readings, `pairs` (p, 2) ball indices; calibrated pairs are added to them.
-    Directions that the distances leave open are not moved in.
+    `x` (readings, d) holds the scale readings, `pairs` (p, 2) ball indices; calibrated pairs are
+    added to them. Directions that the distances leave open are not moved in.
     """
     settings = settings or GaussNewtonSettings()
     points = _points(design, x)
@@ -129,7 +137,9 @@ def rival_estimate(
         if not np.isfinite(total):
             status = "diverged"
             break
-        triangle = np.asarray(np.linalg.qr(np.column_stack([derivative * scale, residual]), mode="r"))
+        triangle = np.asarray(
+            np.linalg.qr(np.column_stack([derivative * scale, residual]), mode="r")
+        )
         u, values, vh = np.linalg.svd(triangle[: len(a), :-1])
         rank = int((values > EXACT * values.max(initial=0.0)).sum())
         null = scale[:, None] * vh[rank:].T
@@ -154,7 +164,10 @@ def _points(design: Design, x: Array) -> _Points:
     unique, of = np.unique(table, axis=0, return_inverse=True)
     of = of.ravel()
     weight = readings.repeats[:, None] / reading_uncertainties(design, readings) ** 2
-    total, mean = np.zeros((len(unique), design.dimension)), np.zeros((len(unique), design.dimension))
+    total, mean = (
+        np.zeros((len(unique), design.dimension)),
+        np.zeros((len(unique), design.dimension)),
+    )
     np.add.at(total, of, weight)
     # Relative to one of them, so that the mean of equal readings is that reading.
     start = np.zeros_like(mean)
@@ -168,7 +181,9 @@ def _points(design: Design, x: Array) -> _Points:
 def _measured(design: Design, points: _Points, pairs: Integers, across_probes: bool) -> _Measured:
     given = design.distances
     known = np.stack([given.first, given.second], axis=1)
-    ends, of = np.unique(np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    ends, of = np.unique(
+        np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True
+    )
     at = np.full((len(design.balls), len(points.position)), -1)
     at[points.ball, points.place] = np.arange(len(points.ball))
     one, other = np.nonzero(points.position[:, None] == points.position)
@@ -181,7 +196,9 @@ def _measured(design: Design, points: _Points, pairs: Integers, across_probes: b
     along = _apart(points.x + design.probes[points.probe], first, second)[1]
     variance = np.einsum("md,md->m", along**2, points.variance[first] + points.variance[second])
     calibrated = of.ravel()[len(pairs) :]
-    return _Measured(pair, first, second, variance, len(ends), calibrated, given.value, given.uncertainty)
+    return _Measured(
+        pair, first, second, variance, len(ends), calibrated, given.value, given.uncertainty
+    )
 
 
 def _apart(places: Array, first: Integers, second: Integers) -> tuple[Array, Array]:
@@ -195,7 +212,9 @@ def _all_rows(
     design: Design, x: Array, points: _Points, measured: _Measured, a: Array, rows: _Rows
 ) -> tuple[Array, Array]:
     p = design.probes[points.probe]
-    length, along = _apart(points.x + design.model.error(points.x, a, p), measured.first, measured.second)
+    length, along = _apart(
+        points.x + design.model.error(points.x, a, p), measured.first, measured.second
+    )
     jacobian = design.model.jacobian(points.x, a, p)
     by_model = np.einsum("md,mdn->mn", along, jacobian[measured.first] - jacobian[measured.second])
     found = [rows(measured, length, by_model)]
@@ -206,13 +225,18 @@ def _all_rows(
     if len(of_model):
         weight, of_parameters = 1.0 / priors.uncertainty[of_model], priors.by_model[of_model]
         found.append(
-            (weight * (of_parameters @ a - priors.value[of_model]), weight[:, None] * of_parameters),
+            (
+                weight * (of_parameters @ a - priors.value[of_model]),
+                weight[:, None] * of_parameters,
+            ),
         )
     return np.concatenate([one[0] for one in found]), np.concatenate([one[1] for one in found])
 
 
 def _free_distances(measured: _Measured, length: Array, by_model: Array) -> tuple[Array, Array]:
-    """Rows of equation (12), every pair's distance eliminated by an orthogonal projection of the pair's own rows."""
+    """Rows of equation (12), every pair's distance eliminated by an orthogonal projection of the
+    pair's own rows.
+    """
     weight = 1.0 / np.sqrt(measured.variance)
     pair = np.concatenate([measured.pair, measured.calibrated])
     by_distance = np.concatenate([-weight, 1.0 / measured.uncertainty])
@@ -232,7 +256,9 @@ def _differences(
 ) -> tuple[Array, Array]:
     """Rows that say that two measured distances of a pair are equal."""
     weight = 1.0 / np.sqrt(measured.variance[first] + measured.variance[second])
-    return weight * (length[first] - length[second]), weight[:, None] * (by_model[first] - by_model[second])
+    return weight * (length[first] - length[second]), weight[:, None] * (
+        by_model[first] - by_model[second]
+    )
 
 
 def _prescribed(
@@ -247,7 +273,9 @@ def _stacked(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
-def _every_two_positions(measured: _Measured, length: Array, by_model: Array) -> tuple[Array, Array]:
+def _every_two_positions(
+    measured: _Measured, length: Array, by_model: Array
+) -> tuple[Array, Array]:
     """Rows of Cresto's estimator."""
     count = np.bincount(measured.pair, minlength=measured.pairs)
     rows = np.arange(len(measured.pair))
@@ -256,7 +284,8 @@ def _every_two_positions(measured: _Measured, length: Array, by_model: Array) ->
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(later) - later, later)
     row, known = np.nonzero(measured.pair[:, None] == measured.calibrated)
     return _stacked(
-        _differences(measured, length, by_model, first, second), _prescribed(measured, length, by_model, row, known)
+        _differences(measured, length, by_model, first, second),
+        _prescribed(measured, length, by_model, row, known),
     )
 
 

@@ -10,7 +10,9 @@ from .elimination import Factor
 
 
 def solve_balls(factor: Factor, side: Array, transposed: bool = False) -> Array:
-    """Solve the systems (e, d, d) of the balls eliminated singly for sides (e, d, m), all balls at once."""
+    """Solve the systems (e, d, d) of the balls eliminated singly for sides (e, d, m), all balls at
+    once.
+    """
     root = factor.ball_root
     order = None if factor.orders is None else factor.orders.ball[:, :, None]
     if not transposed:
@@ -22,12 +24,18 @@ def solve_balls(factor: Factor, side: Array, transposed: bool = False) -> Array:
 
 def solve_kept(factor: Factor, side: Array, transposed: bool = False) -> Array:
     """Solve the system of the balls that distances tie together for sides (d k, ...)."""
-    return _solve(factor.kept_root, None if factor.orders is None else factor.orders.kept, side, transposed)
+    return _solve(
+        factor.kept_root, None if factor.orders is None else factor.orders.kept, side, transposed
+    )
 
 
 def solve_shared(factor: Factor, side: Array, transposed: bool = False) -> Array:
-    """Solve the system of the shared parameters for sides (s, ...); of a design of full rank only."""
-    return _solve(factor.root, None if factor.orders is None else factor.orders.shared, side, transposed)
+    """Solve the system of the shared parameters for sides (s, ...); of a design of full rank
+    only.
+    """
+    return _solve(
+        factor.root, None if factor.orders is None else factor.orders.shared, side, transposed
+    )
 
 
 def in_order(factor: Factor) -> Array:
@@ -42,7 +50,11 @@ def in_order(factor: Factor) -> Array:
 def _solve(root: Array, order: Integers | None, side: Array, transposed: bool) -> Array:
     solve_triangular = scipy_linalg().solve_triangular
     if transposed:
-        return np.asarray(solve_triangular(root, side if order is None else side[order], trans="T", check_finite=False))
+        return np.asarray(
+            solve_triangular(
+                root, side if order is None else side[order], trans="T", check_finite=False
+            )
+        )
     solution = np.asarray(solve_triangular(root, side, check_finite=False))
     if order is None:
         return solution

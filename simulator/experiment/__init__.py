@@ -1,4 +1,6 @@
-"""Experiment files: loading them, what they may say, and the messages about what is wrong with them."""
+"""Experiment files: loading them, what they may say, and the messages about what is wrong with
+them.
+"""
 
 from ..inputs.messages import ExperimentError, Message
 from .load import load

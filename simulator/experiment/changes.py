@@ -23,7 +23,11 @@ def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
     messages = []
     for path, value in changes.items():
         try:
-            tree = removed(tree, path) if value is None else override(tree, path, node_of(value, mark), mark)
+            tree = (
+                removed(tree, path)
+                if value is None
+                else override(tree, path, node_of(value, mark), mark)
+            )
         except ValueError as error:
             messages.append(mark.message(path, str(error)))
     if messages:
@@ -47,4 +51,6 @@ def node_of(value: object, mark: Mark) -> Node:
         return Mapping(mark, items, dict.fromkeys(items, mark))
     if isinstance(value, AnySequence) and not isinstance(value, bytes):
         return Sequence(mark, tuple(node_of(item, mark) for item in value))
-    raise ValueError(f"a {type(value).__name__} cannot be written; give text, a number, a list or a mapping")
+    raise ValueError(
+        f"a {type(value).__name__} cannot be written; give text, a number, a list or a mapping"
+    )

@@ -1,4 +1,6 @@
-"""Checks that need several sections: names used twice, balls outside the volume, balls nobody reads."""
+"""Checks that need several sections: names used twice, balls outside the volume, balls nobody
+reads.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,13 @@ from ..inputs.yamltree import Mark
 from ..machines.curves import Points
 from ..machines.custom import CustomModelError
 from ..machines.description import MachineDescription, random_part
-from ..machines.settings import MachineFileSettings, MetricSettings, PythonSettings, build_error_model, dimension_of
+from ..machines.settings import (
+    MachineFileSettings,
+    MetricSettings,
+    PythonSettings,
+    build_error_model,
+    dimension_of,
+)
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
 from .curves import read_curves
@@ -39,11 +47,13 @@ from .structure import Sections
 
 TOLERANCE = 1e-9
 
-# Parameters besides those of the balls: their time grows with the cube of the number, their memory with its square.
+# Parameters besides those of the balls: their time grows with the cube of the number, their memory
+# with its square.
 MOST_SHARED = 3500
 # Lengths that the standards contribute, each a row over the machine's errors.
 MOST_LENGTHS = 20_000
-# Lengths of a standard of which some have a ball in common, whose uncertainties are therefore treated together.
+# Lengths of a standard of which some have a ball in common, whose uncertainties are therefore
+# treated together.
 MOST_JOINT_LENGTHS = 3000
 # Derivatives of the evaluation points by machine errors: for each point, axis and error.
 MOST_DERIVATIVES = 50_000_000
@@ -51,14 +61,18 @@ AXES = ("x", "y", "z")
 
 
 def check_error_model(sections: Sections, machine: Machine | None, references: References) -> None:
-    """Report an error model for another number of dimensions than the volume has, or a user's own that is wrong."""
+    """Report an error model for another number of dimensions than the volume has, or a user's own
+    that is wrong.
+    """
     settings = sections.get("error_model")
     if settings is not None and not _check_model(settings, ("error_model",), machine, references):
         # What is wrong may stand in another file; nothing can be built of it.
         del sections.values["error_model",]
 
 
-def _check_model(settings: Any, steps: Steps, machine: Machine | None, references: References) -> bool:
+def _check_model(
+    settings: Any, steps: Steps, machine: Machine | None, references: References
+) -> bool:
     """Report what is wrong; tell whether the settings can be used further."""
     if isinstance(settings, MachineFileSettings):
         found = _machine_of_file(settings.file, steps, references)
@@ -74,14 +88,19 @@ def _check_model(settings: Any, steps: Steps, machine: Machine | None, reference
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
     elif isinstance(settings, MetricSettings):
-        allowed = {2: ("none", "x", "y", "split"), 3: ("each", "none")}.get(references.dimension or 0)
+        allowed = {2: ("none", "x", "y", "split"), 3: ("each", "none")}.get(
+            references.dimension or 0
+        )
         if allowed and settings.scale is not None and settings.scale not in allowed:
-            text = f"has no meaning in {references.dimension} dimensions; choose from: {listing(allowed)}"
+            text = (
+                f"has no meaning in {references.dimension} dimensions; choose from:"
+                f" {listing(allowed)}"
+            )
             references.problems.add((*steps, "scale"), text)
     elif references.dimension not in (None, dimension_of(settings)):
         text = (
-            f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume has '
-            f"{references.dimension}; change one of the two"
+            f'kind "{settings.kind}" has {dimension_of(settings)} dimensions, but machine.volume'
+            f" has {references.dimension}; change one of the two"
         )
         references.problems.add((*steps, "kind"), text)
     elif (
@@ -89,7 +108,9 @@ def _check_model(settings: Any, steps: Steps, machine: Machine | None, reference
         and machine is not None
         and not build_error_model(settings, *_corners(machine)).parameters
     ):
-        text = f"{settings.file} states no error that could be estimated; give polynomials or tables"
+        text = (
+            f"{settings.file} states no error that could be estimated; give polynomials or tables"
+        )
         references.problems.add((*steps, "file"), text)
         return False
     return True
@@ -105,7 +126,9 @@ def _machine_of_file(
         return None
 
 
-def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | None, references: References) -> None:
+def _true_machine_of_file(
+    truth: TrueMachineFileSettings, machine: Machine | None, references: References
+) -> None:
     """Let the true machine be that of its file, or report what is wrong with it."""
     steps: Steps = ("true_machine", "file")
     if references.dimension == 2:
@@ -118,8 +141,9 @@ def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | Non
     random = random_part(found)
     if random and truth.random_part is None:
         text = (
-            f"has a random part that simulated readings would lack: {listing(random)}; let machine.repeatability cover "
-            "it and add random_part: omitted, or leave it out of the machine file"
+            f"has a random part that simulated readings would lack: {listing(random)}; let"
+            " machine.repeatability cover it and add random_part: omitted, or leave it out of the"
+            " machine file"
         )
         references.problems.add(steps, text)
     if machine is None or machine.dimension != 3:
@@ -128,14 +152,17 @@ def _true_machine_of_file(truth: TrueMachineFileSettings, machine: Machine | Non
         low, high = machine.volume.lower[axis], machine.volume.upper[axis]
         if low < found.lower[axis] - TOLERANCE or high > found.upper[axis] + TOLERANCE:
             text = (
-                f"its volume goes from {format_length(found.lower[axis])} to {format_length(found.upper[axis])} in "
-                f"{name}, but machine.volume from {format_length(low)} to {format_length(high)}; stay within it"
+                f"its volume goes from {format_length(found.lower[axis])} to"
+                f" {format_length(found.upper[axis])} in {name}, but machine.volume from"
+                f" {format_length(low)} to {format_length(high)}; stay within it"
             )
             references.problems.add(steps, text)
 
 
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
-    """Report a true machine whose own error model is wrong, or values that its error model cannot have."""
+    """Report a true machine whose own error model is wrong, or values that its error model cannot
+    have.
+    """
     settings, truth = sections.get("error_model"), sections.get("true_machine")
     if truth is None:
         return
@@ -150,9 +177,17 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
         return
     problems = references.problems
     if isinstance(truth, RandomSettings) and truth.position is None and truth.rotation is None:
-        text = "without sizes it is a machine without errors; give position: 2 um, rotation: 4 urad, or both"
+        text = (
+            "without sizes it is a machine without errors; give position: 2 um, rotation: 4 urad,"
+            " or both"
+        )
         problems.add(("true_machine",), text)
-    if settings is None or machine is None or problems.has_below(("error_model",)) or problems.has_below(_TRUE_MODEL):
+    if (
+        settings is None
+        or machine is None
+        or problems.has_below(("error_model",))
+        or problems.has_below(_TRUE_MODEL)
+    ):
         return
     corners = _corners(machine)
     try:
@@ -177,7 +212,10 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
             continue
         twice = [name for name in found if name in curves]
         if twice:
-            problems.add(steps, f"{listing(twice)} is in an earlier file already; leave it out of one of the two")
+            problems.add(
+                steps,
+                f"{listing(twice)} is in an earlier file already; leave it out of one of the two",
+            )
         curves |= found
         if machine is None or machine.dimension != 3:
             continue
@@ -187,8 +225,10 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
         covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
         if covered < 0.5 * (upper - lower):
             text = (
-                f"goes from {format_length(points.positions[0])} to {format_length(points.positions[-1])}, but "
-                f"machine.volume from {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most of it"
+                f"goes from {format_length(points.positions[0])} to"
+                f" {format_length(points.positions[-1])}, but machine.volume from"
+                f" {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most"
+                " of it"
             )
             problems.add(steps, text)
     truth.of(curves)
@@ -209,18 +249,26 @@ def check_names(position_count: int, problems: Problems) -> None:
         if name is None:
             continue
         if name in first:
-            text = f'"{name}" is the name of positions[{first[name]}] already; names of positions must differ'
+            text = (
+                f'"{name}" is the name of positions[{first[name]}] already; names of positions must'
+                " differ"
+            )
             problems.add(("positions", i, "name"), text)
         first.setdefault(name, i)
 
 
 def check_inside(
-    position: Position, steps: Steps, volume: Volume, offsets: Mapping[str, Floats], references: References
+    position: Position,
+    steps: Steps,
+    volume: Volume,
+    offsets: Mapping[str, Floats],
+    references: References,
 ) -> None:
-    """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those of the probes.
+    """Report readings with scale readings outside the measuring volume; ``offsets`` (d,) are those
+    of the probes.
 
-    Error models are functions of the scale readings, where the ball is less the probe's offset. Balls may be outside,
-    and scale readings by a thousandth of the volume.
+    Error models are functions of the scale readings, where the ball is less the probe's offset.
+    Balls may be outside, and scale readings by a thousandth of the volume.
     """
     layout = references.layouts[position.artefact]
     rows = [
@@ -233,7 +281,9 @@ def check_inside(
         return
     places = ball_coordinates(position.pose, layout)
     balls = np.concatenate([indices for indices, _, _ in rows])
-    by_how_much, axes, sides = excess(np.concatenate([places[one] - offset for one, _, offset in rows]), volume)
+    by_how_much, axes, sides = excess(
+        np.concatenate([places[one] - offset for one, _, offset in rows]), volume
+    )
     outside = np.flatnonzero(by_how_much > SLIGHTLY * (volume.upper - volume.lower)[axes])
     if len(outside) == 0:
         return
@@ -241,12 +291,21 @@ def check_inside(
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
     offset, place = float(offsets[probe][axis]), float(places[balls[worst], axis])
-    others = f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}" if len(outside) > 1 else ""
-    less = f" (the ball at {format_length(place)} less the offset of {format_length(offset)})" if offset else ""
+    others = (
+        f", and {len(outside) - 1} more reading{'s' * (len(outside) > 2)}"
+        if len(outside) > 1
+        else ""
+    )
+    less = (
+        f" (the ball at {format_length(place)} less the offset of {format_length(offset)})"
+        if offset
+        else ""
+    )
     text = (
-        f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" puts the scales at {AXES[axis]} = '
-        f"{format_length(place - offset)}{less}, {format_length(by_how_much[worst])} {sides[worst]} the measuring "
-        f"volume{others}; move the artefact, or read it otherwise"
+        f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" puts the scales at'
+        f" {AXES[axis]} = {format_length(place - offset)}{less},"
+        f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others}; move"
+        " the artefact, or read it otherwise"
     )
     references.problems.add(steps, text)
 
@@ -269,15 +328,21 @@ def check_use(
     candidates: Collection[Position] | None = (),
     planning: bool = False,
 ) -> None:
-    """Report artefacts never placed, balls of plates never read, and uncalibrated length standards of many balls.
+    """Report artefacts never placed, balls of plates never read, and uncalibrated length standards
+    of many balls.
 
-    Of a ball bar or a Bryan gauge without a certificate the length is a parameter. ``candidates`` of a pool, None
-    where some are wrong, may place an artefact; for ``planning`` they may read what no position reads.
+    Of a ball bar or a Bryan gauge without a certificate the length is a parameter. ``candidates``
+    of a pool, None where some are wrong, may place an artefact; for ``planning`` they may read what
+    no position reads.
     """
     problems = references.problems
     placed: set[str] = set()
     uncertain: set[str] = set()
-    in_pool = set(references.artefact_names) if candidates is None else {one.artefact for one in candidates}
+    in_pool = (
+        set(references.artefact_names)
+        if candidates is None
+        else {one.artefact for one in candidates}
+    )
     readers = [*positions.values(), *(candidates or () if planning else ())]
     if planning:
         placed |= in_pool
@@ -286,7 +351,8 @@ def check_use(
         name = written_text(problems.root, "positions", i, "artefact")
         if name is None and len(references.artefact_names) == 1:
             name = references.artefact_names[0]
-        # A position that cannot be understood may be one of any artefact, or read any ball of its own.
+        # A position that cannot be understood may be one of any artefact, or read any ball of its
+        # own.
         names = {name} if name in references.artefact_names else set(references.artefact_names)
         placed |= {str(name) for name in names}
         if i not in positions:
@@ -297,20 +363,35 @@ def check_use(
         if name not in placed and name in in_pool:
             continue
         if name not in placed:
-            problems.add(("artefacts", name), "is never placed; add a position of it, or remove it", of_key=True)
+            problems.add(
+                ("artefacts", name),
+                "is never placed; add a position of it, or remove it",
+                of_key=True,
+            )
         elif name in references.layouts and name not in uncertain:
             _check_balls_read(name, [one for one in readers if one.artefact == name], references)
     calibration_count = len(sections.entries("calibration"))
     for name, settings in references.artefacts.items():
         with_one_length = isinstance(settings, TwoSpheresSettings | BryanGaugeSettings)
-        if settings.role == "length_standard" and not with_one_length and not problems.has_below(("calibration",)):
+        if (
+            settings.role == "length_standard"
+            and not with_one_length
+            and not problems.has_below(("calibration",))
+        ):
             kinds = (
-                [one.kind for one in sections.entries("calibration").values() if one.artefact in (name, None)]
+                [
+                    one.kind
+                    for one in sections.entries("calibration").values()
+                    if one.artefact in (name, None)
+                ]
                 if calibration_count
                 else []
             )
             if "distances" not in kinds and "coordinates" not in kinds:
-                text = "is a length standard without calibrated distances; add a calibration of kind: distances"
+                text = (
+                    "is a length standard without calibrated distances; add a calibration of kind:"
+                    " distances"
+                )
                 problems.add(("artefacts", name), text, of_key=True)
 
 
@@ -321,9 +402,15 @@ def check_calibration_read(
     position_count: int,
     references: References,
 ) -> None:
-    """Report calibrated balls of a length standard that no position reads; of plates, all are reported."""
+    """Report calibrated balls of a length standard that no position reads; of plates, all are
+    reported.
+    """
     is_standard = references.artefacts[calibration.artefact].role == "length_standard"
-    if not is_standard or isinstance(calibration, RadiusCalibration) or len(positions) < position_count:
+    if (
+        not is_standard
+        or isinstance(calibration, RadiusCalibration)
+        or len(positions) < position_count
+    ):
         return
     own = [position for position in positions.values() if position.artefact == calibration.artefact]
     used = calibration.pairs if isinstance(calibration, DistanceCalibration) else calibration.balls
@@ -333,7 +420,8 @@ def check_calibration_read(
         names = listing(layout.names[i] for i in unread)
         key = "pairs" if isinstance(calibration, DistanceCalibration) else "balls"
         references.problems.add(
-            (*steps, key), f"no position reads {_balls(len(unread))} {names}; read them, or leave them out"
+            (*steps, key),
+            f"no position reads {_balls(len(unread))} {names}; read them, or leave them out",
         )
 
 
@@ -345,7 +433,8 @@ def check_radii(calibrations: Mapping[int, Calibration], problems: Problems) -> 
             continue
         if calibration.artefact in first:
             text = (
-                f'the radius of "{calibration.artefact}" stands in calibration[{first[calibration.artefact]}] already'
+                f'the radius of "{calibration.artefact}" stands in'
+                f" calibration[{first[calibration.artefact]}] already"
             )
             problems.add(("calibration", i), f"{text}; remove one of the two")
         first.setdefault(calibration.artefact, i)
@@ -365,26 +454,38 @@ def check_size(
         return
     d = machine.dimension
     poses = sum(references.artefacts[one.artefact].role == "plate" for one in positions.values())
-    gauges = {name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)}
+    gauges = {
+        name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
+    }
     pivots = [one for one in positions.values() if one.artefact in gauges]
     errors = len(build_error_model(settings, *_corners(machine)).parameters)
     shared = errors + pose_size(d) * poses + d * (len(pivots) + len(offset_uncertainties))
     if shared > MOST_SHARED:
         text = (
-            f"{poses + len(pivots)} poses, {errors} machine errors and {len(offset_uncertainties)} probe offsets make "
-            f"{shared} parameters besides the balls; at most {MOST_SHARED} are "
-            "possible: leave positions out, or give the machine fewer coefficients"
+            f"{poses + len(pivots)} poses, {errors} machine errors and {len(offset_uncertainties)}"
+            f" probe offsets make {shared} parameters besides the balls; at most {MOST_SHARED} are"
+            " possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)
-    check_lengths({("calibration", i): one for i, one in calibrations.items()}, positions.values(), references)
+    check_lengths(
+        {("calibration", i): one for i, one in calibrations.items()}, positions.values(), references
+    )
 
 
 def check_derivatives(
-    sections: Sections, machine: Machine | None, evaluation: Evaluation | None, references: References
+    sections: Sections,
+    machine: Machine | None,
+    evaluation: Evaluation | None,
+    references: References,
 ) -> None:
     """Report more evaluation points than there is memory for, with so many machine errors."""
     settings = sections.get("error_model")
-    if settings is None or machine is None or evaluation is None or references.problems.has_below(("error_model",)):
+    if (
+        settings is None
+        or machine is None
+        or evaluation is None
+        or references.problems.has_below(("error_model",))
+    ):
         return
     count, d = evaluation.points.shape
     # Errors are at most as many as parameters are, so that they need seldom be counted.
@@ -393,32 +494,46 @@ def check_derivatives(
     errors = len(build_error_model(settings, *_corners(machine)).parameters)
     if count * d * errors > MOST_DERIVATIVES:
         text = (
-            f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at most "
-            f"{MOST_DERIVATIVES // (d * errors)} points are possible with so many errors"
+            f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at"
+            f" most {MOST_DERIVATIVES // (d * errors)} points are possible with so many errors"
         )
         references.problems.add(("evaluation", "points"), text)
 
 
 def check_lengths(
-    calibrations: Mapping[Steps, Calibration], positions: Collection[Position], references: References
+    calibrations: Mapping[Steps, Calibration],
+    positions: Collection[Position],
+    references: References,
 ) -> None:
     """Report length standards and gauges that are read too often."""
     problems = references.problems
-    gauges = {name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)}
+    gauges = {
+        name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
+    }
     pivots = [one for one in positions if one.artefact in gauges]
-    rows = sum(len(group.balls) * len(group.probes) * group.repeats for one in pivots for group in one.readings)
+    rows = sum(
+        len(group.balls) * len(group.probes) * group.repeats
+        for one in pivots
+        for group in one.readings
+    )
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
     for steps, calibration in calibrations.items():
         name = calibration.artefact
-        if references.artefacts[name].role == "length_standard" and isinstance(calibration, DistanceCalibration):
-            probes = [{probe for group in one.readings for probe in group.probes} for one in positions]
-            times = sum(len(own) for own, one in zip(probes, positions, strict=True) if one.artefact == name)
+        if references.artefacts[name].role == "length_standard" and isinstance(
+            calibration, DistanceCalibration
+        ):
+            probes = [
+                {probe for group in one.readings for probe in group.probes} for one in positions
+            ]
+            times = sum(
+                len(own) for own, one in zip(probes, positions, strict=True) if one.artefact == name
+            )
             if len(calibration.pairs) * times > MOST_LENGTHS:
                 text = (
-                    f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too many; at most '
-                    f"{MOST_LENGTHS} lengths are possible"
+                    f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too'
+                    f" many; at most {MOST_LENGTHS} lengths are possible"
                 )
                 problems.add((*steps, "pairs"), text)
     _check_joint_lengths(calibrations, references)
@@ -437,8 +552,8 @@ def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: 
         is_joint = len(ends) > 2 * MOST_JOINT_LENGTHS and np.bincount(ends).max() > 1
         if is_joint and not references.problems.has_below(place):
             text = (
-                f'{len(ends) // 2} distances of "{name}" have balls in common; at most {MOST_JOINT_LENGTHS} such are '
-                "possible: calibrate fewer of them"
+                f'{len(ends) // 2} distances of "{name}" have balls in common; at most'
+                f" {MOST_JOINT_LENGTHS} such are possible: calibrate fewer of them"
             )
             references.problems.add(place, text)
 
@@ -451,7 +566,8 @@ def check_points(
     marks: Sequence[Mark] | None = None,
     of_one: bool = False,
 ) -> None:
-    """Report points outside the volume: listed ones one by one, of a table (with ``marks``) the first.
+    """Report points outside the volume: listed ones one by one, of a table (with ``marks``) the
+    first.
 
     ``of_one``: the path is that of a single point, not of a list.
     """
@@ -459,10 +575,14 @@ def check_points(
     outside = np.flatnonzero(by_how_much > TOLERANCE)
     for i in outside if marks is None else outside[:1]:
         axis = int(axes[i])
-        others = f", as {len(outside) - 1} further points are" if marks is not None and len(outside) > 1 else ""
+        others = (
+            f", as {len(outside) - 1} further points are"
+            if marks is not None and len(outside) > 1
+            else ""
+        )
         text = (
-            f"{AXES[axis]} = {format_length(points[i, axis])} is {format_length(by_how_much[i])} {sides[i]} "
-            f"the measuring volume{others}; move the point inside"
+            f"{AXES[axis]} = {format_length(points[i, axis])} is {format_length(by_how_much[i])}"
+            f" {sides[i]} the measuring volume{others}; move the point inside"
         )
         if marks is None:
             problems.add(steps if of_one else (*steps, int(i)), text)
@@ -471,7 +591,9 @@ def check_points(
 
 
 def read_balls(positions: Iterable[Position]) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Return the indices of the balls that are read in any of the positions of one artefact, in order."""
+    """Return the indices of the balls that are read in any of the positions of one artefact, in
+    order.
+    """
     groups = [group.ball_indices for position in positions for group in position.readings]
     return np.unique(np.concatenate(groups)) if groups else np.zeros(0, dtype=np.intp)
 
@@ -481,7 +603,10 @@ def _check_balls_read(name: str, positions: list[Position], references: Referenc
     unread = np.setdiff1d(np.arange(len(layout.names)), read_balls(positions))
     if references.artefacts[name].role == "plate" and len(unread):
         names = listing(layout.names[i] for i in unread)
-        text = f"no position reads {_balls(len(unread))} {names}; read them, or leave them out of the artefact"
+        text = (
+            f"no position reads {_balls(len(unread))} {names}; read them, or leave them out of the"
+            " artefact"
+        )
         references.problems.add(("artefacts", name), text, of_key=True)
 
 

@@ -1,4 +1,6 @@
-"""Tables of one parametric error: positions and values, and in comments where and how it was measured."""
+"""Tables of one parametric error: positions and values, and in comments where and how it was
+measured.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ OTHER_WORDS = {"offset": "probe", "reflector": "probe", "criterion": "straightne
 VALUE = re.compile(r"=|\d\s*(mm|m|um|in)\b|^(table|end points|least squares|minimum zone)$")
 MOST_WORDS = 3
 
-# Part of an axis by which a table may go beyond it, or fall short of it; with wide spacing it may by one more point.
+# Part of an axis by which a table may go beyond it, or fall short of it; with wide spacing it may
+# by one more point.
 MARGIN, WIDEST = 0.05, 0.25
 
 
@@ -61,7 +64,10 @@ def parse_line(text: str) -> dict[str, float]:
     for part in text.split(","):
         name, equals, value = (one.strip() for one in part.partition("="))
         if not equals or name not in AXES:
-            raise LineError(f'"{shorten(part)}" is no position of an axis; write for example y = 600 mm, z = 200 mm')
+            raise LineError(
+                f'"{shorten(part)}" is no position of an axis; write for example y = 600 mm, z ='
+                " 200 mm"
+            )
         if name in found:
             raise LineError(f"{name} is given twice; leave one of them out")
         try:
@@ -80,7 +86,8 @@ def _refuse_decimal_comma(text: str) -> None:
 
 
 def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = None) -> ErrorTable:
-    """Read the table of the error `name` from a CSV file such as position_mm,EYX_um,EYX_bandwidth_um.
+    """Read the table of the error `name` from a CSV file such as
+    position_mm,EYX_um,EYX_bandwidth_um.
 
     Where the ends of the `axis` are given, in metres, the table should cover it.
 
@@ -97,14 +104,25 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         if not colon or key.rstrip() not in KEYS:
             # Any other comment is one.
             if (meant := _meant(match[1])) is not None:
-                text = f'unknown "{shorten(key.rstrip())}{colon}"; did you mean "{meant}:"? If not, reword the comment'
+                text = (
+                    f'unknown "{shorten(key.rstrip())}{colon}"; did you mean "{meant}:"? If not,'
+                    " reword the comment"
+                )
                 messages.append(mark.message("", text))
         elif (key := key.rstrip()) in stated:
-            messages.append(mark.message("", f'"{key}:" stands already in line {stated[key][0].line}; remove one'))
+            messages.append(
+                mark.message(
+                    "", f'"{key}:" stands already in line {stated[key][0].line}; remove one'
+                )
+            )
         else:
             begin = match.end(1) - len(value.lstrip()) + 1
             stated[key] = (Mark(str(path), number, begin), value.strip())
-    line_of, probe, criterion = _line(stated, name, messages), _probe(stated, messages), _criterion(stated, messages)
+    line_of, probe, criterion = (
+        _line(stated, name, messages),
+        _probe(stated, messages),
+        _criterion(stated, messages),
+    )
     curves: dict[str, Points] = {}
     try:
         curves, numbers = read_numbered_curves(path, bandwidths=True)
@@ -114,17 +132,29 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         messages += error.messages
     others = [one for one in curves if one.removesuffix(BANDWIDTH) != name]
     if curves and (others or name not in curves):
-        text = f"the file should have {name}" + (f" alone, but has {listing(others)}" if others else "")
+        text = f"the file should have {name}" + (
+            f" alone, but has {listing(others)}" if others else ""
+        )
         messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
     elif name[1] not in {"X", "Y", "Z"} - {name[2]}:
         text = f"{name} is no straightness error; remove this line"
-        messages += [stated[key][0].message("", text) for key in ("straightness", "straightedge") if key in stated]
+        messages += [
+            stated[key][0].message("", text)
+            for key in ("straightness", "straightedge")
+            if key in stated
+        ]
     bandwidth = curves.get(name + BANDWIDTH)
     if bandwidth is not None and min(bandwidth.values) < 0:
-        messages.append(Message(str(path), 0, 0, "", "a bandwidth is below zero; write half the width of the band"))
+        messages.append(
+            Message(
+                str(path), 0, 0, "", "a bandwidth is below zero; write half the width of the band"
+            )
+        )
     if "straightedge" in stated and stated["straightedge"][1] != "table":
         mark, text = stated["straightedge"]
-        messages.append(mark.message("", f'unknown place "{shorten(text)}"; write table, or leave the line out'))
+        messages.append(
+            mark.message("", f'unknown place "{shorten(text)}"; write table, or leave the line out')
+        )
     if messages:
         raise ExperimentError(sorted(messages))
     return ErrorTable(curves[name], bandwidth, line_of, probe, criterion, "straightedge" in stated)
@@ -160,13 +190,19 @@ def _range(
     shift = lower - positions[0]
     right = "give positions of the axis, in the unit that the header says, and cover the axis"
     if abs(shift) > MARGIN * length and abs(positions[-1] + shift - upper) <= MARGIN * length:
-        change = f"add {format_length(shift)} to" if shift > 0.0 else f"take {format_length(-shift)} from"
+        change = (
+            f"add {format_length(shift)} to"
+            if shift > 0.0
+            else f"take {format_length(-shift)} from"
+        )
         right = f"{change} every position, or state the volume as the scales read"
     told = f"but the axis goes from {format_length(lower)} to {format_length(upper)}"
     return [Message(file, number, 1, "", f"{text}, {told}; {right}") for number, text in found]
 
 
-def _line(stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message]) -> dict[str, float]:
+def _line(
+    stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message]
+) -> dict[str, float]:
     if "line" not in stated:
         return {}
     mark, text = stated["line"]
@@ -217,5 +253,7 @@ def _criterion(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> 
     for known in get_args(Criterion):
         if text == known:
             return known
-    messages.append(mark.message("", f'unknown criterion "{shorten(text)}"; {hint(text, get_args(Criterion))}'))
+    messages.append(
+        mark.message("", f'unknown criterion "{shorten(text)}"; {hint(text, get_args(Criterion))}')
+    )
     return None

@@ -38,15 +38,19 @@ from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees
 
 
-def load(path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True) -> tuple[Experiment, ...]:
+def load(
+    path: str | os.PathLike[str], planning: bool = False, with_modules: bool = True
+) -> tuple[Experiment, ...]:
     """Load an experiment file.
 
-    Returns the experiment, or one per variant in the order of the file. Tables that the file names are read
-    from the folder it is in. For ``planning`` an experiment has its pool, and positions may be missing where there is
-    one; otherwise what only the pool places is left out. Error models in Python are code that loading runs; without
-    ``with_modules`` files that have any are refused, and nothing is run.
+    Returns the experiment, or one per variant in the order of the file. Tables that the file names
+    are read from the folder it is in. For ``planning`` an experiment has its pool, and positions
+    may be missing where there is one; otherwise what only the pool places is left out. Error models
+    in Python are code that loading runs; without ``with_modules`` files that have any are refused,
+    and nothing is run.
 
-    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
+    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
+        found.
     """
     source = Path(path)
     refused: list[Message] = []
@@ -54,7 +58,9 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
     base_problems = Problems(root)
     trees = variant_trees(root, base_problems)
     if not with_modules:
-        forbidden = {message for tree in (root, *trees.values()) for message in refused_modules(tree)}
+        forbidden = {
+            message for tree in (root, *trees.values()) for message in refused_modules(tree)
+        }
         if forbidden:
             raise ExperimentError(sorted(forbidden))
     if not trees:
@@ -72,14 +78,22 @@ def load(path: str | os.PathLike[str], planning: bool = False, with_modules: boo
             experiments.append(replace(experiment, mark=mark))
             size += experiment.size
         if size > MOST_OF_ALL and len(experiments) > 1:
-            text = f"the variants up to here have {size} balls, balls read, calibrated values, priors and evaluation "
-            text += f"points; at most {MOST_OF_ALL} are possible: put some of the variants into a file of their own"
+            text = (
+                f"the variants up to here have {size} balls, balls read, calibrated values, priors"
+                " and evaluation "
+            )
+            text += (
+                f"points; at most {MOST_OF_ALL} are possible: put some of the variants into a file"
+                " of their own"
+            )
             base_problems.add(("variants", name), text)
             break
         for message in messages:
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [
-        Message(one.file, one.line, one.column, one.path, one.text + in_variants(names, list(trees)))
+        Message(
+            one.file, one.line, one.column, one.path, one.text + in_variants(names, list(trees))
+        )
         for one, names in variants_of.items()
     ]
     _raise_if_any(found, refused, source)
@@ -125,18 +139,24 @@ def _built(root: Node, source: Path, name: str | None, planning: bool) -> Experi
 def build(
     root: Node, source: Path, name: str | None, planning: bool = False
 ) -> tuple[Experiment | None, list[Message]]:
-    """Return the experiment of a tree without variants and no messages, or None and what is wrong."""
+    """Return the experiment of a tree without variants and no messages, or None and what is
+    wrong.
+    """
     try:
         return _build(root, source, name, planning)
     except ExperimentError as too_many:
         return None, list(too_many.messages)
 
 
-def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[Experiment | None, list[Message]]:
+def _build(
+    root: Node, source: Path, name: str | None, planning: bool
+) -> tuple[Experiment | None, list[Message]]:
     problems = Problems(root)
     sections = validate_sections(root, problems, planning)
     references = resolve_references(sections, source.parent, problems)
-    machine = resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
+    machine = (
+        resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
+    )
     probes = resolve_probes(sections, references)
     check_error_model(sections, machine, references)
     check_true_machine(sections, machine, references)
@@ -159,14 +179,18 @@ def _build(root: Node, source: Path, name: str | None, planning: bool) -> tuple[
     check_use(sections, positions, position_count, references, possible, planning)
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
     named = dict(enumerate(candidates.positions or positions.values()))
-    readers, reader_count = (named, len(named) + (not candidates.complete)) if planning else (positions, position_count)
+    readers, reader_count = (
+        (named, len(named) + (not candidates.complete)) if planning else (positions, position_count)
+    )
     calibrations: dict[int, Calibration] = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
         calibration = resolve_calibration(settings, ("calibration", i), references)
         if calibration is not None:
             calibrations[i] = calibration
-            check_calibration_read(calibration, ("calibration", i), readers, reader_count, references)
+            check_calibration_read(
+                calibration, ("calibration", i), readers, reader_count, references
+            )
     check_radii(calibrations, problems)
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, references)

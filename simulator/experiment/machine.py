@@ -1,4 +1,6 @@
-"""From the settings of the machine and of its evaluation to volume, repeatability, points and tasks."""
+"""From the settings of the machine and of its evaluation to volume, repeatability, points and
+tasks.
+"""
 
 from __future__ import annotations
 
@@ -49,9 +51,14 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
         by_axis = dict(zip(AXES, settings.repeatability, strict=False))
     else:
         listed = settings.repeatability
-        by_axis = {axis: getattr(listed, axis) for axis in AXES if getattr(listed, axis) is not None}
+        by_axis = {
+            axis: getattr(listed, axis) for axis in AXES if getattr(listed, axis) is not None
+        }
     if by_axis.keys() != ends.keys():
-        text = f"has {len(by_axis)} axes, but machine.volume has {len(ends)}; give one length for all, or {len(ends)}"
+        text = (
+            f"has {len(by_axis)} axes, but machine.volume has {len(ends)}; give one length for all,"
+            f" or {len(ends)}"
+        )
         problems.add(steps, text)
         is_right = False
     if not is_right:
@@ -59,18 +66,25 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     largest = max(by_axis.values())
     if largest >= LARGE_REPEATABILITY:
         text = (
-            f"{format_length(largest)} is far more than the readings of a co-ordinate measuring machine scatter; "
-            f"write {format_length(largest / 1000)} if that is meant"
+            f"{format_length(largest)} is far more than the readings of a co-ordinate measuring"
+            f" machine scatter; write {format_length(largest / 1000)} if that is meant"
         )
         problems.doubt(steps, text)
     lower_corner, upper_corner = zip(*ends.values(), strict=True)
-    return Machine(Volume(frozen(lower_corner), frozen(upper_corner)), frozen(list(by_axis.values())))
+    return Machine(
+        Volume(frozen(lower_corner), frozen(upper_corner)), frozen(list(by_axis.values()))
+    )
 
 
 def resolve_evaluation(
-    sections: Sections, machine: Machine | None, offsets: Mapping[str, Floats], references: References
+    sections: Sections,
+    machine: Machine | None,
+    offsets: Mapping[str, Floats],
+    references: References,
 ) -> Evaluation | None:
-    """Return where to evaluate, or None after saying what is wrong; ``offsets`` (d,) are those of the probes."""
+    """Return where to evaluate, or None after saying what is wrong; ``offsets`` (d,) are those of
+    the probes.
+    """
     settings = sections.get("evaluation")
     probe = references.probes[0] if references.probes else ""
     nowhere = frozen(np.zeros((0, references.dimension or 0)))
@@ -78,15 +92,24 @@ def resolve_evaluation(
         return Evaluation(nowhere, probe)
     if settings.probe is not None:
         probe = settings.probe
-        references.require(probe in references.probes, ("evaluation", "probe"), _unknown(probe, references))
+        references.require(
+            probe in references.probes, ("evaluation", "probe"), _unknown(probe, references)
+        )
     if settings.points is None and settings.tasks is None:
         text = 'gives nothing to evaluate; add "points", such as {random: 200, seed: 1}, or "tasks"'
         references.problems.add(("evaluation",), text)
         return None
-    tasks = [_task(i, one, probe, machine, offsets, sections, references) for i, one in enumerate(settings.tasks or ())]
+    tasks = [
+        _task(i, one, probe, machine, offsets, sections, references)
+        for i, one in enumerate(settings.tasks or ())
+    ]
     points = nowhere if settings.points is None else _points(settings.points, machine, references)
     found = tuple(task for task in tasks if task is not None)
-    return None if points is None or len(found) < len(tasks) else Evaluation(frozen(points), probe, found)
+    return (
+        None
+        if points is None or len(found) < len(tasks)
+        else Evaluation(frozen(points), probe, found)
+    )
 
 
 def _task(
@@ -104,17 +127,27 @@ def _task(
     before = len(problems.messages)
     names = [one.name for one in sections.get("evaluation").tasks]
     if settings.name in names[:i]:
-        text = f'"{settings.name}" is the name of tasks[{names.index(settings.name)}] already; names must differ'
+        text = (
+            f'"{settings.name}" is the name of tasks[{names.index(settings.name)}] already; names'
+            " must differ"
+        )
         problems.add((*steps, "name"), text)
     if settings.probe is not None and settings.probes is not None:
-        problems.add((*steps, "probe"), 'does not go with "probes"; remove one of the two', of_key=True)
+        problems.add(
+            (*steps, "probe"), 'does not go with "probes"; remove one of the two', of_key=True
+        )
     probes = settings.probes or (settings.probe or probe,) * 2
     if settings.probe is not None or settings.probes is not None:
         for k, name in enumerate(probes):
             where = ("probe",) if settings.probes is None else ("probes", k)
-            references.require(name in references.probes, (*steps, *where), _unknown(name, references))
+            references.require(
+                name in references.probes, (*steps, *where), _unknown(name, references)
+            )
     for key, point in (("from", settings.start), ("to", settings.to)):
-        text = f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}"
+        text = (
+            f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give"
+            f" {dimension}"
+        )
         is_right = references.require(dimension in (None, len(point)), (*steps, key), text)
         if is_right and machine is not None and machine.dimension == len(point):
             check_points(np.array([point]), (*steps, key), machine.volume, problems, of_one=True)
@@ -124,11 +157,15 @@ def _task(
     if np.linalg.norm(np.diff(points + [offsets[name] for name in probes], axis=0)) <= TOLERANCE:
         problems.add((*steps, "to"), "is where the length begins; give two points")
         return None
-    return Task(settings.name, frozen(points), probes, target_of(sections, settings.target_accuracy))
+    return Task(
+        settings.name, frozen(points), probes, target_of(sections, settings.target_accuracy)
+    )
 
 
 def target_of(sections: Sections, own: LengthFunction | None = None) -> Target | None:
-    """What uncertainties are to be within: a length of its `own`, or else the file's, and which of them it is about."""
+    """What uncertainties are to be within: a length of its `own`, or else the file's, and which of
+    them it is about.
+    """
     stated = own or sections.get("target_accuracy")
     return None if stated is None else Target(stated, sections.get("coverage_factor"))
 
@@ -143,7 +180,9 @@ def _points(settings: Any, machine: Machine | None, references: References) -> F
         return None
     if isinstance(settings, PointsSettings):
         if (settings.random is None) == (settings.file is None):
-            problems.add(steps, 'needs either "random" or "file"; write for example {random: 200, seed: 1}')
+            problems.add(
+                steps, 'needs either "random" or "file"; write for example {random: 200, seed: 1}'
+            )
             return None
         if settings.file is not None:
             if settings.seed is not None:
@@ -156,7 +195,10 @@ def _points(settings: Any, machine: Machine | None, references: References) -> F
         return np.random.default_rng(seed).uniform(volume.lower, volume.upper, size)
     is_right = True
     for i, point in enumerate(settings):
-        text = f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}"
+        text = (
+            f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give"
+            f" {dimension}"
+        )
         is_right &= references.require(len(point) == dimension, (*steps, i), text)
     if not is_right:
         return None
@@ -166,7 +208,9 @@ def _points(settings: Any, machine: Machine | None, references: References) -> F
     return points
 
 
-def _points_of_file(file: str, steps: Steps, machine: Machine | None, references: References) -> Floats | None:
+def _points_of_file(
+    file: str, steps: Steps, machine: Machine | None, references: References
+) -> Floats | None:
     assert references.dimension is not None
     try:
         rows = read_table(references.folder / file, [], AXES[: references.dimension])

@@ -38,21 +38,29 @@ from .sections import VolumeSettings
 NOTHING = 1e-12
 
 
-def load_machine(path: str | os.PathLike[str], doubts: list[Message] | None = None) -> MachineDescription:
+def load_machine(
+    path: str | os.PathLike[str], doubts: list[Message] | None = None
+) -> MachineDescription:
     """Load a machine file. Tables that it names are read from the folder it is in.
 
     What counts for nothing in it, and was hardly stated for that, is added to `doubts`.
 
-    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was found.
+    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
+        found.
     """
     source = Path(path)
     refused: list[Any] = []
     root = read_tree(source, refused)
     problems = Problems(root)
     if not isinstance(root, Mapping):
-        problems.add((), f"expected a mapping that begins with title: …, found {describe(to_python(root))}")
+        problems.add(
+            (), f"expected a mapping that begins with title: …, found {describe(to_python(root))}"
+        )
     elif "positions" in root.items or "axes" in root.items and "base" in root.items:
-        text = "this is an experiment or a sweep; name a machine file, with arrangement, volume and errors"
+        text = (
+            "this is an experiment or a sweep; name a machine file, with arrangement, volume and"
+            " errors"
+        )
         problems.add((), text)
     else:
         for steps, node in walk(root):
@@ -91,8 +99,12 @@ def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescript
             squareness.append(Squareness(name, stated))
         elif stated is not None:
             _inside(stated.at, machine, ("squareness", name, "at"), problems)
-            squareness.append(Squareness(name, stated.value, stated.at, (stated.bandwidth or 0.0) / stated.sigmas))
-    return None if problems.messages else replace(machine, errors=errors, squareness=tuple(squareness))
+            squareness.append(
+                Squareness(name, stated.value, stated.at, (stated.bandwidth or 0.0) / stated.sigmas)
+            )
+    return (
+        None if problems.messages else replace(machine, errors=errors, squareness=tuple(squareness))
+    )
 
 
 def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDescription | None:
@@ -107,16 +119,25 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         ends = [volume.x, volume.y, volume.z]
     _check_ends(ends, problems)
     # What else is wrong is told with the ends exchanged, or without any.
-    ends = [(min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends]
+    ends = [
+        (min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends
+    ]
     name = settings.arrangement if isinstance(settings.arrangement, str) else ""
     stated = settings.arrangement
     if isinstance(stated, str):
         arrangement = ARRANGEMENTS[stated]
     else:
         arrangement = Arrangement(stated.probe_side, stated.workpiece_side)
-    droop = {which: value for which in ("phi1", "phi2") if (value := getattr(settings.droop, which, None)) is not None}
+    droop = {
+        which: value
+        for which in ("phi1", "phi2")
+        if (value := getattr(settings.droop, which, None)) is not None
+    }
     if droop and name not in DROOP:
-        text = f"only the arm of {listing(DROOP)} droops; leave it out, or name one of them as arrangement"
+        text = (
+            f"only the arm of {listing(DROOP)} droops; leave it out, or name one of them as"
+            " arrangement"
+        )
         problems.add(("droop",), text, of_key=True)
     bottom, top = (_three(end) for end in zip(*ends, strict=True))
     temperature = {
@@ -146,7 +167,10 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
 def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None:
     for axis, (lower, upper) in zip(AXES, ends, strict=False):
         if upper < lower:
-            text = f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)}; exchange them"
+            text = (
+                f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)};"
+                " exchange them"
+            )
             problems.add(("volume", axis), text)
         elif upper == lower:
             text = f"ends where it begins, at {format_length(lower)}; give an end above it"
@@ -168,7 +192,10 @@ def _three(values: Iterable[float]) -> Three:
 
 
 def _errors(
-    settings: DescribedMachineSettings, machine: MachineDescription, source: Path, problems: Problems
+    settings: DescribedMachineSettings,
+    machine: MachineDescription,
+    source: Path,
+    problems: Problems,
 ) -> Iterable[ParametricError]:
     for name in NAMES:
         one = getattr(settings.errors, name, None)
@@ -184,7 +211,9 @@ def _errors(
             probe = one.probe or (0.0, 0.0, 0.0)
             on_table = getattr(one, "straightedge", None) is not None
             _check_table(on_table, machine, error.axis, (*steps, "straightedge"), problems)
-            yield replace(error, shape=shape, line=line, probe=probe, criterion=criterion, on_table=on_table)
+            yield replace(
+                error, shape=shape, line=line, probe=probe, criterion=criterion, on_table=on_table
+            )
         elif one.file is not None:
             ends = machine.lower[error.axis], machine.upper[error.axis]
             covered = ends if math.isfinite(ends[0]) else None
@@ -195,7 +224,10 @@ def _errors(
             _inside(line, machine, (*steps, "file"), problems)
             if table.bandwidth is not None:
                 if random is not None:
-                    problems.add((*steps, "bandwidth"), "the file has a bandwidth as well; leave one of the two out")
+                    problems.add(
+                        (*steps, "bandwidth"),
+                        "the file has a bandwidth as well; leave one of the two out",
+                    )
                 deviations = tuple(value / one.sigmas for value in table.bandwidth.values)
                 error = replace(error, deviation=Points(table.bandwidth.positions, deviations))
             _check_table(table.on_table, machine, error.axis, (*steps, "file"), problems)
@@ -206,22 +238,33 @@ def _errors(
 
 
 def _doubt_what_is_taken_off(machine: MachineDescription, problems: Problems) -> None:
-    """Say what of stated polynomials makes no difference: a straight line through end points, and a constant."""
+    """Say what of stated polynomials makes no difference: a straight line through end points, and a
+    constant.
+    """
     for error in machine.errors:
         if not isinstance(error.shape, PowerSeries):
             continue
-        steps, show = ("errors", error.name, "polynomial"), format_angle if error.is_rotation else format_length
+        steps, show = (
+            ("errors", error.name, "polynomial"),
+            format_angle if error.is_rotation else format_length,
+        )
         t0 = float(machine.scaled(error.axis, machine.reference[error.axis]))
         start, end, there = error.shape.values(np.array([0.0, 1.0, t0]))[:, 0].tolist()
         if error.is_straightness and error.criterion == "end points":
             if max(abs(start), abs(end)) > NOTHING * sum(map(abs, error.shape.coefficients)):
                 problems.doubt(
                     steps,
-                    f"the straight line through its end points, from {show(start)} to {show(end)}, is taken off, as "
-                    "it is no straightness; let the polynomial begin and end at zero, and state a slope as squareness",
+                    f"the straight line through its end points, from {show(start)} to {show(end)},"
+                    " is taken off, as it is no straightness; let the polynomial begin and end at"
+                    " zero, and state a slope as squareness",
                 )
-        elif not error.is_straightness and abs(there) > NOTHING * sum(map(abs, error.shape.coefficients)):
-            text = f"{show(there)} is taken off, as errors are zero at the reference point; correct the constant"
+        elif not error.is_straightness and abs(there) > NOTHING * sum(
+            map(abs, error.shape.coefficients)
+        ):
+            text = (
+                f"{show(there)} is taken off, as errors are zero at the reference point; correct"
+                " the constant"
+            )
             problems.doubt(steps, text)
 
 
@@ -244,12 +287,16 @@ def _read_tables(root: Mapping, source: Path, problems: Problems) -> None:
             _table(source.parent / file.value, name, None, ("errors", name, "file"), problems)
 
 
-def _line(settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> Three | None:
+def _line(
+    settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems
+) -> Three | None:
     if settings is None:
         return None
     stated = {key: value for key in AXES if (value := getattr(settings, key)) is not None}
     if AXES[axis] in stated:
-        problems.add((*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True)
+        problems.add(
+            (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True
+        )
         return None
     line = _complete(stated, machine, axis)
     _inside(line, machine, steps, problems)
@@ -261,25 +308,31 @@ def _complete(stated: dict[str, float], machine: MachineDescription, axis: int) 
     if not stated:
         return None
     x, y, z = (
-        stated.get(key, machine.reference[k]) if k != axis else machine.reference[k] for k, key in enumerate(AXES)
+        stated.get(key, machine.reference[k]) if k != axis else machine.reference[k]
+        for k, key in enumerate(AXES)
     )
     return x, y, z
 
 
-def _inside(point: Three | None, machine: MachineDescription, steps: Steps, problems: Problems) -> bool:
+def _inside(
+    point: Three | None, machine: MachineDescription, steps: Steps, problems: Problems
+) -> bool:
     is_inside = True
     for k, value in enumerate(point or ()):
         if not machine.lower[k] <= value <= machine.upper[k]:
             text = (
-                f"{AXES[k]} = {format_length(value)} is outside the volume, which goes from "
-                f"{format_length(machine.lower[k])} to {format_length(machine.upper[k])}; correct one of the two"
+                f"{AXES[k]} = {format_length(value)} is outside the volume, which goes from"
+                f" {format_length(machine.lower[k])} to {format_length(machine.upper[k])}; correct"
+                " one of the two"
             )
             problems.add(steps, text)
             is_inside = False
     return is_inside
 
 
-def _check_table(on_table: bool, machine: MachineDescription, axis: int, steps: Steps, problems: Problems) -> None:
+def _check_table(
+    on_table: bool, machine: MachineDescription, axis: int, steps: Steps, problems: Problems
+) -> None:
     if on_table and AXES[axis] not in machine.arrangement.workpiece_side:
         problems.add(steps, f"the {AXES[axis]} axis moves no table; leave straightedge: table out")
 

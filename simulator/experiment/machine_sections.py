@@ -30,14 +30,25 @@ MOST_COEFFICIENTS = 11
 
 Point = tuple[Length, Length, Length]
 Sigmas = Literal[1, 2, 3]
-BANDWIDTH = "random part, as so many standard deviations on either side as sigmas says, the same along the axis"
+BANDWIDTH = (
+    "random part, as so many standard deviations on either side as sigmas says, the same along the"
+    " axis"
+)
 SIGMAS = "standard deviations in a bandwidth: 1, 2 or 3"
 POLYNOMIAL = "coefficients of 1, t, t^2, … with t from 0 to 1 along the axis, to the tenth order"
-FILE = "CSV file with columns such as position_mm,EXX_um, whose comments may say # line, # straightness, # probe"
+FILE = (
+    "CSV file with columns such as position_mm,EXX_um, whose comments may say # line, #"
+    " straightness, # probe"
+)
 LINE = "where it was measured, as positions of the other axes; default: through the reference point"
-PROBE = "offset of the reflector or tip from the reference point of the probe while it was measured; default 0"
+PROBE = (
+    "offset of the reflector or tip from the reference point of the probe while it was measured;"
+    " default 0"
+)
 STRAIGHTEDGE = "table, where it was measured along a straightedge on a table that the axis moves"
-STRAIGHTNESS = "line that a straightness error is told from: end points, least squares or minimum zone"
+STRAIGHTNESS = (
+    "line that a straightness error is told from: end points, least squares or minimum zone"
+)
 
 
 class LineSettings(Settings):
@@ -58,12 +69,20 @@ class _ErrorSettings(Settings):
     def _what_belongs_together(self) -> Self:
         polynomial, bandwidth = getattr(self, "polynomial", None), getattr(self, "bandwidth", None)
         if polynomial is not None and self.file is not None:
-            raise ValueError("a polynomial and a file cannot both be the error; leave one of them out")
+            raise ValueError(
+                "a polynomial and a file cannot both be the error; leave one of them out"
+            )
         if polynomial is None and self.file is None and bandwidth is None:
-            raise ValueError("nothing is stated; give a polynomial, a file, or the bandwidth of a random error")
+            raise ValueError(
+                "nothing is stated; give a polynomial, a file, or the bandwidth of a random error"
+            )
         for key in ("line", "probe", "straightness", "straightedge"):
             if key in self.model_fields_set and polynomial is None:
-                where = f"write # {key}: … into the file" if self.file else "remove it, or give a polynomial"
+                where = (
+                    f"write # {key}: … into the file"
+                    if self.file
+                    else "remove it, or give a polynomial"
+                )
                 raise ValueError(f'"{key}" has no meaning here; {where}')
         return self
 
@@ -71,25 +90,27 @@ class _ErrorSettings(Settings):
 class PositioningSettings(_ErrorSettings):
     """A positioning error of an axis."""
 
-    polynomial: Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_COEFFICIENTS)] | None = Field(
-        None, description=POLYNOMIAL
-    )
+    polynomial: (
+        Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_COEFFICIENTS)] | None
+    ) = Field(None, description=POLYNOMIAL)
     bandwidth: PositiveLength | None = Field(None, description=BANDWIDTH)
 
 
 class StraightnessSettings(PositioningSettings):
     """A straightness error of an axis."""
 
-    straightness: Criterion | None = Field(None, description=f"{STRAIGHTNESS}; default: that of the machine")
+    straightness: Criterion | None = Field(
+        None, description=f"{STRAIGHTNESS}; default: that of the machine"
+    )
     straightedge: Literal["table"] | None = Field(None, description=STRAIGHTEDGE)
 
 
 class RotationSettings(_ErrorSettings):
     """A rotational error of an axis."""
 
-    polynomial: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=MOST_COEFFICIENTS)] | None = Field(
-        None, description=POLYNOMIAL
-    )
+    polynomial: (
+        Annotated[tuple[Angle, ...], Field(min_length=1, max_length=MOST_COEFFICIENTS)] | None
+    ) = Field(None, description=POLYNOMIAL)
     bandwidth: PositiveAngle | None = Field(None, description=BANDWIDTH)
 
 
@@ -110,17 +131,25 @@ ErrorsSettings = create_model(
 class SquarenessValue(Settings):
     """A squareness error with its random part, or measured elsewhere."""
 
-    value: Angle = Field(description="right-handed rotation of the second axis to the first, from a right angle")
+    value: Angle = Field(
+        description="right-handed rotation of the second axis to the first, from a right angle"
+    )
     at: Point | None = Field(
         None,
-        description="where the two lines cross on which it was measured; default: the reference point",
+        description=(
+            "where the two lines cross on which it was measured; default: the reference point"
+        ),
     )
-    bandwidth: PositiveAngle | None = Field(None, description="random part, the same wherever the machine is")
+    bandwidth: PositiveAngle | None = Field(
+        None, description="random part, the same wherever the machine is"
+    )
     sigmas: Sigmas = Field(2, description=SIGMAS)
 
 
 _Squareness = Annotated[
-    Annotated[Angle, Tag("<one>")] | Annotated[SquarenessValue, Tag("<mapping>")] | Annotated[Angle, Tag("<list>")],
+    Annotated[Angle, Tag("<one>")]
+    | Annotated[SquarenessValue, Tag("<mapping>")]
+    | Annotated[Angle, Tag("<list>")],
     FORM,
 ]
 SquarenessSettings = create_model(
@@ -134,7 +163,9 @@ SquarenessSettings = create_model(
 class AxisTemperatureSettings(Settings):
     """Temperature of an axis's scale and what it does."""
 
-    deviation: TemperatureDifference = Field(description="temperature less the reference temperature of 20 degC")
+    deviation: TemperatureDifference = Field(
+        description="temperature less the reference temperature of 20 degC"
+    )
     expansion: Expansion = Field(description="coefficient of thermal expansion")
     standard_uncertainty: PositiveTemperatureDifference | None = Field(
         None, description="standard uncertainty of the deviation; part of the random error"
@@ -150,14 +181,22 @@ class TemperatureSettings(Settings):
 
 
 class DroopSettings(Settings):
-    """Droop of a horizontal arm, for each metre that it is moved out; it counts besides the stated errors."""
+    """Droop of a horizontal arm, for each metre that it is moved out; it counts besides the stated
+    errors.
+    """
 
-    phi1: Bending | None = Field(None, description="tilt of the column: phi1 x z in X (MH1), phi1 y z in Y (MH2)")
-    phi2: Bending | None = Field(None, description="bend of the arm: -phi2 x^2/2 (MH1), +phi2 y^2/2 (MH2), in Z")
+    phi1: Bending | None = Field(
+        None, description="tilt of the column: phi1 x z in X (MH1), phi1 y z in Y (MH2)"
+    )
+    phi2: Bending | None = Field(
+        None, description="bend of the arm: -phi2 x^2/2 (MH1), +phi2 y^2/2 (MH2), in Z"
+    )
 
 
 class DescribedMachineSettings(Settings):
-    """A machine and its parametric errors, for ballplate map and for kind: machine in experiments."""
+    """A machine and its parametric errors, for ballplate map and for kind: machine in
+    experiments.
+    """
 
     title: Line = Field(description="what the machine is, in a line")
     description: Text | None = Field(None, description="what else is worth knowing")
@@ -169,15 +208,23 @@ class DescribedMachineSettings(Settings):
         FORM,
     ] = Field(description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]")
     reference_point: Point | None = Field(
-        None, description="where all errors are zero and lines of reference cross; default: the lower corner"
+        None,
+        description=(
+            "where all errors are zero and lines of reference cross; default: the lower corner"
+        ),
     )
-    probe: Point | None = Field(None, description="offset of the tip from the reference point of the probe; default 0")
+    probe: Point | None = Field(
+        None, description="offset of the tip from the reference point of the probe; default 0"
+    )
     interpolation: Interpolation = Field(
-        "linear", description="between the points of tables: linear, cubic splines, or monotone cubics"
+        "linear",
+        description="between the points of tables: linear, cubic splines, or monotone cubics",
     )
     straightness: Criterion = Field("end points", description=STRAIGHTNESS)
     errors: ErrorsSettings | None = Field(None, description="errors of the axes by ISO 230-1 name")  # type: ignore[valid-type]
-    squareness: SquarenessSettings | None = Field(None, description="squareness errors by ISO 230-1 name")  # type: ignore[valid-type]
+    squareness: SquarenessSettings | None = Field(  # type: ignore[valid-type]
+        None, description="squareness errors by ISO 230-1 name"
+    )
     temperature: TemperatureSettings | None = Field(None, description="temperatures of the axes")
     droop: DroopSettings | None = Field(None, description="droop of the arm, for MH1 and MH2")
     probing: PositiveLength | None = Field(

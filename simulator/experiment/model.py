@@ -1,4 +1,6 @@
-"""An experiment as the rest of the program sees it: in metres, defaults filled in, names resolved."""
+"""An experiment as the rest of the program sees it: in metres, defaults filled in, names
+resolved.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,8 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-# Fraction of the volume by which scale readings may be outside: measured offsets of probes are no round numbers, and
-# artefacts are not set up just as drawn.
+# Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
+# round numbers, and artefacts are not set up just as drawn.
 SLIGHTLY = 1e-3
 
 
@@ -45,7 +47,9 @@ class Volume:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The machine. ``repeatability``: (d,) standard uncertainty of a reading per co-ordinate, in metres."""
+    """The machine. ``repeatability``: (d,) standard uncertainty of a reading per co-ordinate, in
+    metres.
+    """
 
     volume: Volume
     repeatability: Floats
@@ -61,7 +65,8 @@ class ReadingGroup:
     """Balls read with the same probes: each ball with each probe, ``repeats`` times.
 
     ``probes``: names. ``balls``: names, ``ball_indices``: (k,) the same as indices into the layout.
-    ``standard_uncertainty``: (d,) metres of each reading, None where it is the machine's repeatability.
+    ``standard_uncertainty``: (d,) metres of each reading, None where it is the machine's
+    repeatability.
     """
 
     probes: tuple[str, ...]
@@ -85,10 +90,10 @@ class Position:
 class DistanceCalibration:
     """Calibrated distances of an artefact.
 
-    ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y. ``values``: (m,)
-    metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres, the function
-    ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability`` matter for length
-    standards only.
+    ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
+    ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
+    the function ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability``
+    matter for length standards only.
     """
 
     artefact: str
@@ -107,8 +112,8 @@ class DistanceCalibration:
 class CoordinateCalibration:
     """Calibrated ball co-ordinates in the artefact's frame.
 
-    ``balls``: (k,) indices. ``axes``: the a calibrated axes, 0 to 2. ``values``: (k, a) metres, nominal
-    unless ``certified``. ``standard_uncertainties``: (a,) metres.
+    ``balls``: (k,) indices. ``axes``: the a calibrated axes, 0 to 2. ``values``: (k, a) metres,
+    nominal unless ``certified``. ``standard_uncertainties``: (a,) metres.
     """
 
     artefact: str
@@ -137,9 +142,9 @@ Calibration = DistanceCalibration | CoordinateCalibration | RadiusCalibration
 class Prior:
     """What is known beforehand of a parameter, in metres, radians or a ratio.
 
-    ``position`` and ``component``: a pose parameter, by its place among origin and rotation. ``probe`` and
-    ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of the error model's
-    parameters. ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
+    ``position`` and ``component``: a pose parameter, by its place among origin and rotation.
+    ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
+    the error model's parameters. ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1.
     """
 
     name: str
@@ -156,7 +161,8 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A length that the machine is to measure: ``points`` (2, d) in metres, and the probes of its ends.
+    """A length that the machine is to measure: ``points`` (2, d) in metres, and the probes of its
+    ends.
 
     ``target``: what is to be reached, None where neither the task nor the file states it.
     """
@@ -169,7 +175,9 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, the probe, and tasks."""
+    """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, the
+    probe, and tasks.
+    """
 
     points: Floats
     probe: str
@@ -188,10 +196,11 @@ class ChangeTimes:
 class Candidate:
     """A position, or a calibration item, that a plan may choose.
 
-    `seconds` is what it takes by itself: set-up, readings and changes of probe within it, or the price of a
-    calibration item. `plane` names the axis that the artefact stands across, empty where the pose is free and for a
-    calibration item. `group` is the entry of the pool that it comes from, empty for positions that are `drawn`, in the
-    experiment's own list. `settings` is what an experiment file says of it. `reading_seconds` is what a reading takes.
+    `seconds` is what it takes by itself: set-up, readings and changes of probe within it, or the
+    price of a calibration item. `plane` names the axis that the artefact stands across, empty where
+    the pose is free and for a calibration item. `group` is the entry of the pool that it comes
+    from, empty for positions that are `drawn`, in the experiment's own list. `settings` is what an
+    experiment file says of it. `reading_seconds` is what a reading takes.
     """
 
     name: str
@@ -208,7 +217,9 @@ class Candidate:
         """Readings that it takes, every repeat counted."""
         if not isinstance(self.item, Position):
             return 0
-        return sum(len(group.probes) * len(group.balls) * group.repeats for group in self.item.readings)
+        return sum(
+            len(group.probes) * len(group.balls) * group.repeats for group in self.item.readings
+        )
 
 
 @dataclass(frozen=True)
@@ -221,10 +232,11 @@ class AtMost:
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Candidates in order, positions of the experiment itself first, and the limits on choosing them.
+    """Candidates in order, positions of the experiment itself first, and the limits on choosing
+    them.
 
-    `must` are the indices of what has to be chosen. `dropped` tells how many candidates were generated but
-    cannot be read, or stand there twice, by the reason.
+    `must` are the indices of what has to be chosen. `dropped` tells how many candidates were
+    generated but cannot be read, or stand there twice, by the reason.
     """
 
     candidates: tuple[Candidate, ...]
@@ -238,13 +250,15 @@ class Pool:
 class Experiment:
     """A complete experiment, or one variant of it.
 
-    ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres. ``layouts``:
-    name of an artefact → its balls. ``target_accuracy`` and ``expected_rank_deficiency`` are None where
-    nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are meant for.
-    ``offset_uncertainties``: standard uncertainties (d,) of the offsets that are estimated,
-    by the probe's name, infinite where the offset is unknown; other offsets are as stated. ``pool``: what a plan
-    may choose from. ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
-    without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an experiment of a tree.
+    ``name``: of the variant, None without variants. ``probes``: name → offset (d,) in metres.
+    ``layouts``: name of an artefact → its balls. ``target_accuracy`` and
+    ``expected_rank_deficiency`` are None where nothing was stated. ``coverage_factor`` times the
+    standard uncertainty is what targets are meant for. ``offset_uncertainties``: standard
+    uncertainties (d,) of the offsets that are estimated, by the probe's name, infinite where the
+    offset is unknown; other offsets are as stated. ``pool``: what a plan may choose from.
+    ``doubts``: what of the file is possible, and unlikely to be meant. ``tree``: what was written,
+    without variants, ``mark``: where the experiment itself stands, and ``builder``: what makes an
+    experiment of a tree.
     """
 
     title: str
@@ -285,10 +299,14 @@ class Experiment:
 
     @property
     def size(self) -> int:
-        """Number of balls, balls read at each position and candidate, calibrated values, priors and points."""
+        """Number of balls, balls read at each position and candidate, calibrated values, priors and
+        points.
+        """
         candidates = () if self.pool is None else self.pool.candidates
         offered = [one.item for one in candidates if isinstance(one.item, Position)]
-        read = sum(len(group.ball_indices) for one in (*self.positions, *offered) for group in one.readings)
+        read = sum(
+            len(group.ball_indices) for one in (*self.positions, *offered) for group in one.readings
+        )
         known = sum(len(one.values) for one in self.calibration if one.kind != "radius")
         balls = sum(len(layout.names) for layout in self.layouts.values())
         return balls + read + known + len(self.priors) + len(self.evaluation.points)
@@ -304,14 +322,19 @@ class Experiment:
         """A message about what stands at a path."""
         return self.place(steps).message(format_path(steps), text)
 
-    def with_(self, changes: Mapping[str, object] | None = None, /, **sections: object) -> Experiment:
+    def with_(
+        self, changes: Mapping[str, object] | None = None, /, **sections: object
+    ) -> Experiment:
         """The experiment with some of its entries changed, checked as a file is.
 
-        ``changes`` has new values by path, such as ``positions[P1].level`` or ``artefacts.plate.size``, as variants of
-        a file have; ``sections`` replaces whole entries by their names. Values are what a file would hold: texts with
-        units, numbers, lists and mappings. None removes an entry. A length computed in metres is given as a text with
-        its unit too, as in ``f"{length} m"``.
+        ``changes`` has new values by path, such as ``positions[P1].level`` or
+        ``artefacts.plate.size``, as variants of a file have; ``sections`` replaces whole entries by
+        their names. Values are what a file would hold: texts with units, numbers, lists and
+        mappings. None removes an entry. A length computed in metres is given as a text with its
+        unit too, as in ``f"{length} m"``.
 
         :raises ExperimentError: a path that does not exist, or an experiment that is wrong so.
         """
-        return self.builder(changed_tree(self.tree, str(self.source), {**(changes or {}), **sections}))
+        return self.builder(
+            changed_tree(self.tree, str(self.source), {**(changes or {}), **sections})
+        )

@@ -19,8 +19,13 @@ def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
 
 def refused_modules(root: Node) -> list[Message]:
     """A message for each error model in Python, for files that nobody has looked at."""
-    text = "is code that loading the file would run, and modules are not allowed here; allow them if you trust the file"
+    text = (
+        "is code that loading the file would run, and modules are not allowed here; allow them if"
+        " you trust the file"
+    )
     return [
-        model.items["kind"].mark.message(format_path((*steps, "kind")), f"an error model in Python {text}")
+        model.items["kind"].mark.message(
+            format_path((*steps, "kind")), f"an error model in Python {text}"
+        )
         for steps, model in python_models(root)
     ]

@@ -7,7 +7,14 @@ from typing import Any, Literal
 import numpy as np
 
 from ..geometry.artefacts import BallLayout
-from ..geometry.positions import IN_PLANE_AXES, Axis, FreePlacement, PlanePlacement, Pose, nominal_pose
+from ..geometry.positions import (
+    IN_PLANE_AXES,
+    Axis,
+    FreePlacement,
+    PlanePlacement,
+    Pose,
+    nominal_pose,
+)
 from ..inputs.messages import Steps
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
@@ -17,13 +24,21 @@ PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 
 
-def resolve_position(settings: PositionSettings, steps: Steps, references: References) -> Position | None:
+def resolve_position(
+    settings: PositionSettings, steps: Steps, references: References
+) -> Position | None:
     """Return a position with its pose and readings, or None after saying what is wrong."""
     artefact = references.artefact(settings.artefact, steps)
     layout = references.layouts.get(artefact) if artefact is not None else None
     readings = _readings(settings, steps, layout, references)
     placement = _placement(settings, steps, references)
-    if artefact is None or layout is None or readings is None or placement is None or references.dimension is None:
+    if (
+        artefact is None
+        or layout is None
+        or readings is None
+        or placement is None
+        or references.dimension is None
+    ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
     for array in (pose.rotation, pose.origin):
@@ -53,7 +68,10 @@ def _readings(
                 of_key=True,
             )
             complete = False
-    groups = [_group(group, (*steps, "readings", i), layout, references) for i, group in enumerate(settings.readings)]
+    groups = [
+        _group(group, (*steps, "readings", i), layout, references)
+        for i, group in enumerate(settings.readings)
+    ]
     found = tuple(group for group in groups if group is not None)
     return found if complete and len(found) == len(groups) else None
 
@@ -72,7 +90,9 @@ def _group(
     if not references.count_readings(len(probe_names or ()) * len(names) * settings.repeats, steps):
         return None
     indices = (
-        np.arange(len(layout.names)) if balls == "all" else references.ball_indices(names, layout, (*steps, "balls"))
+        np.arange(len(layout.names))
+        if balls == "all"
+        else references.ball_indices(names, layout, (*steps, "balls"))
     )
     if probe_names is None or indices is None or not is_right:
         return None
@@ -87,7 +107,9 @@ def _placement(
     plane_keys = [key for key in PLANE_KEYS if getattr(settings, key) is not None]
     if settings.pose is not None:
         for key in plane_keys:
-            problems.add((*steps, key), 'does not go with "pose"; remove one of the two', of_key=True)
+            problems.add(
+                (*steps, key), 'does not go with "pose"; remove one of the two', of_key=True
+            )
         pose = _free_placement(settings.pose, (*steps, "pose"), references)
         return None if plane_keys else pose
     if dimension is None:
@@ -102,14 +124,18 @@ def _placement(
             problems.add((*steps, key), "has no meaning in two dimensions; remove it", of_key=True)
             is_right = False
     else:
-        is_right &= references.require(settings.plane is not None, (*steps, "plane"), 'missing; add "plane", x, y or z')
+        is_right &= references.require(
+            settings.plane is not None, (*steps, "plane"), 'missing; add "plane", x, y or z'
+        )
         text = 'missing; add "level", the co-ordinate of the plane'
         is_right &= references.require(settings.level is not None, (*steps, "level"), text)
     if settings.corner is None and settings.centre is None:
         problems.add((*steps, "corner"), 'missing; add "corner" or "centre"')
         return None
     if settings.corner is not None and settings.centre is not None:
-        problems.add((*steps, "centre"), 'does not go with "corner"; remove one of the two', of_key=True)
+        problems.add(
+            (*steps, "centre"), 'does not go with "corner"; remove one of the two', of_key=True
+        )
         return None
     plane: Axis | None = "z" if dimension == 2 else settings.plane
     if plane is None:
@@ -129,10 +155,14 @@ def check_turns(turns: int, steps: Steps, references: References) -> bool:
         meant = f"write 0 to 3, such as {turns % 4}, which turns as far"
     else:
         meant = f"write {turns // 90 % 4} for {turns} deg"
-    return references.require(0 <= turns <= 3, steps, f"{turns} is no number of turns by 90 deg from 0 to 3; {meant}")
+    return references.require(
+        0 <= turns <= 3, steps, f"{turns} is no number of turns by 90 deg from 0 to 3; {meant}"
+    )
 
 
-def _in_plane(point: Any, plane: Axis, steps: Steps, references: References) -> tuple[float, float] | None:
+def _in_plane(
+    point: Any, plane: Axis, steps: Steps, references: References
+) -> tuple[float, float] | None:
     axes = IN_PLANE_AXES[plane]
     first, second = sorted(axes)
     is_right = True
@@ -154,17 +184,25 @@ def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlac
     is_right = references.require(
         len(pose.origin) == dimension,
         (*steps, "origin"),
-        f"has {len(pose.origin)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}",
+        f"has {len(pose.origin)} co-ordinates, but the experiment has {dimension} dimensions; give"
+        f" {dimension}",
     )
     is_right &= references.require(
         pose.rotation is None or isinstance(pose.rotation, float) == (dimension == 2),
         (*steps, "rotation"),
-        "a two-dimensional experiment has one angle; write for example 90 deg"
-        if dimension == 2
-        else "a three-dimensional experiment has three angles; write for example [0 deg, 0 deg, 90 deg]",
+        (
+            "a two-dimensional experiment has one angle; write for example 90 deg"
+            if dimension == 2
+            else (
+                "a three-dimensional experiment has three angles; write for example [0 deg, 0 deg,"
+                " 90 deg]"
+            )
+        ),
     )
     if not is_right:
         return None
     if pose.rotation is None:
         return FreePlacement(pose.origin, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0))
-    return FreePlacement(pose.origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,))
+    return FreePlacement(
+        pose.origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,)
+    )

@@ -1,4 +1,6 @@
-"""Groups of a pool: candidates that are every combination of planes, levels, places, turns, probes and balls."""
+"""Groups of a pool: candidates that are every combination of planes, levels, places, turns, probes
+and balls.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,13 @@ from ..inputs.quantities import format_length, length_text
 from ..inputs.yamltree import to_python, written
 from .model import Floats, Indices, Position, ReadingGroup, Volume
 from .placements import check_turns
-from .pool_sections import GroupSettings, LengthsByAxisSettings, ProbesByPlaneSettings, RangeSettings, form_of_balls
+from .pool_sections import (
+    GroupSettings,
+    LengthsByAxisSettings,
+    ProbesByPlaneSettings,
+    RangeSettings,
+    form_of_balls,
+)
 from .references import References, lengths_per_axis
 
 # Candidates of a pool, those dropped included.
@@ -38,9 +46,9 @@ TOLERANCE = 1e-9
 class Bounds:
     """Where artefacts may be.
 
-    The scale readings of balls, which are where they are less the probe's offset of `offsets` (d,), have to be in
-    `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by probe. `edge` is what a plate needs
-    around it.
+    The scale readings of balls, which are where they are less the probe's offset of `offsets` (d,),
+    have to be in `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by
+    probe. `edge` is what a plate needs around it.
     """
 
     volume: Volume
@@ -51,7 +59,9 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """A candidate of a group that can be read, or with a reason instead of a position why it cannot."""
+    """A candidate of a group that can be read, or with a reason instead of a position why it
+    cannot.
+    """
 
     name: str
     position: Position | None
@@ -91,19 +101,29 @@ class _Group:
 
     @property
     def count(self) -> int:
-        of_planes = (len(self.levels[p]) * len(self.places[p]) * len(self.probes[p]) for p in self.planes)
+        of_planes = (
+            len(self.levels[p]) * len(self.places[p]) * len(self.probes[p]) for p in self.planes
+        )
         return sum(of_planes) * len(self.turns) * len(self.balls)
 
 
 def generate(
     settings: GroupSettings, steps: Steps, bounds: Bounds | None, count: int, references: References
 ) -> list[Generated] | None:
-    """Return the candidates of a group, or None after saying what is wrong; `count` are there already."""
+    """Return the candidates of a group, or None after saying what is wrong; `count` are there
+    already.
+    """
     group = _resolve(settings, steps, references)
     if group is None:
         return None
-    text = f"there are {count + group.count} candidates up to here; at most {MOST_CANDIDATES} are possible"
-    if not references.require(count + group.count <= MOST_CANDIDATES, steps, text) or bounds is None:
+    text = (
+        f"there are {count + group.count} candidates up to here; at most {MOST_CANDIDATES} are"
+        " possible"
+    )
+    if (
+        not references.require(count + group.count <= MOST_CANDIDATES, steps, text)
+        or bounds is None
+    ):
         return None
     reasons = {
         (plane, turn, k): _reasons(group, plane, turn, balls, bounds, references)
@@ -112,7 +132,9 @@ def generate(
         for k, balls in enumerate(group.balls)
     }
     read = sum(
-        sum(reason == "" for reason in reasons[plane, turn, k][probes]) * len(probes) * len(balls.indices)
+        sum(reason == "" for reason in reasons[plane, turn, k][probes])
+        * len(probes)
+        * len(balls.indices)
         for plane, turn, (k, balls) in product(group.planes, group.turns, enumerate(group.balls))
         for probes in group.probes[plane]
     )
@@ -127,7 +149,9 @@ def extent(points: Floats) -> Floats:
 
 
 def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
-    """Return the lowest and the highest co-ordinates (2, d) of a plate with so much material beyond its balls."""
+    """Return the lowest and the highest co-ordinates (2, d) of a plate with so much material beyond
+    its balls.
+    """
     (left, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
     around = np.array([(x, y, 0.0) for x in (left, right) for y in (low, high)])
     return extent(around[:, : len(pose.origin)] @ pose.rotation.T + pose.origin)
@@ -135,15 +159,21 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
 
 def is_within(found: Floats, lower: Floats, upper: Floats) -> Any:
     """Tell whether extents (…, 2, d) are within limits (d,)."""
-    return np.all((found[..., 0, :] >= lower - TOLERANCE) & (found[..., 1, :] <= upper + TOLERANCE), axis=-1)
+    return np.all(
+        (found[..., 0, :] >= lower - TOLERANCE) & (found[..., 1, :] <= upper + TOLERANCE), axis=-1
+    )
 
 
 def _reasons(
     group: _Group, plane: Axis, turn: int, balls: _Balls, bounds: Bounds, references: References
 ) -> dict[tuple[str, ...], list[str]]:
-    """By set of probes and for each level and place, why a candidate cannot be read; empty where it can."""
+    """By set of probes and for each level and place, why a candidate cannot be read; empty where it
+    can.
+    """
     d = references.dimension or 3
-    at_zero = nominal_pose(PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn), group.layout, d)
+    at_zero = nominal_pose(
+        PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn), group.layout, d
+    )
     shifts = np.zeros((len(group.levels[plane]) * len(group.places[plane]), d))
     both = list(product(group.levels[plane], group.places[plane]))
     first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
@@ -163,16 +193,22 @@ def _reasons(
             one[~is_within(read - offset, *bounds.volume.of_readings)] = "outside the volume"
         for probe in probes:
             if probe in bounds.reach:
-                one[(one == "") & ~is_within(read, *bounds.reach[probe])] = f"out of reach of probe {probe}"
+                one[(one == "") & ~is_within(read, *bounds.reach[probe])] = (
+                    f"out of reach of probe {probe}"
+                )
         by_probes[probes] = one.tolist()
     return by_probes
 
 
 def _candidates(
-    group: _Group, reasons: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], list[str]]], d: int
+    group: _Group,
+    reasons: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], list[str]]],
+    d: int,
 ) -> Iterator[Generated]:
     readings = {
-        (probes, k): (ReadingGroup(probes, balls.names, balls.indices, group.repeats, group.uncertainty),)
+        (probes, k): (
+            ReadingGroup(probes, balls.names, balls.indices, group.repeats, group.uncertainty),
+        )
         for plane in group.planes
         for probes in group.probes[plane]
         for k, balls in enumerate(group.balls)
@@ -182,7 +218,11 @@ def _candidates(
         for row, (level, place) in enumerate(product(group.levels[plane], group.places[plane])):
             at = {axis: length for axis, length in sorted(zip(axes, place, strict=True))}
             where = f"{'at' if group.anchor == 'corner' else 'about'} {_both(*at.values())}"
-            name = f"{group.prefix}{where}" if d == 2 else f"{group.prefix}{plane} {format_length(level)} {where}"
+            name = (
+                f"{group.prefix}{where}"
+                if d == 2
+                else f"{group.prefix}{plane} {format_length(level)} {where}"
+            )
             placed: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": length_text(level)}
             placed[group.anchor] = {axis: length_text(length) for axis, length in at.items()}
             for turn in group.turns:
@@ -190,12 +230,16 @@ def _candidates(
                 turned = f"{name} turn {turn}" if len(set(group.turns)) > 1 else name
                 for probes, (k, balls) in product(group.probes[plane], enumerate(group.balls)):
                     reason = reasons[plane, turn, k][probes][row]
-                    full = f"{turned} {'+'.join(probes)}" if len(group.probes[plane]) > 1 else turned
+                    full = (
+                        f"{turned} {'+'.join(probes)}" if len(group.probes[plane]) > 1 else turned
+                    )
                     full = f"{full} {balls.word}" if len(group.balls) > 1 else full
                     if reason:
                         yield Generated(full, None, plane, {}, reason)
                         continue
-                    pose = pose or _pose(PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d)
+                    pose = pose or _pose(
+                        PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d
+                    )
                     position = Position(full, group.artefact, pose, readings[probes, k])
                     stated: dict[str, Any] = {"name": full}
                     stated |= {"artefact": group.artefact} if group.names_artefact else {}
@@ -233,12 +277,18 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
     assert lengths is not None
     places = _places(lengths, planes, (*steps, f"{anchor}s"), references)
     probes = _probes(settings, planes, steps, references)
-    uncertainty, _ = lengths_per_axis(settings.standard_uncertainty, (*steps, "standard_uncertainty"), references)
+    uncertainty, _ = lengths_per_axis(
+        settings.standard_uncertainty, (*steps, "standard_uncertainty"), references
+    )
     balls = _balls(settings, layout, (*steps, "balls"), references) if layout is not None else ()
     if artefact is None or layout is None or len(references.problems.messages) > before:
         return None
     is_list = isinstance(settings.quarter_turns, tuple)
-    turns = settings.quarter_turns if isinstance(settings.quarter_turns, tuple) else (settings.quarter_turns,)
+    turns = (
+        settings.quarter_turns
+        if isinstance(settings.quarter_turns, tuple)
+        else (settings.quarter_turns,)
+    )
     for k, turn in enumerate(turns):
         check_turns(turn, (*steps, "quarter_turns", *((k,) if is_list else ())), references)
     if len(references.problems.messages) > before:
@@ -268,13 +318,17 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
     )
 
 
-def _planes(settings: GroupSettings, steps: Steps, references: References) -> tuple[Axis, ...] | None:
+def _planes(
+    settings: GroupSettings, steps: Steps, references: References
+) -> tuple[Axis, ...] | None:
     if references.dimension is None:
         return None
     if references.dimension == 2:
         for key in ("planes", "levels"):
             if getattr(settings, key) is not None:
-                references.problems.add((*steps, key), "has no meaning in two dimensions; remove it", of_key=True)
+                references.problems.add(
+                    (*steps, key), "has no meaning in two dimensions; remove it", of_key=True
+                )
         return ("z",)
     text = 'missing; add "planes", such as [x, y, z]'
     if not references.require(settings.planes is not None, (*steps, "planes"), text):
@@ -318,13 +372,19 @@ def _places(
 
 
 def _by_axis(
-    lengths: LengthsByAxisSettings, axes: Sequence[str], what: str, steps: Steps, references: References
+    lengths: LengthsByAxisSettings,
+    axes: Sequence[str],
+    what: str,
+    steps: Steps,
+    references: References,
 ) -> dict[str, tuple[float, ...]]:
     found = {}
     for axis in AXIS_INDEX:
         value = getattr(lengths, axis)
         if value is not None and axis not in axes:
-            references.problems.add((*steps, axis), f"is not {what}; remove it, or add to planes", of_key=True)
+            references.problems.add(
+                (*steps, axis), f"is not {what}; remove it, or add to planes", of_key=True
+            )
         elif value is not None:
             found[axis] = _values(value)
         elif axis in axes:
@@ -375,7 +435,9 @@ def _sets(stated: Any, steps: Steps, references: References) -> tuple[tuple[str,
     return tuple(stated)
 
 
-def _balls(settings: GroupSettings, layout: BallLayout, steps: Steps, references: References) -> tuple[_Balls, ...]:
+def _balls(
+    settings: GroupSettings, layout: BallLayout, steps: Steps, references: References
+) -> tuple[_Balls, ...]:
     stated: Any = settings.balls
     is_several = form_of_balls(stated) == "<sets>"
     found = []

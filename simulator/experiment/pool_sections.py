@@ -1,4 +1,6 @@
-"""What an experiment file says of the pool: candidates to choose from, how long they take, limits on the choice."""
+"""What an experiment file says of the pool: candidates to choose from, how long they take, limits
+on the choice.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,10 @@ class TimesSettings(OwnTimesSettings):
     probe_change: Seconds = Field(None, description="to go on with another probe; default 2 min")
     plane_change: Seconds = Field(
         None,
-        description="more for a position in another plane, or of another artefact, than the one before; default 30 min",
+        description=(
+            "more for a position in another plane, or of another artefact, than the one before;"
+            " default 30 min"
+        ),
     )
 
 
@@ -58,7 +63,9 @@ class RangeSettings(Settings):
 
 LengthList = Annotated[tuple[Length, ...], Field(min_length=1, max_length=1000)]
 Lengths = Annotated[
-    Annotated[Length, Tag("<one>")] | Annotated[LengthList, Tag("<list>")] | Annotated[RangeSettings, Tag("<mapping>")],
+    Annotated[Length, Tag("<one>")]
+    | Annotated[LengthList, Tag("<list>")]
+    | Annotated[RangeSettings, Tag("<mapping>")],
     FORM,
 ]
 
@@ -89,12 +96,18 @@ Levels = Annotated[
 def _form_of_sets(value: Any) -> str:
     if isinstance(value, dict):
         return "<planes>"
-    return "<sets>" if isinstance(value, tuple) and any(isinstance(one, tuple) for one in value) else "<list>"
+    return (
+        "<sets>"
+        if isinstance(value, tuple) and any(isinstance(one, tuple) for one in value)
+        else "<list>"
+    )
 
 
 ProbeSets = Annotated[
     Annotated[ProbeNames, Tag("<list>")]
-    | Annotated[Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")]
+    | Annotated[
+        Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")
+    ]
     | Annotated[ProbeNames, Tag("<planes>")],
     Discriminator(_form_of_sets),
 ]
@@ -110,7 +123,9 @@ class ProbesByPlaneSettings(Settings):
 
 GroupProbes = Annotated[
     Annotated[ProbeNames, Tag("<list>")]
-    | Annotated[Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")]
+    | Annotated[
+        Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")
+    ]
     | Annotated[ProbesByPlaneSettings, Tag("<planes>")],
     Discriminator(_form_of_sets),
 ]
@@ -127,18 +142,26 @@ def form_of_balls(value: Any) -> str:
     """Whether balls are stated by a word, as a list of names, or as a list of such sets."""
     if not isinstance(value, tuple):
         return "<one>"
-    return "<sets>" if any(isinstance(one, tuple) or one in ("all", "corners") for one in value) else "<list>"
+    return (
+        "<sets>"
+        if any(isinstance(one, tuple) or one in ("all", "corners") for one in value)
+        else "<list>"
+    )
 
 
 GroupBalls = Annotated[
     Annotated[Literal["all", "corners"], Tag("<one>")]
     | Annotated[BallNames, Tag("<list>")]
-    | Annotated[Annotated[tuple[SomeBalls, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")],
+    | Annotated[
+        Annotated[tuple[SomeBalls, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")
+    ],
     Discriminator(form_of_balls),
 ]
 Turns = Annotated[
     Annotated[QuarterTurns, Tag("<one>")]
-    | Annotated[Annotated[tuple[QuarterTurns, ...], Field(min_length=1, max_length=1000)], Tag("<list>")]
+    | Annotated[
+        Annotated[tuple[QuarterTurns, ...], Field(min_length=1, max_length=1000)], Tag("<list>")
+    ]
     | Annotated[QuarterTurns, Tag("<mapping>")],
     FORM,
 ]
@@ -147,36 +170,60 @@ Turns = Annotated[
 class GroupSettings(Settings):
     """Candidates that are every combination of planes, levels, places, turns, probes and balls."""
 
-    name: Name | None = Field(None, description="of the group; the names of its candidates begin with it")
-    artefact: Name | None = Field(None, description="name of the artefact; optional if there is exactly one")
+    name: Name | None = Field(
+        None, description="of the group; the names of its candidates begin with it"
+    )
+    artefact: Name | None = Field(
+        None, description="name of the artefact; optional if there is exactly one"
+    )
     planes: Annotated[tuple[Axis, ...], Field(min_length=1)] | None = Field(
-        None, description="axes that the artefact's plane is normal to, such as [x, y, z]; omitted in 2-D"
+        None,
+        description=(
+            "axes that the artefact's plane is normal to, such as [x, y, z]; omitted in 2-D"
+        ),
     )
     levels: Levels | None = Field(
         None,
-        description="co-ordinates of the planes: a list, {from: 0 mm, to: 1 m, count: 5}, or by plane {x: …, z: …}; "
-        "omitted in 2-D",
+        description=(
+            "co-ordinates of the planes: a list, {from: 0 mm, to: 1 m, count: 5}, or by plane {x:"
+            " …, z: …}; omitted in 2-D"
+        ),
     )
     corners: LengthsByAxisSettings | None = Field(
-        None, description="lower corners of the turned bounding rectangle along each axis, as lists or ranges"
+        None,
+        description=(
+            "lower corners of the turned bounding rectangle along each axis, as lists or ranges"
+        ),
     )
     centres: LengthsByAxisSettings | None = Field(
         None, description="centres of the bounding rectangle along each axis, instead of corners"
     )
-    quarter_turns: Turns = Field(0, description="one number of turns by 90 degrees, 0 to 3, or a list; default 0")
+    quarter_turns: Turns = Field(
+        0, description="one number of turns by 90 degrees, 0 to 3, or a list; default 0"
+    )
     probes: GroupProbes | None = Field(
         None,
-        description="names of probes, or a list of such sets to choose from, [[right, left], [right]]; either for all "
-        "planes or by plane; optional if there is exactly one probe",
+        description=(
+            "names of probes, or a list of such sets to choose from, [[right, left], [right]];"
+            " either for all planes or by plane; optional if there is exactly one probe"
+        ),
     )
     balls: GroupBalls = Field(
-        "all", description="all (default), corners, a list of balls, or a list of such sets, [all, corners]"
+        "all",
+        description=(
+            "all (default), corners, a list of balls, or a list of such sets, [all, corners]"
+        ),
     )
-    repeats: Count = Field(1, description="how often every ball is read with every probe; default 1")
+    repeats: Count = Field(
+        1, description="how often every ball is read with every probe; default 1"
+    )
     standard_uncertainty: LengthPerAxis | None = Field(
-        None, description="of each reading there, one length or per axis; default: machine.repeatability"
+        None,
+        description="of each reading there, one length or per axis; default: machine.repeatability",
     )
-    times: OwnTimesSettings | None = Field(None, description="times that are others than in pool.times")
+    times: OwnTimesSettings | None = Field(
+        None, description="times that are others than in pool.times"
+    )
 
     @model_validator(mode="after")
     def _one_anchor(self) -> Self:
@@ -189,12 +236,18 @@ class ListedSettings(PositionSettings):
     """A candidate by itself, described as a position is."""
 
     name: Name = Field(description="name of the position, if it is chosen")
-    times: OwnTimesSettings | None = Field(None, description="times that are others than in pool.times")
+    times: OwnTimesSettings | None = Field(
+        None, description="times that are others than in pool.times"
+    )
 
 
 def is_group(value: Any) -> bool:
     """Whether an entry of the pool's candidates, mapping or settings, stands for many."""
-    return isinstance(value, GroupSettings) or isinstance(value, dict) and bool(set(GROUP_KEYS) & set(value))
+    return (
+        isinstance(value, GroupSettings)
+        or isinstance(value, dict)
+        and bool(set(GROUP_KEYS) & set(value))
+    )
 
 
 CandidateSettings = Annotated[
@@ -205,7 +258,9 @@ CandidateSettings = Annotated[
 
 class _Priced(Settings):
     name: Name = Field(description="name of the item, to be told by")
-    price: Duration = Field(0.0, description="what it takes of the budget, such as 3 h; default nothing")
+    price: Duration = Field(
+        0.0, description="what it takes of the budget, such as 3 h; default nothing"
+    )
 
 
 class PricedDistancesSettings(_Priced, DistancesSettings):
@@ -221,14 +276,17 @@ class PricedRadiusSettings(_Priced, RadiusSettings):
 
 
 PricedSettings = Annotated[
-    PricedDistancesSettings | PricedCoordinatesSettings | PricedRadiusSettings, Field(discriminator="kind")
+    PricedDistancesSettings | PricedCoordinatesSettings | PricedRadiusSettings,
+    Field(discriminator="kind"),
 ]
 
 
 class SelectorSettings(Settings):
     """Which candidates are meant: those to which everything stated applies."""
 
-    name: Text | None = Field(None, description='name, in which * stands for anything, such as "z *"')
+    name: Text | None = Field(
+        None, description='name, in which * stands for anything, such as "z *"'
+    )
     group: Name | None = Field(None, description="name of their entry in pool.candidates")
     plane: Axis | None = Field(None, description="axis that the artefact's plane is normal to")
     artefact: Name | None = Field(None, description="name of the artefact")
@@ -237,7 +295,9 @@ class SelectorSettings(Settings):
     @model_validator(mode="after")
     def _something(self) -> Self:
         if not self.model_fields_set:
-            raise ValueError("says nothing; give at least one of name, group, plane, artefact, probe")
+            raise ValueError(
+                "says nothing; give at least one of name, group, plane, artefact, probe"
+            )
         return self
 
 
@@ -270,18 +330,25 @@ class LimitsSettings(Settings):
         | Annotated[tuple[Name, ...], Tag("<list>")]
         | Annotated[tuple[Name, ...], Tag("<mapping>")],
         FORM,
-    ] = Field((), description="candidates that must be chosen, by name; all: every position of the file")
+    ] = Field(
+        (), description="candidates that must be chosen, by name; all: every position of the file"
+    )
     never_together: tuple[Together, ...] = Field(
         (), description="lists of names, of each of which at most one is chosen"
     )
-    at_most: tuple[AtMostSettings, ...] = Field((), description="{of: {plane: x}, count: 2} and the like")
+    at_most: tuple[AtMostSettings, ...] = Field(
+        (), description="{of: {plane: x}, count: 2} and the like"
+    )
     reach: dict[Name, RegionSettings] = Field(
-        default_factory=dict, description="name of a probe → where balls can be read with it, {x: [200 mm, 1 m]}"
+        default_factory=dict,
+        description="name of a probe → where balls can be read with it, {x: [200 mm, 1 m]}",
     )
     edge: Length | None = Field(
         None,
-        description="material of a plate beyond its outermost balls, which has to stay inside the volume; default: "
-        "only balls that are read have to",
+        description=(
+            "material of a plate beyond its outermost balls, which has to stay inside the volume;"
+            " default: only balls that are read have to"
+        ),
     )
 
 
@@ -294,7 +361,10 @@ class PoolSettings(Settings):
     candidates: tuple[CandidateSettings, ...] = Field(
         (), description="groups of candidates, and single ones described as a position is"
     )
-    calibration: tuple[PricedSettings, ...] = Field((), description="items of calibration that can be had at a price")
+    calibration: tuple[PricedSettings, ...] = Field(
+        (), description="items of calibration that can be had at a price"
+    )
     limits: LimitsSettings = Field(
-        default_factory=lambda: LimitsSettings.model_validate({}), description="what a choice has to comply with"
+        default_factory=lambda: LimitsSettings.model_validate({}),
+        description="what a choice has to comply with",
     )

@@ -1,4 +1,6 @@
-"""From the settings of a pool to candidates, those that stand there twice left out, and limits on choosing them."""
+"""From the settings of a pool to candidates, those that stand there twice left out, and limits on
+choosing them.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,17 @@ from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
-from .model import AtMost, Calibration, Candidate, ChangeTimes, Floats, Machine, Pool, Position, RadiusCalibration
+from .model import (
+    AtMost,
+    Calibration,
+    Candidate,
+    ChangeTimes,
+    Floats,
+    Machine,
+    Pool,
+    Position,
+    RadiusCalibration,
+)
 from .placements import resolve_position
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (
@@ -39,7 +51,9 @@ SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60
 
 @dataclass
 class Candidates:
-    """Positions to choose from as far as they are right; `complete` tells whether all that is written is."""
+    """Positions to choose from as far as they are right; `complete` tells whether all that is
+    written is.
+    """
 
     found: list[Candidate] = field(default_factory=list)
     dropped: dict[str, int] = field(default_factory=dict)
@@ -62,7 +76,9 @@ class Candidates:
         if name != candidate.name:
             assert isinstance(candidate.item, Position)
             item = replace(candidate.item, name=name)
-            candidate = replace(candidate, name=name, item=item, settings={**candidate.settings, "name": name})
+            candidate = replace(
+                candidate, name=name, item=item, settings={**candidate.settings, "name": name}
+            )
         self.found.append(candidate)
 
     def drop(self, reason: str) -> None:
@@ -134,7 +150,16 @@ def resolve_candidates(
                     _check_bounds(listed, steps, bounds, references)
             stated = to_python(written(root, *steps))  # type: ignore[arg-type]
             result.add(
-                _candidate(listed, settings.plane, settings.name, False, stated, times, settings.times, references)
+                _candidate(
+                    listed,
+                    settings.plane,
+                    settings.name,
+                    False,
+                    stated,
+                    times,
+                    settings.times,
+                    references,
+                )
             )
         else:
             generated = generate(settings, steps, bounds, count, references)
@@ -148,12 +173,27 @@ def resolve_candidates(
                     result.drop(one.reason)
                     continue
                 result.add(
-                    _candidate(one.position, one.plane, group, False, one.settings, times, settings.times, references)
+                    _candidate(
+                        one.position,
+                        one.plane,
+                        group,
+                        False,
+                        one.settings,
+                        times,
+                        settings.times,
+                        references,
+                    )
                 )
     if result.complete and not result.found:
         why = [f"{number} {reason}" for reason, number in result.dropped.items()]
-        text = f"no candidate is left: {listing(why)}" if why else "there is no candidate; add some, or positions"
-        problems.add(("pool", "candidates"), f"{text}; widen the pool" if why else text, of_key=True)
+        text = (
+            f"no candidate is left: {listing(why)}"
+            if why
+            else "there is no candidate; add some, or positions"
+        )
+        problems.add(
+            ("pool", "candidates"), f"{text}; widen the pool" if why else text, of_key=True
+        )
         result.complete = False
     return result
 
@@ -172,8 +212,12 @@ def resolve_pool(
     found, complete = list(candidates.found), candidates.complete
     at_most: list[AtMost] = []
     radii: dict[str, list[int]] = {}
-    fixed = {one.artefact: i for i, one in calibrations.items() if isinstance(one, RadiusCalibration)}
-    by_steps: dict[Steps, Calibration] = {("calibration", i): one for i, one in calibrations.items()}
+    fixed = {
+        one.artefact: i for i, one in calibrations.items() if isinstance(one, RadiusCalibration)
+    }
+    by_steps: dict[Steps, Calibration] = {
+        ("calibration", i): one for i, one in calibrations.items()
+    }
     for i in range(written_count(root, "pool", "calibration")):
         steps: Steps = ("pool", "calibration", i)
         settings = sections.get(*steps)
@@ -186,18 +230,25 @@ def resolve_pool(
         by_steps[steps] = item
         if isinstance(item, RadiusCalibration):
             if item.artefact in fixed:
-                text = f'the radius of "{item.artefact}" stands in calibration[{fixed[item.artefact]}] already; '
+                text = (
+                    f'the radius of "{item.artefact}" stands in calibration[{fixed[item.artefact]}]'
+                    " already; "
+                )
                 problems.add(steps, f"{text}remove one of the two")
             radii.setdefault(item.artefact, []).append(len(found))
         stated = to_python(written(root, *steps))  # type: ignore[arg-type]
         stated = {key: value for key, value in stated.items() if key not in ("name", "price")}
-        found.append(Candidate(settings.name, item, settings.price, "", settings.name, False, stated))
+        found.append(
+            Candidate(settings.name, item, settings.price, "", settings.name, False, stated)
+        )
     if complete:
         check_lengths(by_steps, candidates.positions, references)
     at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
     must, limited = _limits(sections.get("pool", "limits"), found, complete, references)
     times: TimesSettings = sections.get("pool", "times")
-    changes = ChangeTimes(_or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE))
+    changes = ChangeTimes(
+        _or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE)
+    )
     return Pool(tuple(found), changes, must, (*at_most, *limited), candidates.dropped)
 
 
@@ -217,7 +268,9 @@ def _candidate(
     )
     readings = sum(len(one.probes) * len(one.balls) * one.repeats for one in position.readings)
     probes = {probe for one in position.readings for probe in one.probes}
-    seconds = set_up + readings * reading + (len(probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
+    seconds = (
+        set_up + readings * reading + (len(probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
+    )
     across = "" if plane is None or references.dimension == 2 else plane
     stated = {key: value for key, value in stated.items() if key != "times"}
     return Candidate(position.name, position, seconds, across, group, drawn, stated, reading)
@@ -236,7 +289,11 @@ def _identity(position: Position) -> Any:
         tuple(
             (
                 frozenset(one.probes),
-                one.ball_indices.tobytes() if len(one.balls) < 2 else np.sort(one.ball_indices).tobytes(),
+                (
+                    one.ball_indices.tobytes()
+                    if len(one.balls) < 2
+                    else np.sort(one.ball_indices).tobytes()
+                ),
                 one.repeats,
                 None if one.standard_uncertainty is None else one.standard_uncertainty.tobytes(),
             )
@@ -246,7 +303,9 @@ def _identity(position: Position) -> Any:
 
 
 def _check_names(references: References) -> bool:
-    """Tell whether no entry of the pool has the name of another, or of a position, after reporting those that have."""
+    """Tell whether no entry of the pool has the name of another, or of a position, after reporting
+    those that have.
+    """
     problems, before = references.problems, len(references.problems.messages)
     first: dict[str, str] = {}
     for section in (("positions",), ("pool", "candidates"), ("pool", "calibration")):
@@ -256,7 +315,10 @@ def _check_names(references: References) -> bool:
             if name is None:
                 continue
             if name in first and section != ("positions",):
-                problems.add((*steps, "name"), f'"{name}" is the name of {first[name]} already; names must differ')
+                problems.add(
+                    (*steps, "name"),
+                    f'"{name}" is the name of {first[name]} already; names must differ',
+                )
             first.setdefault(name, format_path(steps))
     return len(problems.messages) == before
 
@@ -267,7 +329,9 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
     for name, region in limits.reach.items():
         steps: Steps = ("pool", "limits", "reach", name)
         if name not in references.probes:
-            problems.add(steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True)
+            problems.add(
+                steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True
+            )
             continue
         ends = np.array([[-np.inf] * 3, [np.inf] * 3])
         for k, axis in enumerate(AXIS_INDEX):
@@ -277,7 +341,9 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
             if stated[0] >= stated[1]:
                 problems.add((*steps, axis), "the lower end must be below the upper; correct them")
             if k >= (references.dimension or 3):
-                problems.add((*steps, axis), "has no meaning in two dimensions; remove it", of_key=True)
+                problems.add(
+                    (*steps, axis), "has no meaning in two dimensions; remove it", of_key=True
+                )
             ends[:, k] = stated
         found[name] = frozen(ends[:, : references.dimension or 3])
     return found
@@ -291,7 +357,10 @@ def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: 
         around = outline(position.pose, layout, bounds.edge)
         if not is_within(around, lower, upper):
             beyond = format_length(float(np.max([lower - around[0], around[1] - upper])))
-            text = f"with its edge of {format_length(bounds.edge)} the plate is {beyond} outside the volume"
+            text = (
+                f"with its edge of {format_length(bounds.edge)} the plate is {beyond} outside the"
+                " volume"
+            )
             problems.add(steps, f"{text}; move it, or correct pool.limits.edge")
     if not bounds.reach:
         return
@@ -301,7 +370,10 @@ def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: 
             if probe in bounds.reach:
                 text = _beyond(coordinates[group.ball_indices], bounds.reach[probe])
                 if text:
-                    text = f"probe {probe} does not reach that far: {text}; move it, or correct pool.limits.reach"
+                    text = (
+                        f"probe {probe} does not reach that far: {text}; move it, or correct"
+                        " pool.limits.reach"
+                    )
                     problems.add(steps, text)
 
 
@@ -309,9 +381,15 @@ def _beyond(points: Floats, ends: Floats) -> str:
     lowest, highest = extent(points)
     for k, axis in enumerate(list(AXIS_INDEX)[: points.shape[1]]):
         if lowest[k] < ends[0, k] - TOLERANCE:
-            return f"a ball is at {axis} = {format_length(lowest[k])}, below {format_length(ends[0, k])}"
+            return (
+                f"a ball is at {axis} = {format_length(lowest[k])}, below"
+                f" {format_length(ends[0, k])}"
+            )
         if highest[k] > ends[1, k] + TOLERANCE:
-            return f"a ball is at {axis} = {format_length(highest[k])}, above {format_length(ends[1, k])}"
+            return (
+                f"a ball is at {axis} = {format_length(highest[k])}, above"
+                f" {format_length(ends[1, k])}"
+            )
     return ""
 
 
@@ -346,18 +424,29 @@ def _limits(
     for one, steps in at_most:
         kept = [found[i].name for i in sorted(set(must) & set(one.members))]
         if len(kept) > one.count and len(problems.messages) == before:
-            text = f"at most {one.count} of these are allowed, but {listing(kept)} are to be kept; correct pool.limits"
+            text = (
+                f"at most {one.count} of these are allowed, but {listing(kept)} are to be kept;"
+                " correct pool.limits"
+            )
             problems.add(steps, text)
     return tuple(sorted(must)), [one for one, _ in at_most]
 
 
 def _selected(
-    of: SelectorSettings, found: AnySequence[Candidate], complete: bool, steps: Steps, references: References
+    of: SelectorSettings,
+    found: AnySequence[Candidate],
+    complete: bool,
+    steps: Steps,
+    references: References,
 ) -> list[int]:
     """Indices of the candidates to which everything applies that a selector states."""
     root = references.problems.root
     groups = {one.group for one in found if one.group} | set(_group_names(root))
-    known: dict[str, Any] = {"group": groups, "artefact": references.artefact_names, "probe": references.probes}
+    known: dict[str, Any] = {
+        "group": groups,
+        "artefact": references.artefact_names,
+        "probe": references.probes,
+    }
     for key, names in known.items():
         name = getattr(of, key)
         if name is not None and name not in names:
@@ -369,7 +458,9 @@ def _selected(
         pattern = of.name
         tests.append(lambda one: fnmatchcase(one.name, pattern))
         if complete and not any(fnmatchcase(one.name, pattern) for one in found):
-            references.problems.add((*steps, "name"), f'no candidate has a name such as "{pattern}"; correct it')
+            references.problems.add(
+                (*steps, "name"), f'no candidate has a name such as "{pattern}"; correct it'
+            )
     if of.group is not None:
         tests.append(lambda one: one.group == of.group)
     if of.plane is not None:

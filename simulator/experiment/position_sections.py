@@ -1,4 +1,6 @@
-"""What an experiment file says of positions and calibration, in the list drawn as in a pool to choose from."""
+"""What an experiment file says of positions and calibration, in the list drawn as in a pool to
+choose from.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ CalibratedBalls = Annotated[
 ]
 ListedPairs = Annotated[tuple[tuple[Name, Name], ...], Field(min_length=1)]
 PairSelection = Annotated[
-    Annotated[PairSet, Tag("<one>")] | Annotated[ListedPairs, Tag("<list>")] | Annotated[ListedPairs, Tag("<mapping>")],
+    Annotated[PairSet, Tag("<one>")]
+    | Annotated[ListedPairs, Tag("<list>")]
+    | Annotated[ListedPairs, Tag("<mapping>")],
     FORM,
 ]
 
@@ -86,17 +90,27 @@ class PoseSettings(Settings):
             FORM,
         ]
         | None
-    ) = Field(None, description="angles about the fixed axes x, then y, then z; a single angle in 2-D; default 0")
+    ) = Field(
+        None,
+        description=(
+            "angles about the fixed axes x, then y, then z; a single angle in 2-D; default 0"
+        ),
+    )
 
 
 class ReadingSettings(Settings):
     """Balls that are read with the same probes."""
 
-    probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")
+    probes: ProbeNames | None = Field(
+        None, description="names of probes; optional if there is exactly one"
+    )
     balls: BallSelection = Field("all", description="all, or a list of balls")
     repeats: Count = Field(1, description="how often every ball is read with every probe")
     standard_uncertainty: LengthPerAxis | None = Field(
-        None, description="of each of these readings, one length or per axis; default: machine.repeatability"
+        None,
+        description=(
+            "of each of these readings, one length or per axis; default: machine.repeatability"
+        ),
     )
 
 
@@ -104,23 +118,47 @@ class PositionSettings(Settings):
     """One position of an artefact and what is read in it."""
 
     name: Name = Field(description="name of the position, used in tables and messages")
-    artefact: Name | None = Field(None, description="name of the artefact; optional if there is exactly one")
-    plane: Axis | None = Field(None, description="axis that the artefact's plane is normal to; omitted in 2-D")
-    level: Length | None = Field(None, description="co-ordinate of the plane along that axis; omitted in 2-D")
-    corner: InPlaneSettings | None = Field(None, description="lower corner of the turned bounding rectangle")
-    centre: InPlaneSettings | None = Field(None, description="centre of the bounding rectangle, instead of corner")
-    quarter_turns: QuarterTurns | None = Field(
-        None, description="0 to 3 turns by 90 degrees, counter-clockwise seen against the plane's normal; default 0"
+    artefact: Name | None = Field(
+        None, description="name of the artefact; optional if there is exactly one"
     )
-    pose: PoseSettings | None = Field(None, description="free pose, instead of plane, level and corner")
-    probes: ProbeNames | None = Field(None, description="names of probes; optional if there is exactly one")
+    plane: Axis | None = Field(
+        None, description="axis that the artefact's plane is normal to; omitted in 2-D"
+    )
+    level: Length | None = Field(
+        None, description="co-ordinate of the plane along that axis; omitted in 2-D"
+    )
+    corner: InPlaneSettings | None = Field(
+        None, description="lower corner of the turned bounding rectangle"
+    )
+    centre: InPlaneSettings | None = Field(
+        None, description="centre of the bounding rectangle, instead of corner"
+    )
+    quarter_turns: QuarterTurns | None = Field(
+        None,
+        description=(
+            "0 to 3 turns by 90 degrees, counter-clockwise seen against the plane's normal;"
+            " default 0"
+        ),
+    )
+    pose: PoseSettings | None = Field(
+        None, description="free pose, instead of plane, level and corner"
+    )
+    probes: ProbeNames | None = Field(
+        None, description="names of probes; optional if there is exactly one"
+    )
     balls: BallSelection | None = Field(None, description="all (default), or a list of balls")
-    repeats: Count | None = Field(None, description="how often every ball is read with every probe; default 1")
+    repeats: Count | None = Field(
+        None, description="how often every ball is read with every probe; default 1"
+    )
     standard_uncertainty: LengthPerAxis | None = Field(
-        None, description="of each reading there, one length or per axis; default: machine.repeatability"
+        None,
+        description="of each reading there, one length or per axis; default: machine.repeatability",
     )
     readings: Annotated[tuple[ReadingSettings, ...], Field(min_length=1)] | None = Field(
-        None, description="groups of readings, instead of probes, balls, repeats and standard_uncertainty"
+        None,
+        description=(
+            "groups of readings, instead of probes, balls, repeats and standard_uncertainty"
+        ),
     )
 
 
@@ -138,9 +176,14 @@ class DistancesSettings(Settings):
     """Calibrated distances between balls of an artefact."""
 
     kind: Literal["distances"] = Field(description="calibrated distances between balls")
-    artefact: Name | None = Field(None, description="name of the artefact; optional if there is exactly one")
+    artefact: Name | None = Field(
+        None, description="name of the artefact; optional if there is exactly one"
+    )
     pairs: PairSelection = Field(
-        description=("corner sides, corner diagonals, corners (both), neighbours, all, or a list of pairs of balls")
+        description=(
+            "corner sides, corner diagonals, corners (both), neighbours, all, or a list of pairs of"
+            " balls"
+        )
     )
     dimensions: Literal[2, 3] | None = Field(
         None, description="3 (default): distances in space; 2: in the artefact's plane"
@@ -156,15 +199,20 @@ class DistancesSettings(Settings):
         | None
     ) = Field(
         None,
-        description="CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
-        "{balls: [a, b], distance: …}; default: nominal distances",
+        description=(
+            "CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
+            "{balls: [a, b], distance: …}; default: nominal distances"
+        ),
     )
     form: Literal["distance", "projection"] = Field(
-        "distance", description="only for a length standard: distance, or projection on its nominal axis"
+        "distance",
+        description="only for a length standard: distance, or projection on its nominal axis",
     )
     repeatability: Literal["included", "ignored"] = Field(
         "included",
-        description="only for a length standard: whether reading it has the machine's repeatability",
+        description=(
+            "only for a length standard: whether reading it has the machine's repeatability"
+        ),
     )
 
 
@@ -172,7 +220,9 @@ class CoordinatesSettings(Settings):
     """Calibrated co-ordinates of balls in their artefact's frame."""
 
     kind: Literal["coordinates"] = Field(description="calibrated co-ordinates of balls")
-    artefact: Name | None = Field(None, description="name of the artefact; optional if there is exactly one")
+    artefact: Name | None = Field(
+        None, description="name of the artefact; optional if there is exactly one"
+    )
     balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
     standard_uncertainty: Annotated[
         Annotated[PositiveLength, Tag("<one>")]
@@ -181,7 +231,8 @@ class CoordinatesSettings(Settings):
         FORM,
     ] = Field(description="of every co-ordinate, or per axis of the artefact: {x: …, y: …}")
     values: Text | None = Field(
-        None, description="CSV file with columns ball, x_mm, y_mm, z_mm; default: nominal co-ordinates"
+        None,
+        description="CSV file with columns ball, x_mm, y_mm, z_mm; default: nominal co-ordinates",
     )
 
 
@@ -189,9 +240,17 @@ class RadiusSettings(Settings):
     """The calibrated radius of a Bryan gauge."""
 
     kind: Literal["radius"] = Field(description="calibrated radius of a Bryan gauge")
-    artefact: Name | None = Field(None, description="name of the gauge; optional if there is exactly one artefact")
-    value: PositiveLength | None = Field(None, description="the radius certified; default: as drawn")
-    standard_uncertainty: PositiveLength = Field(description="of the radius, the same wherever the gauge stands")
+    artefact: Name | None = Field(
+        None, description="name of the gauge; optional if there is exactly one artefact"
+    )
+    value: PositiveLength | None = Field(
+        None, description="the radius certified; default: as drawn"
+    )
+    standard_uncertainty: PositiveLength = Field(
+        description="of the radius, the same wherever the gauge stands"
+    )
 
 
-CalibrationSettings = Annotated[DistancesSettings | CoordinatesSettings | RadiusSettings, Field(discriminator="kind")]
+CalibrationSettings = Annotated[
+    DistancesSettings | CoordinatesSettings | RadiusSettings, Field(discriminator="kind")
+]

@@ -23,7 +23,10 @@ PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
 
 def resolve_priors(
-    sections: Sections, machine: Machine | None, positions: dict[int, Position], references: References
+    sections: Sections,
+    machine: Machine | None,
+    positions: dict[int, Position],
+    references: References,
 ) -> tuple[Prior, ...]:
     """Return what is known beforehand; what is wrong goes to the problems."""
     settings, entries = sections.get("error_model"), sections.entries("priors")
@@ -42,17 +45,23 @@ def resolve_priors(
     for i, entry in entries.items():
         found += _prior(entry, ("priors", int(i)), known, references)
         if len(found) > MOST_PRIORS:
-            text = f"there are {len(found)} priors up to here, coefficients counted; at most {MOST_PRIORS} are possible"
+            text = (
+                f"there are {len(found)} priors up to here, coefficients counted; at most"
+                f" {MOST_PRIORS} are possible"
+            )
             references.problems.add(("priors", int(i)), text)
             break
     return tuple(found)
 
 
-# What a name stands for: name of the parameter, position, probe, component, row over the model, unit, nominal value.
+# What a name stands for: name of the parameter, position, probe, component, row over the model,
+# unit, nominal value.
 _Known = tuple[str, str | None, str | None, int, Floats, Unit, float]
 
 
-def _known(model: ErrorModel, positions: dict[int, Position], references: References) -> dict[str, tuple[_Known, ...]]:
+def _known(
+    model: ErrorModel, positions: dict[int, Position], references: References
+) -> dict[str, tuple[_Known, ...]]:
     """Every name that a prior may have, and the parameters it stands for."""
     known: dict[str, tuple[_Known, ...]] = {}
     own = np.eye(len(model.parameters))
@@ -63,7 +72,9 @@ def _known(model: ErrorModel, positions: dict[int, Position], references: Refere
             known[parameter.function] = (*known.get(parameter.function, ()), one)
     reported = model.reported()
     for name, k in reported.known_names().items():
-        known.setdefault(name, ((reported.names[k], None, None, -1, reported.matrix[k], reported.units[k], 0.0),))
+        known.setdefault(
+            name, ((reported.names[k], None, None, -1, reported.matrix[k], reported.units[k], 0.0),)
+        )
     of_no_error = np.zeros(len(own))
     for position in positions.values():
         artefact = references.artefacts[position.artefact]
@@ -76,13 +87,18 @@ def _known(model: ErrorModel, positions: dict[int, Position], references: Refere
         for k, word in enumerate(words):
             name = f"{position.name}: {word}"
             unit: Unit
-            unit, nominal = ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
+            unit, nominal = (
+                ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
+            )
             known[name] = ((name, position.name, None, k, of_no_error, unit, nominal),)
     return known
 
 
 def _prior(
-    settings: PriorSettings, steps: Steps, known: dict[str, tuple[_Known, ...]], references: References
+    settings: PriorSettings,
+    steps: Steps,
+    known: dict[str, tuple[_Known, ...]],
+    references: References,
 ) -> list[Prior]:
     problems, name = references.problems, settings.parameter
     if name not in known:
@@ -97,14 +113,33 @@ def _prior(
     found = []
     for full, position, probe, component, row, unit, nominal in known[name]:
         parse, values = PARSERS[unit], []
-        for key, text in (("value", settings.value), ("standard_uncertainty", settings.standard_uncertainty)):
+        for key, text in (
+            ("value", settings.value),
+            ("standard_uncertainty", settings.standard_uncertainty),
+        ):
             try:
                 values.append(nominal if text is None else parse(text))
             except QuantityError as error:
                 problems.add((*steps, key), str(error))
         if len(values) == 2:
             if values[1] <= 0.0:
-                problems.add((*steps, "standard_uncertainty"), "must be above zero; correct it, or remove the prior")
+                problems.add(
+                    (*steps, "standard_uncertainty"),
+                    "must be above zero; correct it, or remove the prior",
+                )
             by_model = np.array(row)
-            found.append(Prior(full, position, probe, component, by_model, values[0], values[1], mark, place, unit))
+            found.append(
+                Prior(
+                    full,
+                    position,
+                    probe,
+                    component,
+                    by_model,
+                    values[0],
+                    values[1],
+                    mark,
+                    place,
+                    unit,
+                )
+            )
     return found

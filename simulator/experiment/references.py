@@ -30,7 +30,8 @@ from .structure import Sections
 
 DEFAULT_PROBE = "probe"
 
-# Of all artefacts together, and of all positions with their repeats: half a million readings take half a gigabyte.
+# Of all artefacts together, and of all positions with their repeats: half a million readings take
+# half a gigabyte.
 MOST_BALLS_OF_ALL = 100_000
 MOST_READINGS = 2_000_000
 
@@ -46,8 +47,9 @@ class Tally:
 class References:
     """What can be referred to.
 
-    ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in themselves;
-    ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the file does not tell it.
+    ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in
+    themselves; ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the
+    file does not tell it.
     """
 
     problems: Problems
@@ -60,26 +62,35 @@ class References:
     tally: Tally = field(default_factory=Tally)
 
     def count_readings(self, count: int, steps: Steps) -> bool:
-        """Count further readings; tell whether there is room for them, after saying once that there is not."""
+        """Count further readings; tell whether there is room for them, after saying once that there
+        is not.
+        """
         before = self.tally.readings
         self.tally.readings += count
         if before <= MOST_READINGS < self.tally.readings:
             text = (
-                f"there are {self.tally.readings} readings up to here, repeats counted; at most {MOST_READINGS} are "
-                "possible: read fewer balls, or less often"
+                f"there are {self.tally.readings} readings up to here, repeats counted; at most"
+                f" {MOST_READINGS} are possible: read fewer balls, or less often"
             )
             self.problems.add(steps, text)
         return self.tally.readings <= MOST_READINGS
 
     def artefact(self, name: str | None, steps: Steps) -> str | None:
-        """Return the artefact that a position or calibration is about, or None after saying what is wrong."""
+        """Return the artefact that a position or calibration is about, or None after saying what is
+        wrong.
+        """
         if name is None:
             if len(self.artefact_names) > 1:
                 choice = listing(self.artefact_names)
-                self.problems.add((*steps, "artefact"), f'missing; add "artefact", one of: {choice}')
+                self.problems.add(
+                    (*steps, "artefact"), f'missing; add "artefact", one of: {choice}'
+                )
             return self.artefact_names[0] if len(self.artefact_names) == 1 else None
         if name not in self.artefact_names:
-            self.problems.add((*steps, "artefact"), f'unknown artefact "{name}"; {hint(name, self.artefact_names)}')
+            self.problems.add(
+                (*steps, "artefact"),
+                f'unknown artefact "{name}"; {hint(name, self.artefact_names)}',
+            )
             return None
         return name
 
@@ -92,7 +103,9 @@ class References:
         for i in range(len(probes.items)) if isinstance(probes, SequenceNode) else ():
             probe = written_text(self.problems.root, *steps, "probes", i)
             if probe is not None and probe not in self.probes:
-                self.problems.add((*steps, "probes", i), f'unknown probe "{probe}"; {hint(probe, self.probes)}')
+                self.problems.add(
+                    (*steps, "probes", i), f'unknown probe "{probe}"; {hint(probe, self.probes)}'
+                )
 
     def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
         """Return the probes of a reading, or None after saying what is wrong."""
@@ -104,24 +117,34 @@ class References:
         return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
     def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
-        """Tell whether names listed at a path are of probes, each once, after saying what is wrong."""
+        """Tell whether names listed at a path are of probes, each once, after saying what is
+        wrong.
+        """
         return self._known_once("probe", self.probes, names, steps)
 
-    def ball_indices(self, names: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
+    def ball_indices(
+        self, names: Sequence[str], layout: BallLayout, steps: Steps
+    ) -> Indices | None:
         """Return the indices of listed balls, or None after saying what is wrong."""
         index = {name: i for i, name in enumerate(layout.names)}
         if not self._known_once("ball", index, names, steps):
             return None
         return np.array([index[name] for name in names], dtype=np.intp)
 
-    def _known_once(self, what: str, known: Collection[str], names: Sequence[str], steps: Steps) -> bool:
+    def _known_once(
+        self, what: str, known: Collection[str], names: Sequence[str], steps: Steps
+    ) -> bool:
         seen: set[str] = set()
         before = len(self.problems.messages)
         for i, name in enumerate(names):
             if name not in known:
-                self.problems.add((*steps, i), f'unknown {what} "{shorten(name)}"; {hint(name, known)}')
+                self.problems.add(
+                    (*steps, i), f'unknown {what} "{shorten(name)}"; {hint(name, known)}'
+                )
             elif name in seen:
-                self.problems.add((*steps, i), f'{what} "{shorten(name)}" is listed twice; remove one of the two')
+                self.problems.add(
+                    (*steps, i), f'{what} "{shorten(name)}" is listed twice; remove one of the two'
+                )
             seen.add(name)
         return len(self.problems.messages) == before
 
@@ -133,7 +156,9 @@ class References:
 
 
 def resolve_references(sections: Sections, folder: Path, problems: Problems) -> References:
-    """Return what positions and calibrations can refer to; tables of balls are read from ``folder``."""
+    """Return what positions and calibrations can refer to; tables of balls are read from
+    ``folder``.
+    """
     root = problems.root
     dimension = _dimension(root)
     probes = written_keys(root, "probes")
@@ -150,43 +175,60 @@ def resolve_references(sections: Sections, folder: Path, problems: Problems) -> 
         layout = listed.layout()
         balls += len(layout.names)
         if balls > MOST_BALLS_OF_ALL:
-            text = f"there are {balls} balls up to here; at most {MOST_BALLS_OF_ALL} of all artefacts are possible"
+            text = (
+                f"there are {balls} balls up to here; at most {MOST_BALLS_OF_ALL} of all artefacts"
+                " are possible"
+            )
             problems.add(steps, text)
             break
         where = (*steps, "directions" if isinstance(listed, BryanGaugeSettings) else "coordinates")
         twins = coincident_balls(layout)
         for i, j in twins[:3]:
-            text = f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct one of them'
+            text = (
+                f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct'
+                " one of them"
+            )
             problems.add(where, text)
         if dimension == 2 and np.any(layout.coordinates[:, 2]):
             high = int(np.flatnonzero(layout.coordinates[:, 2])[0])
             text = (
-                f'ball "{layout.names[high]}" has the third co-ordinate '
-                f"{format_length(layout.coordinates[high, 2])}, "
-                "but the experiment is two-dimensional; give two co-ordinates, or machine.volume a z axis"
+                f'ball "{layout.names[high]}" has the third co-ordinate'
+                f" {format_length(layout.coordinates[high, 2])}, but the experiment is"
+                " two-dimensional; give two co-ordinates, or machine.volume a z axis"
             )
             problems.add(where, text)
         elif not twins:
             artefacts[name], layouts[name] = listed, layout
         if listed.axes is not None:
             _check_axes(listed, layout, (*steps, "axes"), dimension, problems)
-    return References(problems, folder, dimension, probes, written_keys(root, "artefacts"), artefacts, layouts)
+    return References(
+        problems, folder, dimension, probes, written_keys(root, "artefacts"), artefacts, layouts
+    )
 
 
 def _check_axes(
-    settings: ArtefactSettings, layout: BallLayout, steps: Steps, dimension: int | None, problems: Problems
+    settings: ArtefactSettings,
+    layout: BallLayout,
+    steps: Steps,
+    dimension: int | None,
+    problems: Problems,
 ) -> None:
     """Report axes of an artefact that has none, or through balls that it does not have."""
     assert settings.axes is not None
     if settings.role != "plate":
         problems.add(steps, "a length standard's balls are not estimated; remove its axes")
     elif dimension == 3:
-        text = "axes are those of a plate in two dimensions; remove them, or the z axis of machine.volume"
+        text = (
+            "axes are those of a plate in two dimensions; remove them, or the z axis of"
+            " machine.volume"
+        )
         problems.add(steps, text)
     for key in ("origin", "x", "y"):
         name = getattr(settings.axes, key)
         if name is not None and name not in layout.names:
-            problems.add((*steps, key), f'unknown ball "{shorten(name)}"; {hint(name, layout.names)}')
+            problems.add(
+                (*steps, key), f'unknown ball "{shorten(name)}"; {hint(name, layout.names)}'
+            )
 
 
 def resolve_probes(sections: Sections, references: References) -> dict[str, Floats]:
@@ -194,7 +236,10 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Floa
     problems, dimension = references.problems, references.dimension
     if written(problems.root, "probes") is None:
         if dimension == 3:
-            text = 'missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: offsets from the reference point'
+            text = (
+                'missing; add "probes", such as {down: [0 mm, 0 mm, -50 mm]}: offsets from the'
+                " reference point"
+            )
             problems.add(("probes",), text)
         return {DEFAULT_PROBE: frozen(np.zeros(dimension))} if dimension == 2 else {}
     offsets = {}
@@ -203,33 +248,54 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Floa
         if references.require(
             dimension in (None, len(offset)),
             ("probes", name),
-            f"has {len(offset)} co-ordinates, but the experiment has {dimension} dimensions; give {dimension}",
+            f"has {len(offset)} co-ordinates, but the experiment has {dimension} dimensions; give"
+            f" {dimension}",
         ):
             offsets[str(name)] = frozen(offset)
     return offsets
 
 
 def resolve_offset_uncertainties(sections: Sections, references: References) -> dict[str, Floats]:
-    """Return standard uncertainties (d,) of the offsets that are estimated, infinite where they are unknown."""
+    """Return standard uncertainties (d,) of the offsets that are estimated, infinite where they are
+    unknown.
+    """
     problems, dimension = references.problems, references.dimension
-    listed = {str(name): s for name, s in sections.entries("probes").items() if isinstance(s, ProbeSettings)}
+    listed = {
+        str(name): s
+        for name, s in sections.entries("probes").items()
+        if isinstance(s, ProbeSettings)
+    }
     named = [name for name, settings in listed.items() if settings.reference]
     for name in named[1:]:
-        problems.add(("probes", name, "reference"), f'"{named[0]}" is the reference already; remove one of the two')
+        problems.add(
+            ("probes", name, "reference"),
+            f'"{named[0]}" is the reference already; remove one of the two',
+        )
     reference = named[0] if named else references.probes[0] if references.probes else ""
     found: dict[str, Floats] = {}
     for name, settings in listed.items():
         steps: Steps = ("probes", name)
         stated = settings.standard_uncertainty
         if settings.unknown and stated is not None:
-            problems.add((*steps, "unknown"), 'does not go with "standard_uncertainty"; remove one of the two', True)
+            problems.add(
+                (*steps, "unknown"),
+                'does not go with "standard_uncertainty"; remove one of the two',
+                True,
+            )
         if settings.reference and (settings.unknown or stated is not None):
             key = "unknown" if settings.unknown else "standard_uncertainty"
-            problems.add((*steps, key), "the offset of the reference is held as stated; remove it", True)
+            problems.add(
+                (*steps, key), "the offset of the reference is held as stated; remove it", True
+            )
         if name == reference and not named and (settings.unknown or stated is not None):
-            text = "its offset is held as stated, as the first probe is the reference where none has reference: true"
+            text = (
+                "its offset is held as stated, as the first probe is the reference where none has"
+                " reference: true"
+            )
             problems.doubt(steps, f"{text}; what is said of its uncertainty counts for nothing")
-        uncertainty, is_right = lengths_per_axis(stated, (*steps, "standard_uncertainty"), references)
+        uncertainty, is_right = lengths_per_axis(
+            stated, (*steps, "standard_uncertainty"), references
+        )
         if settings.unknown and dimension is not None:
             uncertainty = frozen([np.inf] * dimension)
         if uncertainty is not None and is_right and name != reference:
@@ -237,8 +303,12 @@ def resolve_offset_uncertainties(sections: Sections, references: References) -> 
     return found
 
 
-def lengths_per_axis(stated: Any, steps: Steps, references: References) -> tuple[Floats | None, bool]:
-    """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is right."""
+def lengths_per_axis(
+    stated: Any, steps: Steps, references: References
+) -> tuple[Floats | None, bool]:
+    """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is
+    right.
+    """
     dimension = references.dimension
     if stated is None or dimension is None:
         return None, True
@@ -246,7 +316,10 @@ def lengths_per_axis(stated: Any, steps: Steps, references: References) -> tuple
         return frozen([stated] * dimension), True
     listed = stated if isinstance(stated, tuple) else (stated.x, stated.y, stated.z)
     given = tuple(length for length in listed if length is not None)
-    text = f"has {len(given)} axes, but the experiment has {dimension}; give one length for all, or {dimension}"
+    text = (
+        f"has {len(given)} axes, but the experiment has {dimension}; give one length for all, or"
+        f" {dimension}"
+    )
     return frozen(given), references.require(len(given) == dimension, steps, text)
 
 
@@ -272,13 +345,19 @@ def _with_coordinates(
     complete = True
     for row in rows:
         if row.texts[0] in coordinates:
-            problems.add_at(row.mark, steps, f'ball "{row.texts[0]}" is listed twice; remove one of the two lines')
+            problems.add_at(
+                row.mark,
+                steps,
+                f'ball "{row.texts[0]}" is listed twice; remove one of the two lines',
+            )
             complete = False
         coordinates[row.texts[0]] = row.lengths
     if len(coordinates) > MOST_BALLS:
         problems.add(steps, f"has {len(coordinates)} balls; at most {MOST_BALLS} are possible")
         return None
-    return settings.model_copy(update={"coordinates": coordinates, "file": None}) if complete else None
+    return (
+        settings.model_copy(update={"coordinates": coordinates, "file": None}) if complete else None
+    )
 
 
 def _dimension(root: Node) -> int | None:

@@ -1,4 +1,6 @@
-"""The JSON Schema of experiment files, for editors that complete and check while the file is written."""
+"""The JSON Schema of experiment files, for editors that complete and check while the file is
+written.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ def schema() -> dict[str, Any]:
 
 
 def tidied(part: Any) -> Any:
-    """Leave out what serves programs only: titles, OpenAPI's discriminators, null for an omitted key."""
+    """Leave out what serves programs only: titles, OpenAPI's discriminators, null for an omitted
+    key.
+    """
     if isinstance(part, list):
         return [tidied(item) for item in part]
     if not isinstance(part, dict):
@@ -30,7 +34,11 @@ def tidied(part: Any) -> Any:
     for key, value in part.items():
         if key in ("properties", "$defs"):
             found[key] = {name: tidied(below) for name, below in value.items()}
-        elif key == "title" or key == "discriminator" or (key == "default" and not _is_writable(value, part)):
+        elif (
+            key == "title"
+            or key == "discriminator"
+            or (key == "default" and not _is_writable(value, part))
+        ):
             continue
         else:
             found[key] = tidied(value)
@@ -42,11 +50,16 @@ def tidied(part: Any) -> Any:
         del found["anyOf"]
         found = {**choices[0], **found}
     # Whole numbers serve as names too.
-    if isinstance(found.get("items"), dict) and found["items"] == {"minLength": 1, "type": "string"}:
+    if isinstance(found.get("items"), dict) and found["items"] == {
+        "minLength": 1,
+        "type": "string",
+    }:
         found["items"] = {"minLength": 1, "type": ["string", "integer"]}
     return found
 
 
 def _is_writable(default: Any, part: dict[str, Any]) -> bool:
-    """Tell whether a default could stand in the file: not null, nor the metres behind a text like 0 mm."""
+    """Tell whether a default could stand in the file: not null, nor the metres behind a text like 0
+    mm.
+    """
     return default is not None and not (isinstance(default, float) and part.get("type") == "string")

@@ -1,4 +1,6 @@
-"""The keys of an experiment file: forms, units and ranges. What they refer to is checked elsewhere."""
+"""The keys of an experiment file: forms, units and ranges. What they refer to is checked
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ class VolumeSettings(Settings):
 
     x: tuple[Length, Length] = Field(description="lower and upper end of the x axis")
     y: tuple[Length, Length] = Field(description="lower and upper end of the y axis")
-    z: tuple[Length, Length] | None = Field(None, description="lower and upper end of the z axis; omitted in 2-D")
+    z: tuple[Length, Length] | None = Field(
+        None, description="lower and upper end of the z axis; omitted in 2-D"
+    )
 
 
 class MachineSettings(Settings):
@@ -39,7 +43,11 @@ class MachineSettings(Settings):
         | Annotated[Edges, Tag("<list>")]
         | Annotated[VolumeSettings, Tag("<one>")],
         FORM,
-    ] = Field(description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]; two axes: 2-D")
+    ] = Field(
+        description=(
+            "ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]; two axes: 2-D"
+        )
+    )
     repeatability: LengthPerAxis = Field(
         description="standard uncertainty of a reading: for every co-ordinate, or one per axis"
     )
@@ -49,11 +57,14 @@ class PriorSettings(Settings):
     """What is known beforehand of a parameter."""
 
     parameter: Text = Field(
-        description="name as fit reports it, such as EXX[1], EXX t^2 or z low: rotation x; or an error function such "
-        "as EAX, for each of its coefficients"
+        description=(
+            "name as fit reports it, such as EXX[1], EXX t^2 or z low: rotation x; or an error"
+            " function such as EAX, for each of its coefficients"
+        )
     )
     value: Text | None = Field(
-        None, description="value with unit; default 0, of a position's origin the nominal co-ordinate"
+        None,
+        description="value with unit; default 0, of a position's origin the nominal co-ordinate",
     )
     standard_uncertainty: Text = Field(description="standard uncertainty of the value, with unit")
 
@@ -61,13 +72,22 @@ class PriorSettings(Settings):
 class ProbeSettings(Settings):
     """A probe whose offset is estimated."""
 
-    offset: Coordinates = Field(description="offset from the machine's reference point, as far as it is known")
-    standard_uncertainty: LengthPerAxis | None = Field(
-        None, description="of the stated offset, one length or per axis; the offset is then estimated"
+    offset: Coordinates = Field(
+        description="offset from the machine's reference point, as far as it is known"
     )
-    unknown: bool = Field(False, description="whether the offset is estimated without being known beforehand")
+    standard_uncertainty: LengthPerAxis | None = Field(
+        None,
+        description="of the stated offset, one length or per axis; the offset is then estimated",
+    )
+    unknown: bool = Field(
+        False, description="whether the offset is estimated without being known beforehand"
+    )
     reference: bool = Field(
-        False, description="whether this probe's offset is held, which says what others are relative to; default: first"
+        False,
+        description=(
+            "whether this probe's offset is held, which says what others are relative to; default:"
+            " first"
+        ),
     )
 
 
@@ -93,12 +113,19 @@ class TaskSettings(Settings):
     """A measuring task: a length that the corrected machine is to measure."""
 
     name: Name = Field(description="name of the task, used in tables and messages")
-    start: Coordinates = Field(alias="from", description="where the length begins: co-ordinates as those of points")
+    start: Coordinates = Field(
+        alias="from", description="where the length begins: co-ordinates as those of points"
+    )
     to: Coordinates = Field(description="where the length ends")
-    probe: Name | None = Field(None, description="probe that both ends are measured with; default: evaluation.probe")
-    probes: tuple[Name, Name] | None = Field(None, description="probes of the two ends, instead of probe")
+    probe: Name | None = Field(
+        None, description="probe that both ends are measured with; default: evaluation.probe"
+    )
+    probes: tuple[Name, Name] | None = Field(
+        None, description="probes of the two ends, instead of probe"
+    )
     target_accuracy: LengthFunction | None = Field(
-        None, description="what is to be reached, as target_accuracy of the file, which is the default"
+        None,
+        description="what is to be reached, as target_accuracy of the file, which is the default",
     )
 
 
@@ -108,19 +135,29 @@ class EvaluationSettings(Settings):
     points: (
         Annotated[
             Annotated[PointsSettings, Tag("<mapping>")]
-            | Annotated[Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)], Tag("<list>")]
+            | Annotated[
+                Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)],
+                Tag("<list>"),
+            ]
             | Annotated[PointsSettings, Tag("<one>")],
             FORM,
         ]
         | None
     ) = Field(
         None,
-        description="{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates; optional where tasks are "
-        "given",
+        description=(
+            "{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates; optional where"
+            " tasks are given"
+        ),
     )
-    probe: Name | None = Field(None, description="probe that the points are measured with; default: the first")
-    tasks: Annotated[tuple[TaskSettings, ...], Field(min_length=1, max_length=MOST_TASKS)] | None = Field(
-        None, description="list of lengths that the machine is to measure, {name: …, from: …, to: …}"
+    probe: Name | None = Field(
+        None, description="probe that the points are measured with; default: the first"
+    )
+    tasks: (
+        Annotated[tuple[TaskSettings, ...], Field(min_length=1, max_length=MOST_TASKS)] | None
+    ) = Field(
+        None,
+        description="list of lengths that the machine is to measure, {name: …, from: …, to: …}",
     )
 
 
@@ -134,12 +171,15 @@ class ExperimentSettings(Settings):
         description="the errors of the machine that are estimated"
     )
     true_machine: TrueMachineSettings = Field(
-        default_factory=ZeroSettings, description="the errors that simulated readings have; default zero"
+        default_factory=ZeroSettings,
+        description="the errors that simulated readings have; default zero",
     )
     probes: Annotated[dict[Name, AnyProbe], Field(min_length=1)] | None = Field(
         None,
-        description="name → offset of the probe from the machine's reference point, or {offset: …, "
-        "standard_uncertainty: …} where it is estimated; optional in 2-D",
+        description=(
+            "name → offset of the probe from the machine's reference point, or {offset: …, "
+            "standard_uncertainty: …} where it is estimated; optional in 2-D"
+        ),
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
         description="name → artefact: grid, square, balls, two_spheres, sphere or bryan_gauge"
@@ -148,26 +188,38 @@ class ExperimentSettings(Settings):
         description="where the artefacts are put and what is read there"
     )
     calibration: tuple[CalibrationSettings, ...] = Field(
-        (), description="what is known of the artefacts: distances, coordinates, radius; may be empty"
+        (),
+        description="what is known of the artefacts: distances, coordinates, radius; may be empty",
     )
-    pool: PoolSettings | None = Field(None, description="what ballplate plan chooses positions and calibration from")
+    pool: PoolSettings | None = Field(
+        None, description="what ballplate plan chooses positions and calibration from"
+    )
     priors: Annotated[tuple[PriorSettings, ...], Field(min_length=1)] | None = Field(
         None, description="what is known beforehand of machine errors and poses"
     )
-    evaluation: EvaluationSettings | None = Field(None, description="where the machine's uncertainty is evaluated")
+    evaluation: EvaluationSettings | None = Field(
+        None, description="where the machine's uncertainty is evaluated"
+    )
     target_accuracy: LengthFunction | None = Field(
         None,
-        description="what standard uncertainties, or coverage_factor times these, are to be within, such as "
-        "0.5 um + L/1000000 with L in metres, 0.9 um + 2.5 um/m, or (0.9 + L/400) um with L in mm",
+        description=(
+            "what standard uncertainties, or coverage_factor times these, are to be within, such as"
+            " 0.5 um + L/1000000 with L in metres, 0.9 um + 2.5 um/m, or (0.9 + L/400) um with L"
+            " in mm"
+        ),
     )
     coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
         1.0,
-        description="k of the expanded uncertainty U = k u that is compared with target_accuracy; default 1: the "
-        "standard uncertainty u is",
+        description=(
+            "k of the expanded uncertainty U = k u that is compared with target_accuracy; default"
+            " 1: the standard uncertainty u is"
+        ),
     )
     sigma: Literal["estimated", "given"] = Field(
         "estimated",
-        description="whether the scale of all uncertainties is estimated from the residuals or given",
+        description=(
+            "whether the scale of all uncertainties is estimated from the residuals or given"
+        ),
     )
     expected_rank_deficiency: Annotated[int, Field(ge=0, strict=True)] | None = Field(
         None, description="number of undetermined parameters that is accepted as intended"
@@ -175,5 +227,8 @@ class ExperimentSettings(Settings):
     seed: Seed = Field(1, description="seed of simulated readings; default 1")
     variants: Annotated[dict[Name, dict[Text, Any]], Field(min_length=1)] | None = Field(
         None,
-        description=("name → {path: new value}; the path is such as positions[1].level or positions[z low].level"),
+        description=(
+            "name → {path: new value}; the path is such as positions[1].level or positions[z"
+            " low].level"
+        ),
     )

@@ -1,4 +1,6 @@
-"""Validates the sections of an experiment file one by one, so that no error hides those of others."""
+"""Validates the sections of an experiment file one by one, so that no error hides those of
+others.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,11 @@ class Sections:
 
     def entries(self, section: str) -> dict[str | int, Any]:
         """Return the right entries of a section by key or index, in the order of the file."""
-        return {steps[1]: value for steps, value in self.values.items() if len(steps) == 2 and steps[0] == section}
+        return {
+            steps[1]: value
+            for steps, value in self.values.items()
+            if len(steps) == 2 and steps[0] == section
+        }
 
 
 def validate_sections(root: Node, problems: Problems, planning: bool = False) -> Sections:
@@ -59,7 +65,10 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         problems.add((), "this is a sweep of experiments; use it with ballplate sweep")
         return Sections(values)
     if "arrangement" in root.items and "machine" not in root.items:
-        text = "this describes a machine; use it with ballplate map, or name it with kind: machine in an experiment"
+        text = (
+            "this describes a machine; use it with ballplate map, or name it with kind: machine in"
+            " an experiment"
+        )
         problems.add((), text)
         return Sections(values)
     for steps, node in walk(root):
@@ -77,7 +86,9 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
             continue
         if node_or_none is None and key == "positions" and "pool" in root.items:
             if not planning:
-                text = "missing; add positions, or choose some from the pool with: ballplate plan FILE"
+                text = (
+                    "missing; add positions, or choose some from the pool with: ballplate plan FILE"
+                )
                 problems.add((key,), text)
             continue
         if node_or_none is None and field.is_required():
@@ -99,8 +110,12 @@ def _validate_entries(key: str, node: Node, problems: Problems) -> dict[Steps, A
     if isinstance(node, Scalar) and node.value is None:
         return {}
     if not isinstance(node, form):
-        expected = "a mapping, name: …" if form is Mapping else "a list, each entry beginning with “- ”"
-        found = describe(to_python(node) if isinstance(node, Scalar) else {} if isinstance(node, Mapping) else ())
+        expected = (
+            "a mapping, name: …" if form is Mapping else "a list, each entry beginning with “- ”"
+        )
+        found = describe(
+            to_python(node) if isinstance(node, Scalar) else {} if isinstance(node, Mapping) else ()
+        )
         problems.add((key,), f"expected {expected}, found {found} ({description})")
         return {}
     if not node.items and key != "calibration":
@@ -118,7 +133,9 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
         return _validate(_adapter("pool"), node, ("pool",), problems)
     values: dict[Steps, Any] = {("pool",): None}
     rest = {key: item for key, item in node.items.items() if key not in POOL_ENTRIES}
-    whole = _validate(_adapter("pool"), replace(node, items=rest), ("pool",), problems).get(("pool",))
+    whole = _validate(_adapter("pool"), replace(node, items=rest), ("pool",), problems).get(
+        ("pool",)
+    )
     whole = whole or PoolSettings.model_validate({})
     values |= {("pool", "times"): whole.times, ("pool", "limits"): whole.limits}
     for key, adapter_of in POOL_ENTRIES.items():
@@ -136,7 +153,11 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
 
 def _kind_of_candidate(node: Node) -> Any:
     # Of one form only, so that a slip is not answered with keys of the other.
-    return GroupSettings if is_group(node.items if isinstance(node, Mapping) else None) else ListedSettings
+    return (
+        GroupSettings
+        if is_group(node.items if isinstance(node, Mapping) else None)
+        else ListedSettings
+    )
 
 
 POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
@@ -145,7 +166,9 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 }
 
 
-def _validate(adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems) -> dict[Steps, Any]:
+def _validate(
+    adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems
+) -> dict[Steps, Any]:
     try:
         return {steps: adapter.validate_python(to_python(node))}
     except ValidationError as error:

@@ -15,8 +15,8 @@ from ..inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_p
 from .sections import ExperimentSettings
 
 MOST_VARIANTS = 1000
-# Balls, balls read, calibrated values, priors and evaluation points of all variants of a file, which are loaded
-# together.
+# Balls, balls read, calibrated values, priors and evaluation points of all variants of a file,
+# which are loaded together.
 MOST_OF_ALL = 2_000_000
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
 
@@ -90,7 +90,11 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     :raises ValueError: the path is malformed, or what it passes through does not exist.
     """
     steps = _steps(path)
-    if len(steps) == 1 and steps[0] not in ExperimentSettings.model_fields or steps[0] == "variants":
+    if (
+        len(steps) == 1
+        and steps[0] not in ExperimentSettings.model_fields
+        or steps[0] == "variants"
+    ):
         known = [key for key in ExperimentSettings.model_fields if key != "variants"]
         raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
     return _replaced(root, steps, value, mark, ())
@@ -125,7 +129,9 @@ def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
 def _steps(path: str) -> list[str]:
     steps = [match[1] or match[2] or "" for match in STEP.finditer(path)]
     if not path or "".join(match[0] for match in STEP.finditer(path)) != path or "" in steps:
-        raise ValueError(f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size')
+        raise ValueError(
+            f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size'
+        )
     return steps
 
 
@@ -148,7 +154,9 @@ def _overlap(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
     return one[:shorter] == other[:shorter]
 
 
-def _replaced(node: Node, steps: list[str], value: Node, mark: Mark, above: tuple[str, ...]) -> Node:
+def _replaced(
+    node: Node, steps: list[str], value: Node, mark: Mark, above: tuple[str, ...]
+) -> Node:
     if not steps:
         return value
     step, rest, here = steps[0], steps[1:], (*above, steps[0])
@@ -162,19 +170,26 @@ def _replaced(node: Node, steps: list[str], value: Node, mark: Mark, above: tupl
         i = _index(node, step, above)
         below = _replaced(node.items[i], rest, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
-    raise ValueError(f"{format_path(above)} is {describe(node.value)} and has nothing below it; replace it as a whole")
+    raise ValueError(
+        f"{format_path(above)} is {describe(node.value)} and has nothing below it; replace it as a"
+        " whole"
+    )
 
 
 def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:
     if re.fullmatch(r"[0-9]{1,9}", step):
         if int(step) < len(node.items):
             return int(step)
-        raise ValueError(f"there is no {format_path(above)}[{step}]; the indices are 0 to {len(node.items) - 1}")
+        raise ValueError(
+            f"there is no {format_path(above)}[{step}]; the indices are 0 to {len(node.items) - 1}"
+        )
     names = [_name(item) for item in node.items]
     if names.count(step) == 1:
         return names.index(step)
     if step in names:
-        raise ValueError(f'several entries of {format_path(above)} are named "{step}"; use an index')
+        raise ValueError(
+            f'several entries of {format_path(above)} are named "{step}"; use an index'
+        )
     known = [name for name in names if name is not None]
     advice = hint(step, known) if known else f"use an index, 0 to {len(names) - 1}"
     raise ValueError(f'there is no "{step}" in {format_path(above)}; {advice}')
@@ -203,7 +218,9 @@ def in_variants(names: list[str], all_names: list[str]) -> str:
 def unknown_variants(
     files: AnySequence[Path], wanted: AnySequence[str], found: Collection[str | None]
 ) -> tuple[Message, ...]:
-    """Messages about variants that none of the files has; `found` are names of those that they have."""
+    """Messages about variants that none of the files has; `found` are names of those that they
+    have.
+    """
     every, known = ", ".join(map(str, files)), sorted(name for name in found if name is not None)
     texts = [f'no variant "{name}"; {hint(name, known)}' for name in wanted if name not in known]
     return tuple(Message(every, 0, 0, "", text) for text in texts)

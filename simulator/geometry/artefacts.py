@@ -28,8 +28,9 @@ Pairs = tuple[tuple[int, int], ...]
 class BallLayout:
     """The balls of an artefact in its own frame.
 
-    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name of a set →
-    pairs of ball indices, without "all". ``corner_set``: indices of the corner balls, empty where undefined.
+    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name of
+    a set → pairs of ball indices, without "all". ``corner_set``: indices of the corner balls, empty
+    where undefined.
     """
 
     names: tuple[str, ...]
@@ -48,7 +49,8 @@ def pairs(layout: BallLayout, set_name: str) -> NDArray[np.intp]:
     if set_name not in layout.pair_sets:
         defined = listing([*layout.pair_sets, "all"])
         raise ValueError(
-            f'"{set_name}" is not defined for this artefact; choose from: {defined}, or list pairs of balls'
+            f'"{set_name}" is not defined for this artefact; choose from: {defined}, or list pairs'
+            " of balls"
         )
     return np.array(layout.pair_sets[set_name], dtype=np.intp).reshape(-1, 2)
 
@@ -66,7 +68,8 @@ def corners(layout: BallLayout) -> NDArray[np.intp]:
 def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, int]]:
     """Return pairs of balls nearer than a nanometre to each other, not many more than asked for."""
     found: list[tuple[int, int]] = []
-    # Along a line askew to all that balls are usually in rows along, only coinciding balls are as far as one another.
+    # Along a line askew to all that balls are usually in rows along, only coinciding balls are as
+    # far as one another.
     along = layout.coordinates @ (0.6139, 0.5243, 0.5901)
     order = np.argsort(along, kind="stable")
     along = along[order]
@@ -77,7 +80,9 @@ def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, in
         first, second = order[near], order[near + shift]
         differences = layout.coordinates[second] - layout.coordinates[first]
         near = np.flatnonzero(np.linalg.norm(differences, axis=1) < COINCIDENT)
-        found += [(int(min(pair)), int(max(pair))) for pair in zip(first[near], second[near], strict=True)]
+        found += [
+            (int(min(pair)), int(max(pair))) for pair in zip(first[near], second[near], strict=True)
+        ]
     return sorted(found)
 
 
@@ -92,18 +97,28 @@ BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 
 
 class AxesSettings(Settings):
-    """The axes that a plate's co-ordinates are told in: the ball at the origin, and one on the x or the y axis."""
+    """The axes that a plate's co-ordinates are told in: the ball at the origin, and one on the x or
+    the y axis.
+    """
 
     origin: Name = Field(description="the ball at the origin")
-    x: Name | None = Field(None, description="the ball on the x axis, on the half where it nominally is; this or y")
-    y: Name | None = Field(None, description="the ball on the y axis, on the half where it nominally is; this or x")
+    x: Name | None = Field(
+        None, description="the ball on the x axis, on the half where it nominally is; this or y"
+    )
+    y: Name | None = Field(
+        None, description="the ball on the y axis, on the half where it nominally is; this or x"
+    )
 
     @model_validator(mode="after")
     def _two_balls(self) -> Self:
         if (self.x is None) == (self.y is None):
-            raise ValueError('needs either "x" or "y", the ball that lies on that axis; give exactly one of them')
+            raise ValueError(
+                'needs either "x" or "y", the ball that lies on that axis; give exactly one of them'
+            )
         if self.origin in (self.x, self.y):
-            raise ValueError(f'ball "{self.origin}" cannot be the origin and fix an axis too; name another one')
+            raise ValueError(
+                f'ball "{self.origin}" cannot be the origin and fix an axis too; name another one'
+            )
         return self
 
 
@@ -113,12 +128,16 @@ class ArtefactSettings(Settings):
     kind: str
     role: Literal["plate", "length_standard"] = Field(
         "plate",
-        description="plate: its ball co-ordinates are estimated; length_standard: it only carries distances",
+        description=(
+            "plate: its ball co-ordinates are estimated; length_standard: it only carries distances"
+        ),
     )
     axes: AxesSettings | None = Field(
         None,
-        description="axes in which a two-dimensional fit tells the co-ordinates of the balls; default: from the first "
-        "ball through the farthest one that nominally lies on its x axis",
+        description=(
+            "axes in which a two-dimensional fit tells the co-ordinates of the balls; default: from"
+            " the first ball through the farthest one that nominally lies on its x axis"
+        ),
     )
 
     def layout(self) -> BallLayout:
@@ -130,7 +149,9 @@ class GridSettings(ArtefactSettings):
     """Balls in rows and columns, r1c1 at the lower corner."""
 
     kind: Literal["grid"] = Field(description="balls in rows and columns")
-    balls: tuple[BallsPerSide, BallsPerSide] = Field(description="number of columns, number of rows")
+    balls: tuple[BallsPerSide, BallsPerSide] = Field(
+        description="number of columns, number of rows"
+    )
     size: tuple[PositiveLength, PositiveLength] = Field(
         description="distance between the outer balls along the artefact's x and y"
     )
@@ -138,7 +159,10 @@ class GridSettings(ArtefactSettings):
     @model_validator(mode="after")
     def _not_too_many_balls(self) -> Self:
         if self.balls[0] * self.balls[1] > MOST_BALLS:
-            raise ValueError(f"{self.balls[0] * self.balls[1]} balls are too many; at most {MOST_BALLS} are possible")
+            raise ValueError(
+                f"{self.balls[0] * self.balls[1]} balls are too many; at most {MOST_BALLS} are"
+                " possible"
+            )
         return self
 
     def layout(self) -> BallLayout:
@@ -176,18 +200,29 @@ class BallsSettings(ArtefactSettings):
     kind: Literal["balls"] = Field(description="balls at listed co-ordinates")
     coordinates: (
         Annotated[
-            Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_BALLS), Tag("<list>")]
-            | Annotated[dict[Name, Coordinates], Field(min_length=1, max_length=MOST_BALLS), Tag("<mapping>")],
+            Annotated[
+                tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_BALLS), Tag("<list>")
+            ]
+            | Annotated[
+                dict[Name, Coordinates],
+                Field(min_length=1, max_length=MOST_BALLS),
+                Tag("<mapping>"),
+            ],
             Discriminator(_form_of_coordinates),
         ]
         | None
     ) = Field(
         None,
-        description="2 or 3 co-ordinates per ball, the third 0 if omitted: a list (balls named 1, 2, …) "
-        "or name → co-ordinates",
+        description=(
+            "2 or 3 co-ordinates per ball, the third 0 if omitted: a list (balls named 1, 2, …) "
+            "or name → co-ordinates"
+        ),
     )
     file: str | None = Field(
-        None, description="CSV file instead of co-ordinates: columns ball, x_mm, y_mm and, if needed, z_mm"
+        None,
+        description=(
+            "CSV file instead of co-ordinates: columns ball, x_mm, y_mm and, if needed, z_mm"
+        ),
     )
 
     @model_validator(mode="after")
@@ -206,7 +241,10 @@ class BallsSettings(ArtefactSettings):
         if isinstance(self.coordinates, dict):
             names, listed = tuple(self.coordinates), tuple(self.coordinates.values())
         else:
-            names, listed = tuple(str(i + 1) for i in range(len(self.coordinates))), self.coordinates
+            names, listed = (
+                tuple(str(i + 1) for i in range(len(self.coordinates))),
+                self.coordinates,
+            )
         return BallLayout(names, _frozen([(*xyz, 0.0)[:3] for xyz in listed]))
 
 
@@ -240,7 +278,9 @@ class SphereSettings(ArtefactSettings):
 class BryanGaugeSettings(ArtefactSettings):
     """A ball that is carried around a fixed ball, which is not read, at the end of a bar."""
 
-    kind: Literal["bryan_gauge"] = Field(description="a ball on a bar that pivots about a fixed ball")
+    kind: Literal["bryan_gauge"] = Field(
+        description="a ball on a bar that pivots about a fixed ball"
+    )
     role: Literal["plate", "length_standard"] = Field(
         "length_standard", description="length_standard: a Bryan gauge only carries its radius"
     )
@@ -252,7 +292,9 @@ class BryanGaugeSettings(ArtefactSettings):
     @model_validator(mode="after")
     def _no_plate(self) -> Self:
         if self.role == "plate":
-            raise ValueError("a Bryan gauge only carries its radius and is no plate; remove its role")
+            raise ValueError(
+                "a Bryan gauge only carries its radius and is no plate; remove its role"
+            )
         return self
 
     def layout(self) -> BallLayout:
@@ -276,7 +318,9 @@ else:
     AnyArtefactSettings = Annotated[Union[tuple(ARTEFACTS.values())], Field(discriminator="kind")]  # noqa: UP007
 
 
-def _rectangle(places: list[tuple[int, int]], shape: tuple[int, int], size: tuple[float, float]) -> BallLayout:
+def _rectangle(
+    places: list[tuple[int, int]], shape: tuple[int, int], size: tuple[float, float]
+) -> BallLayout:
     columns, rows = shape
     index = {place: i for i, place in enumerate(places)}
     coordinates = [
@@ -306,9 +350,12 @@ def _rectangle(places: list[tuple[int, int]], shape: tuple[int, int], size: tupl
         "neighbours": neighbours,
     }
     if len(places) == columns * rows:
-        # From the upper left to the lower right; with these the net of distances is rigid in its plane.
+        # From the upper left to the lower right; with these the net of distances is rigid in its
+        # plane.
         braces = tuple(
-            (index[row + 1, column], index[row, column + 1]) for row in range(rows - 1) for column in range(columns - 1)
+            (index[row + 1, column], index[row, column + 1])
+            for row in range(rows - 1)
+            for column in range(columns - 1)
         )
         every = neighbours + braces + sides + diagonals
         sets["braced"] = tuple(dict.fromkeys((min(pair), max(pair)) for pair in every))

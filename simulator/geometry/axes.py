@@ -1,7 +1,8 @@
-"""The axes of a plate itself, which two of its balls define: an origin, and a ball that lies on one of the axes.
+"""The axes of a plate itself, which two of its balls define: an origin, and a ball that lies on one
+of the axes.
 
-They make co-ordinates comparable, whatever frame an estimate was made in (NBSIR 79-1752, section 2). The axes are those
-of two dimensions.
+They make co-ordinates comparable, whatever frame an estimate was made in (NBSIR 79-1752, section
+2). The axes are those of two dimensions.
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ from numpy.typing import NDArray
 
 from .artefacts import AxesSettings, BallLayout
 
-# A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to be on it.
+# A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to
+# be on it.
 ON_AXIS = 1e-6
 
 
 @dataclass(frozen=True)
 class PlateAxes:
-    """The ball at the origin and the one on axis 0 (x) or 1 (y), on its negative half where `sign` is -1."""
+    """The ball at the origin and the one on axis 0 (x) or 1 (y), on its negative half where `sign`
+    is -1.
+    """
 
     origin: int
     ball: int
@@ -30,9 +34,10 @@ class PlateAxes:
 def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> PlateAxes | None:
     """The axes of a plate as its settings state them, or sensible ones; None for a single ball.
 
-    Without settings the first ball is the origin. The x axis goes through the farthest ball that nominally lies on it;
-    if there is none, the y axis through the farthest on that; otherwise the x axis through the ball that is farthest
-    along it. The half of the axis is the one where the ball nominally is.
+    Without settings the first ball is the origin. The x axis goes through the farthest ball that
+    nominally lies on it; if there is none, the y axis through the farthest on that; otherwise the x
+    axis through the ball that is farthest along it. The half of the axis is the one where the ball
+    nominally is.
 
     :raises KeyError: the settings name a ball that the layout has not.
 
@@ -56,7 +61,9 @@ def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> Plat
 
 
 def _farthest(places: NDArray[np.float64]) -> tuple[int, int]:
-    """The ball that fixes an axis best, and which one, from places (n, 2) relative to the origin."""
+    """The ball that fixes an axis best, and which one, from places (n, 2) relative to the
+    origin.
+    """
     distance = np.sqrt((places**2).sum(axis=1))
     for axis in (0, 1):
         on_axis = np.abs(places[:, 1 - axis]) <= ON_AXIS * distance
@@ -72,11 +79,16 @@ def axes_words(axes: PlateAxes, names: tuple[str, ...]) -> str:
     >>> axes_words(PlateAxes(0, 1, 1), ("a", "b"))
     'origin: ball a, y axis through ball b'
     """
-    return f"origin: ball {names[axes.origin]}, {'xy'[axes.axis]} axis through ball {names[axes.ball]}"
+    return (
+        f"origin: ball {names[axes.origin]}, {'xy'[axes.axis]} axis through ball {names[axes.ball]}"
+    )
 
 
-def in_plate_axes(balls: NDArray[np.float64], axes: PlateAxes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and the rotation (2, 2) that they are turned by.
+def in_plate_axes(
+    balls: NDArray[np.float64], axes: PlateAxes
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and the rotation (2, 2) that they
+    are turned by.
 
     >>> in_plate_axes(np.array([[1.0, 1.0], [1.0, 3.0]]), PlateAxes(0, 1, 0))[0].tolist()
     [[0.0, 0.0], [2.0, 0.0]]

@@ -9,7 +9,8 @@ Array = NDArray[np.float64]
 
 
 def rotation_from_vector(vector: Array) -> Array:
-    """Rotation matrices (m, d, d) that turn by `vector`: (m, 3) about an axis in space, (m, 1) in the plane.
+    """Rotation matrices (m, d, d) that turn by `vector`: (m, 3) about an axis in space, (m, 1) in
+    the plane.
 
     >>> rotation_from_vector(np.array([[np.pi / 2]])).round(12).tolist()
     [[[0.0, -1.0], [1.0, 0.0]]]
@@ -50,7 +51,9 @@ def vector_from_rotation(rotation: Array) -> Array:
 
 
 def vector_rate(vector: Array) -> Array:
-    """Derivative (m, q, q) of `vector_from_rotation` by a further small turn about the machine's axes."""
+    """Derivative (m, q, q) of `vector_from_rotation` by a further small turn about the machine's
+    axes.
+    """
     m, q = vector.shape
     if q == 1:
         return np.ones((m, 1, 1))
@@ -68,8 +71,8 @@ def vector_rate(vector: Array) -> Array:
 def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
     """Rotation (d, d) and origin (d,) that bring points `source` (n, d) closest to `target` (n, d).
 
-    Points in a plane fix a proper rotation in space all the same. Points on a line leave the turn about it open;
-    some rotation is then returned.
+    Points in a plane fix a proper rotation in space all the same. Points on a line leave the turn
+    about it open; some rotation is then returned.
     """
     centre_source, centre_target = source.mean(axis=0), target.mean(axis=0)
     u, _, vh = np.linalg.svd((target - centre_target).T @ (source - centre_source))
@@ -82,8 +85,8 @@ def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
 def without_rigid_motion(places: Array, errors: Array) -> Array:
     """Errors (n, d, r) less the small rigid motion of all places (n, d) that each column contains.
 
-    No distance changes by it to first order, and what is left is small where the distances are known well, so
-    that the differences formed from it keep their digits.
+    No distance changes by it to first order, and what is left is small where the distances are
+    known well, so that the differences formed from it keep their digits.
     """
     n, d = places.shape
     if n == 0 or errors.shape[2] == 0:

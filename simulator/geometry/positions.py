@@ -1,4 +1,6 @@
-"""Positions of an artefact in the machine: from what an experiment file says to a rotation and an origin."""
+"""Positions of an artefact in the machine: from what an experiment file says to a rotation and an
+origin.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +45,10 @@ class Pose:
 class PlanePlacement:
     """An artefact parallel to a machine plane.
 
-    ``plane``: axis the plane is normal to; in two dimensions z. ``level``: co-ordinate of the artefact's
-    plane along it, in metres. ``anchor``: which point of the turned bounding rectangle is ``at``, in metres
-    in the order of ``IN_PLANE_AXES[plane]``. ``quarter_turns``: counter-clockwise as seen against the plane's
-    normal.
+    ``plane``: axis the plane is normal to; in two dimensions z. ``level``: co-ordinate of the
+    artefact's plane along it, in metres. ``anchor``: which point of the turned bounding rectangle
+    is ``at``, in metres in the order of ``IN_PLANE_AXES[plane]``. ``quarter_turns``:
+    counter-clockwise as seen against the plane's normal.
     """
 
     plane: Axis
@@ -58,21 +60,27 @@ class PlanePlacement:
 
 @dataclass(frozen=True)
 class FreePlacement:
-    """An artefact anywhere: x = R y + ``origin`` (d metres), R from ``rotation`` (3 radians, or 1 in 2-D)."""
+    """An artefact anywhere: x = R y + ``origin`` (d metres), R from ``rotation`` (3 radians, or 1
+    in 2-D).
+    """
 
     origin: tuple[float, ...]
     rotation: tuple[float, ...]
 
 
-def nominal_pose(placement: PlanePlacement | FreePlacement, layout: BallLayout, dimension: int) -> Pose:
+def nominal_pose(
+    placement: PlanePlacement | FreePlacement, layout: BallLayout, dimension: int
+) -> Pose:
     """Return the pose that a placement gives an artefact in a machine of 2 or 3 dimensions.
 
-    :raises ValueError: a placement in a plane other than z in two dimensions, or a free one of another
-        dimension.
+    :raises ValueError: a placement in a plane other than z in two dimensions, or a free one of
+        another dimension.
     """
     if isinstance(placement, FreePlacement):
         if len(placement.origin) != dimension:
-            raise ValueError(f"a pose with {len(placement.origin)} co-ordinates in {dimension} dimensions")
+            raise ValueError(
+                f"a pose with {len(placement.origin)} co-ordinates in {dimension} dimensions"
+            )
         return Pose(rotation_matrix(placement.rotation), np.array(placement.origin))
     if dimension == 2 and placement.plane != "z":
         raise ValueError("a plane experiment has no plane but z")
@@ -93,7 +101,9 @@ def nominal_pose(placement: PlanePlacement | FreePlacement, layout: BallLayout, 
 
 
 def bounding_rectangle(layout: BallLayout) -> NDArray[np.float64]:
-    """Return the lower and the upper corner, (2, 2) metres, of the balls in the artefact's x and y."""
+    """Return the lower and the upper corner, (2, 2) metres, of the balls in the artefact's x and
+    y.
+    """
     plane = layout.coordinates[:, :2]
     return np.array([plane.min(axis=0), plane.max(axis=0)])
 

@@ -1,8 +1,9 @@
-"""The profile of a turned part through nominal points: arc length along it, and normals to its surface.
+"""The profile of a turned part through nominal points: arc length along it, and normals to its
+surface.
 
-Between neighbouring points of a feature the profile is an arc with the curvature of circles through three of them, so
-that points on a circle or a line give both exactly. A feature is a run of points; neighbouring features may share the
-place between them.
+Between neighbouring points of a feature the profile is an arc with the curvature of circles through
+three of them, so that points on a circle or a line give both exactly. A feature is a run of points;
+neighbouring features may share the place between them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# How much longer the way over a place may be than the way past it, for the place to lie on the profile.
+# How much longer the way over a place may be than the way past it, for the place to lie on the
+# profile.
 DETOUR = 0.05
 
 
@@ -27,7 +29,8 @@ class NotOnProfileError(ValueError):
 
 @dataclass(frozen=True)
 class Profile:
-    """Nominal `places` (m, 2) as radius and axial co-ordinate in metres, in order along the surface.
+    """Nominal `places` (m, 2) as radius and axial co-ordinate in metres, in order along the
+    surface.
 
     `features` are first and last index of each run; a place in two runs is their common boundary.
     """
@@ -41,12 +44,16 @@ class Profile:
 
     @cached_property
     def lengths(self) -> Array:
-        """Arc length (m,) of each place from the first; between features without a common place, along the chord."""
+        """Arc length (m,) of each place from the first; between features without a common place,
+        along the chord.
+        """
         steps = np.abs(np.diff(self._points))
         for first, last in self.features:
             if last - first >= 2:
                 curvature = _curvatures(self._points[first : last + 1])
-                bend = np.clip(0.25 * steps[first:last] * (curvature[1:] + curvature[:-1]), -1.0, 1.0)
+                bend = np.clip(
+                    0.25 * steps[first:last] * (curvature[1:] + curvature[:-1]), -1.0, 1.0
+                )
                 bend[bend == 0.0] = 1e-300
                 steps[first:last] *= np.arcsin(bend) / bend
         return np.concatenate([[0.0], np.cumsum(steps)])
@@ -55,8 +62,8 @@ class Profile:
     def normals(self) -> Array:
         """Unit normals (m, 2), radius and axial co-ordinate, that point out of the material.
 
-        The normal of a feature of one point is square to the line to the nearer of its neighbours, to which it may be
-        tangent.
+        The normal of a feature of one point is square to the line to the nearer of its neighbours,
+        to which it may be tangent.
         """
         tangents = np.zeros(len(self._points), complex)
         for first, last in self.features:
@@ -86,22 +93,30 @@ class Profile:
 
 
 def _curvatures(points: Complex) -> Array:
-    """Signed curvature (m,) of the circle through each point and its neighbours; at the ends, that of the next."""
+    """Signed curvature (m,) of the circle through each point and its neighbours; at the ends, that
+    of the next.
+    """
     one, two = np.diff(points)[:-1], np.diff(points)[1:]
     inner = 2.0 * (np.conj(one) * two).imag / (np.abs(one) * np.abs(two) * np.abs(one + two))
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
 def along(
-    places: Array, labels: Sequence[str], boundaries: Array, start: Array | None = None, end: Array | None = None
+    places: Array,
+    labels: Sequence[str],
+    boundaries: Array,
+    start: Array | None = None,
+    end: Array | None = None,
 ) -> tuple[Profile, Array, Array]:
-    """The profile over nominal places (m, 2), and indices in it of the places (m,) and of the boundaries (n,).
+    """The profile over nominal places (m, 2), and indices in it of the places (m,) and of the
+    boundaries (n,).
 
-    A feature ends where the labels of neighbouring places differ, and at every one of the `boundaries` (n, 2), which
-    lie between places or are places themselves. `start` and `end` (2,) are places before the first and after the last.
+    A feature ends where the labels of neighbouring places differ, and at every one of the
+    `boundaries` (n, 2), which lie between places or are places themselves. `start` and `end` (2,)
+    are places before the first and after the last.
 
-    :raises NotOnProfileError: a boundary that is far from the way between neighbouring places; its argument is the
-        boundary's index.
+    :raises NotOnProfileError: a boundary that is far from the way between neighbouring places; its
+        argument is the boundary's index.
     """
     found = [*places]
     own = [*range(len(places))]
@@ -136,11 +151,17 @@ def along(
             features.append((first, k - 1))
             first = k
     features.append((first, len(found) - 1))
-    return Profile(np.array(found), tuple(features)), np.array(own, dtype=int), np.array(where, dtype=int)
+    return (
+        Profile(np.array(found), tuple(features)),
+        np.array(own, dtype=int),
+        np.array(where, dtype=int),
+    )
 
 
 def _between(places: Array, boundary: Array) -> int | None:
-    """Index before which a place stands, where it lengthens the way least; None where that is much."""
+    """Index before which a place stands, where it lengthens the way least; None where that is
+    much.
+    """
     if len(places) < 2:
         return None
     before = np.hypot(*(places[:-1] - boundary).T)

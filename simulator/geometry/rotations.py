@@ -1,4 +1,6 @@
-"""Rotations: matrices from angles, and turns that are exact where the angle is a multiple of 90 degrees."""
+"""Rotations: matrices from angles, and turns that are exact where the angle is a multiple of 90
+degrees.
+"""
 
 from __future__ import annotations
 

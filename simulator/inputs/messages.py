@@ -1,4 +1,6 @@
-"""Messages about an experiment file: where, what is wrong and what would be right, all of them at once."""
+"""Messages about an experiment file: where, what is wrong and what would be right, all of them at
+once.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +16,18 @@ MOST_MESSAGES = 1000
 ENOUGH = f"more than {MOST_MESSAGES} errors; mend these first"
 
 # Names of a file may hold what would break a line in two or reach the terminal as a command.
-UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+UNPRINTABLE = re.compile(
+    "[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
 
 
 @dataclass(frozen=True, order=True)
 class Message:
-    """One error of a file. ``line`` and ``column`` count from 1 and are 0 where the whole file is meant.
+    """One error of a file. ``line`` and ``column`` count from 1 and are 0 where the whole file is
+    meant.
 
-    ``path`` is the place in the experiment, such as ``positions[1].probes[0]``; empty where there is none.
+    ``path`` is the place in the experiment, such as ``positions[1].probes[0]``; empty where there
+    is none.
     """
 
     file: str
@@ -36,7 +42,9 @@ class Message:
 
 
 class ExperimentError(Exception):
-    """An experiment file cannot be used; ``messages`` has every reason found, in the order of lines."""
+    """An experiment file cannot be used; ``messages`` has every reason found, in the order of
+    lines.
+    """
 
     def __init__(self, messages: Iterable[Message]) -> None:
         self.messages: tuple[Message, ...] = tuple(messages)

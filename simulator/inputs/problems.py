@@ -1,4 +1,6 @@
-"""Collects what is wrong with an experiment file while it is read, so that everything is said at once."""
+"""Collects what is wrong with an experiment file while it is read, so that everything is said at
+once.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +12,11 @@ from .yamltree import Mapping, Mark, Node, Sequence, mark_of, to_python, written
 
 @dataclass(eq=False)
 class Problems:
-    """Messages about the tree below ``root``; ``doubts`` are about what is possible, and unlikely to be meant.
+    """Messages about the tree below ``root``; ``doubts`` are about what is possible, and unlikely
+    to be meant.
 
-    Adding one too many raises an ``ExperimentError`` with all of them: each takes time to word, and a file may have
-    hundreds of thousands.
+    Adding one too many raises an ``ExperimentError`` with all of them: each takes time to word, and
+    a file may have hundreds of thousands.
     """
 
     root: Node
@@ -51,7 +54,8 @@ class Problems:
         """Tell whether there is a message about a path or something below it."""
         path = format_path(steps)
         return any(
-            message.path == path or message.path.startswith((f"{path}.", f"{path}[")) for message in self.messages
+            message.path == path or message.path.startswith((f"{path}.", f"{path}["))
+            for message in self.messages
         )
 
 

@@ -1,6 +1,8 @@
-"""Quantities of an experiment file: a number with its unit, read exactly and kept in metres and radians.
+"""Quantities of an experiment file: a number with its unit, read exactly and kept in metres and
+radians.
 
-A factor is held as a fraction and multiplied before rounding, so "0.2 um" is the float nearest to 2e-7.
+A factor is held as a fraction and multiplied before rounding, so "0.2 um" is the float nearest to
+2e-7.
 """
 
 from __future__ import annotations
@@ -51,12 +53,24 @@ RATIO_UNITS: Mapping[str, Fraction] = {
     "um/m": Fraction(1, 10**6),
     "nm/m": Fraction(1, 10**9),
 }
-TEMPERATURE_UNITS: Mapping[str, Fraction] = {"K": Fraction(1), "degC": Fraction(1), "mK": Fraction(1, 10**3)}
-EXPANSION_UNITS: Mapping[str, Fraction] = {
-    f"{ratio}/{degree}": RATIO_UNITS[ratio] for ratio in ("um/m", "ppm", "mm/m", "m/m") for degree in ("K", "degC")
+TEMPERATURE_UNITS: Mapping[str, Fraction] = {
+    "K": Fraction(1),
+    "degC": Fraction(1),
+    "mK": Fraction(1, 10**3),
 }
-BENDING_UNITS: Mapping[str, Fraction] = {f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()}
-DURATION_UNITS: Mapping[str, Fraction] = {"s": Fraction(1), "min": Fraction(60), "h": Fraction(3600)}
+EXPANSION_UNITS: Mapping[str, Fraction] = {
+    f"{ratio}/{degree}": RATIO_UNITS[ratio]
+    for ratio in ("um/m", "ppm", "mm/m", "m/m")
+    for degree in ("K", "degC")
+}
+BENDING_UNITS: Mapping[str, Fraction] = {
+    f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()
+}
+DURATION_UNITS: Mapping[str, Fraction] = {
+    "s": Fraction(1),
+    "min": Fraction(60),
+    "h": Fraction(3600),
+}
 # Beyond these, squares and their sums are no numbers any more; nothing real is there.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
 SMALLEST_FLOAT = float(SMALLEST)
@@ -93,7 +107,9 @@ LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
 QUANTITY = re.compile(rf"({NUMBER})\s*([^\s0-9.+-].*)?")
 CONSTANT_AND_DIVISOR = re.compile(rf"([^+]*(?:[eE]\+[^+]*)?)\+\s*L\s*/\s*({NUMBER})\s*")
-CONSTANT_AND_RATIO = re.compile(rf"\s*([+-]?[^+]*(?:[eE]\+[^+]*)?)\+\s*({NUMBER}\s*[^\s0-9+-][^+]*)")
+CONSTANT_AND_RATIO = re.compile(
+    rf"\s*([+-]?[^+]*(?:[eE]\+[^+]*)?)\+\s*({NUMBER}\s*[^\s0-9+-][^+]*)"
+)
 WITH_UNIT_OF_LENGTH = re.compile(
     rf"\s*\(\s*({NUMBER})\s*\+\s*L\s*/\s*({NUMBER})\s*\)\s*([^\s0-9()]+)\s+with\s+L\s+in\s+(\S+)\s*"
 )
@@ -119,12 +135,15 @@ def exact_number(text: str) -> Fraction:
         raise QuantityError(f'"{shorten(text)}" is not a number; write for example "500.0003"')
     decimal = Decimal(text)
     if decimal and not -300 <= decimal.adjusted() <= 300:
-        raise QuantityError(f'"{text}" is beyond what can be computed with; write a number of usual size')
+        raise QuantityError(
+            f'"{text}" is beyond what can be computed with; write a number of usual size'
+        )
     return Fraction(decimal)
 
 
 def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> float:
-    """Read a decimal number of a unit that is `factor` metres or radians; the result is the nearest float.
+    """Read a decimal number of a unit that is `factor` metres or radians; the result is the nearest
+    float.
 
     :raises QuantityError: not a decimal number, or more or less than there is.
 
@@ -144,7 +163,8 @@ def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> fl
 
 
 def power_of_ten(factor: Fraction) -> str:
-    """The exponent that multiplies a decimal number by a unit's factor; empty where it is no power of ten.
+    """The exponent that multiplies a decimal number by a unit's factor; empty where it is no power
+    of ten.
 
     >>> power_of_ten(LENGTH_UNITS["mm"]), power_of_ten(LENGTH_UNITS["in"])
     ('e-3', '')
@@ -156,7 +176,8 @@ def power_of_ten(factor: Fraction) -> str:
 def plain_number(number: str, power: str) -> float | None:
     """Read digits with or without a point in between as `metres_or_radians` does, but sooner.
 
-    `power` is a unit's `power_of_ten`. None where the number is written otherwise, or is too large or too small.
+    `power` is a unit's `power_of_ten`. None where the number is written otherwise, or is too large
+    or too small.
 
     >>> plain_number("750", "e-3"), plain_number("7.5e2", "e-3")
     (0.75, None)
@@ -184,10 +205,11 @@ def parse_positive_length(value: object) -> float:
 
     :raises QuantityError: not a number with a unit of length, or not above zero.
 
-    >>> parse_positive_length("0 mm")
-    Traceback (most recent call last):
-    ...
-    ballplate.simulator.inputs.quantities.QuantityError: "0 mm" must be above zero; give a small one, such as 1 nm
+    >>> try:
+    ...     parse_positive_length("0 mm")
+    ... except QuantityError as error:
+    ...     print(error)
+    "0 mm" must be above zero; give a small one, such as 1 nm
     """
     return _positive(value, parse_length(value))
 
@@ -278,7 +300,8 @@ def parse_duration(value: object) -> float:
 
 
 def length_text(length: float) -> str:
-    """Write a length in metres, in millimetres if that reads well, so that reading it gives the same float.
+    """Write a length in metres, in millimetres if that reads well, so that reading it gives the
+    same float.
 
     >>> length_text(0.75), length_text(2e-7), length_text(1 / 3)
     ('750 mm', '0.2 um', '333.3333333333333 mm')
@@ -336,7 +359,9 @@ class LengthFunction:
         return core_schema.no_info_plain_validator_function(parse_length_function)
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
         units = f"({'|'.join(_unit_patterns('length'))})"
         growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
@@ -344,13 +369,20 @@ class LengthFunction:
         return {
             "type": "string",
             "pattern": f"^({growing}|{stated})$",
-            "examples": ["0.2 um", LENGTH_FUNCTION_EXAMPLE, "0.9 um + 2.5 um/m", "(0.9 + L/400) um with L in mm"],
+            "examples": [
+                "0.2 um",
+                LENGTH_FUNCTION_EXAMPLE,
+                "0.9 um + 2.5 um/m",
+                "(0.9 + L/400) um with L in mm",
+            ],
         }
 
 
 @dataclass(frozen=True)
 class Target:
-    """What an uncertainty is to be within: ``coverage_factor`` times the standard uncertainty, at most ``stated``."""
+    """What an uncertainty is to be within: ``coverage_factor`` times the standard uncertainty, at
+    most ``stated``.
+    """
 
     stated: LengthFunction
     coverage_factor: float = 1.0
@@ -366,20 +398,25 @@ class Target:
         return LengthFunction(self.stated.constant / k, self.stated.slope / k)
 
     def at(self, length: ArrayLike) -> NDArray[np.float64]:
-        """Return what standard uncertainties (m, any shape) are to be within at lengths (m, the same shape)."""
+        """Return what standard uncertainties (m, any shape) are to be within at lengths (m, the
+        same shape).
+        """
         return self.standard.at(length)
 
 
 def parse_length_function(value: object) -> LengthFunction:
     """Read a length that may depend on the measured length.
 
-    ``A`` or ``A + L/K``, with L in metres; ``A + B`` with B a ratio; ``(A + L/K) unit with L in unit``.
+    ``A`` or ``A + L/K``, with L in metres; ``A + B`` with B a ratio; ``(A + L/K) unit with L in
+    unit``.
 
-    :raises QuantityError: written otherwise, negative, zero at every length, or growing by 1e-4 or more.
+    :raises QuantityError: written otherwise, negative, zero at every length, or growing by 1e-4 or
+        more.
 
     >>> parse_length_function("0.5 um + L/1000000")
     LengthFunction(constant=5e-07, slope=1e-06)
-    >>> parse_length_function("(0.9 + L/400) um with L in mm") == parse_length_function("0.9 um + 2.5 ppm")
+    >>> in_mm = parse_length_function("(0.9 + L/400) um with L in mm")
+    >>> in_mm == parse_length_function("0.9 um + 2.5 ppm")
     True
     """
     if not isinstance(value, str) or "L" not in value and "+" not in value.strip()[1:]:
@@ -399,8 +436,9 @@ def parse_length_function(value: object) -> LengthFunction:
     match = CONSTANT_AND_DIVISOR.fullmatch(value)
     if match is None:
         raise QuantityError(
-            f'"{shorten(value)}" is not a length that grows with L; write for example "{LENGTH_FUNCTION_EXAMPLE}", '
-            'with L in metres, "0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L in mm"'
+            f'"{shorten(value)}" is not a length that grows with L; write for example'
+            f' "{LENGTH_FUNCTION_EXAMPLE}", with L in metres, "0.9 um + 2.5 um/m" or "(0.9 + L/400)'
+            ' um with L in mm"'
         )
     return _growing(value, match[1], _inverse(value, match[2]), in_metres=True)
 
@@ -430,39 +468,49 @@ def _inverse(value: str, divisor: str) -> Fraction:
     number = exact_number(divisor)
     if number <= 0:
         raise QuantityError(
-            f'"{shorten(value)}" has a negative part or divides by zero; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
+            f'"{shorten(value)}" has a negative part or divides by zero; write for example'
+            f' "{LENGTH_FUNCTION_EXAMPLE}"'
         )
     return 1 / number
 
 
 def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False) -> LengthFunction:
-    """A length that grows by `slope` metres per metre, if one can; `in_metres` where L is divided without its unit.
+    """A length that grows by `slope` metres per metre, if one can; `in_metres` where L is divided
+    without its unit.
 
     :raises QuantityError: it cannot, or it is a data sheet's that is read as something else.
     """
     text = shorten(value)
     at_zero = parse_length(constant.strip())
     if at_zero < 0 or slope < 0:
-        raise QuantityError(f'"{text}" has a negative part; write for example "{LENGTH_FUNCTION_EXAMPLE}"')
+        raise QuantityError(
+            f'"{text}" has a negative part; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
+        )
     if slope >= STEEPEST:
         told = constant.strip() if at_zero else "0 um"
         by = float(1000 * slope)
         grows = f"{by:.4g} mm" if by < 1e6 else f"{by / 1000:.4g} m"
         if not in_metres or slope / 1000 >= STEEPEST:
-            raise QuantityError(f'"{text}" grows by {grows} per metre of length; give less than 100 um/m')
+            raise QuantityError(
+                f'"{text}" grows by {grows} per metre of length; give less than 100 um/m'
+            )
         raise QuantityError(
-            f'"{text}" grows by {grows} per metre of length, since L is in metres; where L is in millimetres and the '
-            f'result in micrometres, as on data sheets, write "{told} + {float(slope * 1000):.9g} um/m"'
+            f'"{text}" grows by {grows} per metre of length, since L is in metres; where L is in'
+            f' millimetres and the result in micrometres, as on data sheets, write "{told} +'
+            f' {float(slope * 1000):.9g} um/m"'
         )
     if slope and slope < SMALLEST:
-        raise QuantityError(f'"{text}" grows too slowly; leave out what it grows by, or give 1e-18 m/m or more')
+        raise QuantityError(
+            f'"{text}" grows too slowly; leave out what it grows by, or give 1e-18 m/m or more'
+        )
     if at_zero == 0 and slope == 0:
         _positive(value, at_zero)
     return LengthFunction(at_zero, float(slope))
 
 
 def with_quantities(value: Any) -> Any:
-    """The same with every text that is a quantity, in lists and mappings too, replaced by its value in SI units.
+    """The same with every text that is a quantity, in lists and mappings too, replaced by its value
+    in SI units.
 
     >>> with_quantities({"pitch": "200 mm", "axes": ["x", "2 ppm"], "count": 3})
     {'pitch': 0.2, 'axes': ['x', 2e-06], 'count': 3}
@@ -485,11 +533,15 @@ def _parse(value: object, kind: str) -> float:
             raise QuantityError(f'{value} is not a finite {kind}; write for example "{example}"')
         raise QuantityError(f'"{value}" has no unit; {_with_unit(str(value), kind)}')
     if not isinstance(value, str):
-        raise QuantityError(f'expected {_article(kind)}, found {describe(value)}; write for example "{example}"')
+        raise QuantityError(
+            f'expected {_article(kind)}, found {describe(value)}; write for example "{example}"'
+        )
     text = shorten(value)
     if re.match(r"[+-]?[0-9]+,[0-9]", value.strip()):
         example = shorten(value.replace(",", "."))
-        raise QuantityError(f'"{text}" has a decimal comma; write a decimal point, for example "{example}"')
+        raise QuantityError(
+            f'"{text}" has a decimal comma; write a decimal point, for example "{example}"'
+        )
     match = QUANTITY.fullmatch(value.strip())
     if match is None:
         raise QuantityError(f'"{text}" is not {_article(kind)}; write for example "{example}"')
@@ -501,14 +553,19 @@ def _parse(value: object, kind: str) -> float:
         for other, other_units in UNITS.items():
             if plain in other_units:
                 raise QuantityError(
-                    f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example "{example}"'
+                    f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example'
+                    f' "{example}"'
                 )
-        raise QuantityError(f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}')
+        raise QuantityError(
+            f'"{text}" has the unknown unit "{shorten(unit)}"; {hint(plain, units)}'
+        )
     return metres_or_radians(number, units[plain], kind)
 
 
 def _plain(unit: str) -> str:
-    """A unit in the letters of the tables: both the micro sign and the Greek letter are in use on keyboards."""
+    """A unit in the letters of the tables: both the micro sign and the Greek letter are in use on
+    keyboards.
+    """
     return unit.strip().replace("µ", "u").replace("μ", "u")
 
 
@@ -517,7 +574,9 @@ def _positive(value: object, found: float, kind: str = "length") -> float:
         return found
     small = {"length": "1 nm", "angle": "1 nrad", "temperature difference": "1 mK"}[kind]
     example = "0.2 um" if kind == "length" else EXAMPLES[kind]
-    remedy = f"give a small one, such as {small}" if found == 0 else f'write for example "{example}"'
+    remedy = (
+        f"give a small one, such as {small}" if found == 0 else f'write for example "{example}"'
+    )
     raise QuantityError(f'"{value}" must be above zero; {remedy}')
 
 
@@ -525,8 +584,15 @@ def _article(kind: str) -> str:
     return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
 
-# What a number without a unit may have been meant in; to name one alone would lead to errors of a thousand times.
-ALTERNATIVES = {"length": "um", "angle": "deg", "ratio": "m/m", "thermal expansion": "m/m/K", "duration": "s"}
+# What a number without a unit may have been meant in; to name one alone would lead to errors of a
+# thousand times.
+ALTERNATIVES = {
+    "length": "um",
+    "angle": "deg",
+    "ratio": "m/m",
+    "thermal expansion": "m/m/K",
+    "duration": "s",
+}
 
 
 def _with_unit(number: str, kind: str) -> str:
@@ -547,17 +613,35 @@ def _schema(kind: str, *examples: str) -> WithJsonSchema:
     return WithJsonSchema({"type": "string", "pattern": _pattern(kind), "examples": list(examples)})
 
 
-Length = Annotated[float, PlainValidator(parse_length), _schema("length", "750 mm", "0.2 um", "12.5 in")]
-PositiveLength = Annotated[float, PlainValidator(parse_positive_length), _schema("length", "750 mm", "0.2 um")]
-Angle = Annotated[float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")]
-PositiveAngle = Annotated[float, PlainValidator(parse_positive_angle), _schema("angle", "2 arcsec", "5 urad")]
+Length = Annotated[
+    float, PlainValidator(parse_length), _schema("length", "750 mm", "0.2 um", "12.5 in")
+]
+PositiveLength = Annotated[
+    float, PlainValidator(parse_positive_length), _schema("length", "750 mm", "0.2 um")
+]
+Angle = Annotated[
+    float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")
+]
+PositiveAngle = Annotated[
+    float, PlainValidator(parse_positive_angle), _schema("angle", "2 arcsec", "5 urad")
+]
 TemperatureDifference = Annotated[
-    float, PlainValidator(parse_temperature_difference), _schema("temperature difference", "1.5 degC", "-0.3 K")
+    float,
+    PlainValidator(parse_temperature_difference),
+    _schema("temperature difference", "1.5 degC", "-0.3 K"),
 ]
 PositiveTemperatureDifference = Annotated[
-    float, PlainValidator(parse_positive_temperature_difference), _schema("temperature difference", "0.5 degC")
+    float,
+    PlainValidator(parse_positive_temperature_difference),
+    _schema("temperature difference", "0.5 degC"),
 ]
-Expansion = Annotated[float, PlainValidator(parse_expansion), _schema("thermal expansion", "11 um/m/degC")]
+Expansion = Annotated[
+    float, PlainValidator(parse_expansion), _schema("thermal expansion", "11 um/m/degC")
+]
 Bending = Annotated[float, PlainValidator(parse_bending), _schema("angle per length", "5 urad/m")]
-Ratio = Annotated[float, PlainValidator(parse_ratio), _schema("ratio", "5 ppm", "0.1 %", "1.2 um/m")]
-Duration = Annotated[float, PlainValidator(parse_duration), _schema("duration", "20 min", "15 s", "1.5 h")]
+Ratio = Annotated[
+    float, PlainValidator(parse_ratio), _schema("ratio", "5 ppm", "0.1 %", "1.2 um/m")
+]
+Duration = Annotated[
+    float, PlainValidator(parse_duration), _schema("duration", "20 min", "15 s", "1.5 h")
+]

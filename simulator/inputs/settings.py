@@ -1,4 +1,6 @@
-"""What all sections of an experiment file share: the base class of settings, the words of refusals."""
+"""What all sections of an experiment file share: the base class of settings, the words of
+refusals.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,13 @@ from pydantic import BaseModel, ConfigDict, Discriminator
 
 def _form(value: Any) -> str:
     # Tags in angle brackets are left out of paths in messages.
-    return "<mapping>" if isinstance(value, dict) else "<list>" if isinstance(value, tuple) else "<one>"
+    return (
+        "<mapping>"
+        if isinstance(value, dict)
+        else "<list>"
+        if isinstance(value, tuple)
+        else "<one>"
+    )
 
 
 FORM = Discriminator(_form)

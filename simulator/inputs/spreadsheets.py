@@ -1,4 +1,6 @@
-"""Text in CSV files that spreadsheets show as text: names such as =A1 or @home would be computed as formulas."""
+"""Text in CSV files that spreadsheets show as text: names such as =A1 or @home would be computed as
+formulas.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +10,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-# What a spreadsheet takes for the start of a formula, behind the apostrophes that protect it; a sign alone is none.
+# What a spreadsheet takes for the start of a formula, behind the apostrophes that protect it; a
+# sign alone is none.
 _FORMULA = re.compile(r"'*[=+\-@\t\r].", re.DOTALL)
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:inf|nan)")
 
 
 def cell_of_text(text: str) -> str:
-    """A text as it is written into a cell, with an apostrophe before what a spreadsheet would compute.
+    """A text as it is written into a cell, with an apostrophe before what a spreadsheet would
+    compute.
 
     >>> [cell_of_text(text) for text in ("z low", "=1+1", "-0.25", "'=1+1")]
     ['z low', "'=1+1", '-0.25', "''=1+1"]
@@ -44,5 +48,7 @@ class CsvWriter:
 
     def writerows(self, rows: Iterable[Sequence[Any]]) -> None:
         """Write several rows."""
-        shown = ([cell_of_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+        shown = (
+            [cell_of_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows
+        )
         csv.writer(self.stream, lineterminator="\n").writerows(shown)

@@ -25,7 +25,9 @@ MOST_KNOWN = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of a table: texts of its named columns and lengths, in metres, of its length columns."""
+    """A line of a table: texts of its named columns and lengths, in metres, of its length
+    columns.
+    """
 
     mark: Mark
     texts: tuple[str, ...]
@@ -53,21 +55,25 @@ def read_table(
 ) -> tuple[Row, ...]:
     """Read a comma-separated file whose first line names the columns.
 
-    ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a unit such
-    as ``x_mm``; ``optional`` are length columns that may be missing and then are 0. Empty lines and lines
-    that begin with # are skipped. Messages about rows are added to ``problems`` if it is given, so that the caller can
-    say more at once; a length that is wrong is then NaN.
+    ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
+    unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are 0. Empty
+    lines and lines that begin with # are skipped. Messages about rows are added to ``problems`` if
+    it is given, so that the caller can say more at once; a length that is wrong is then NaN.
 
-    :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not a number,
-        there are no rows; all problems of the file at once.
+    :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
+        a number, there are no rows; all problems of the file at once.
     """
     file = str(path)
     messages: list[Message] = [] if problems is None else problems
     lines = table_lines(path)
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:
-        raise ExperimentError([Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")])
-    places, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, example)
+        raise ExperimentError(
+            [Message(file, 1, 1, "", f"the file is empty; its first line should be {example}")]
+        )
+    places, factors = _columns(
+        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, example
+    )
     rows = []
     plain = _PlainRows.of(places, factors, texts, (*lengths, *optional))
     for number, line in islice(lines, 1, MOST_ROWS + 1):
@@ -90,16 +96,28 @@ def read_table(
             try:
                 row_lengths.append(metres_or_radians(cell, factors.get(name, Fraction(1))))
             except QuantityError as error:
-                messages.append(Mark(file, number, column).message("", wrong_number(cell, name) or str(error)))
+                messages.append(
+                    Mark(file, number, column).message("", wrong_number(cell, name) or str(error))
+                )
                 row_lengths.append(float("nan"))
         for name in texts:
             if not by_name[name][1]:
-                messages.append(Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name"))
-        rows.append(Row(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths)))
+                messages.append(
+                    Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name")
+                )
+        rows.append(
+            Row(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths))
+        )
     if len(lines) == 1:
-        messages.append(Message(file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"))
+        messages.append(
+            Message(
+                file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"
+            )
+        )
     if len(lines) > MOST_ROWS + 1:
-        messages.append(Message(file, lines[MOST_ROWS][0], 1, "", f"more than {MOST_ROWS} rows; leave some out"))
+        messages.append(
+            Message(file, lines[MOST_ROWS][0], 1, "", f"more than {MOST_ROWS} rows; leave some out")
+        )
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
     return tuple(rows)
@@ -109,9 +127,9 @@ def read_table(
 class _PlainRows:
     """Reads lines that hold nothing unusual, in a fraction of the time that others take.
 
-    ``count`` is the number of columns, ``texts`` and ``lengths`` where each of the row's is, -1 where it is not; the
-    latter come with the power of ten that makes metres of the column's unit, empty where none does. ``known`` has
-    texts of rows before, of which there are as a rule few.
+    ``count`` is the number of columns, ``texts`` and ``lengths`` where each of the row's is, -1
+    where it is not; the latter come with the power of ten that makes metres of the column's unit,
+    empty where none does. ``known`` has texts of rows before, of which there are as a rule few.
     """
 
     count: int
@@ -121,10 +139,17 @@ class _PlainRows:
 
     @classmethod
     def of(
-        cls, places: Sequence[str], factors: dict[str, Fraction], texts: Sequence[str], lengths: Sequence[str]
+        cls,
+        places: Sequence[str],
+        factors: dict[str, Fraction],
+        texts: Sequence[str],
+        lengths: Sequence[str],
     ) -> _PlainRows:
         by_name = {name: i for i, name in enumerate(places)}
-        powers = [(by_name.get(name, -1), power_of_ten(factors.get(name, Fraction(1)))) for name in lengths]
+        powers = [
+            (by_name.get(name, -1), power_of_ten(factors.get(name, Fraction(1))))
+            for name in lengths
+        ]
         return cls(len(places), tuple(by_name[name] for name in texts), tuple(powers), {})
 
     def row(self, mark: Mark, line: str) -> Row | None:
@@ -168,7 +193,9 @@ def refuse_separators(mark: Mark, header: str, example: str) -> None:
     :raises ExperimentError: they are.
     """
     if "," not in header and re.search("[;\t]", header):
-        raise ExperimentError([mark.message("", f"the columns are not separated by commas; write {example}")])
+        raise ExperimentError(
+            [mark.message("", f"the columns are not separated by commas; write {example}")]
+        )
 
 
 def column_names(path: Path | GivenText) -> tuple[str, ...]:
@@ -188,7 +215,11 @@ def wrong_number(cell: str, name: str) -> str:
         return f"no {name}; write a number, or remove the line"
     if re.fullmatch(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?", cell):
         return f'"{cell}" has a decimal comma; write {cell.replace(",", ".")}'
-    return f'"{shorten(cell)}" is no number; separate the columns by commas' if re.search("[;\t]", cell) else ""
+    return (
+        f'"{shorten(cell)}" is no number; separate the columns by commas'
+        if re.search("[;\t]", cell)
+        else ""
+    )
 
 
 def wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -> str:
@@ -202,7 +233,10 @@ def wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -
         if re.fullmatch(r"[+-]?[0-9]+", one) and re.fullmatch(r"[0-9]+", other)
     ]
     if len(cells) > expected and halves:
-        return f"{what}; if a comma is meant as the decimal point, write a point, as in {shorten(halves[-1])}"
+        return (
+            f"{what}; if a comma is meant as the decimal point, write a point, as in"
+            f" {shorten(halves[-1])}"
+        )
     if len(cells) == 1 and re.search("[;\t]", line):
         return f"{what}; separate them by commas"
     return f"{what}; write one line per row, its columns separated by commas"
@@ -231,26 +265,42 @@ def _columns(
         elif name in (*lengths, *optional) and unit in LENGTH_UNITS:
             factors[name] = LENGTH_UNITS[unit]
         elif name in (*lengths, *optional):
-            messages.append(place.message("", f'unknown unit in the column "{cell}"; {hint(unit, LENGTH_UNITS)}'))
+            messages.append(
+                place.message(
+                    "", f'unknown unit in the column "{cell}"; {hint(unit, LENGTH_UNITS)}'
+                )
+            )
         elif cell in (*lengths, *optional):
             name = cell
-            messages.append(place.message("", f'the column "{cell}" has no unit; write for example {cell}_mm'))
+            messages.append(
+                place.message("", f'the column "{cell}" has no unit; write for example {cell}_mm')
+            )
         else:
             known = [*texts, *(f"{length}_mm" for length in (*lengths, *optional))]
-            messages.append(place.message("", f'unknown column "{shorten(cell)}"; {hint(cell, known)}'))
+            messages.append(
+                place.message("", f'unknown column "{shorten(cell)}"; {hint(cell, known)}')
+            )
         if name in names:
-            messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one of them'))
+            messages.append(
+                place.message("", f'a second column "{shorten(cell)}"; remove one of them')
+            )
         names.append(name)
     missing = [name for name in (*texts, *lengths) if name not in names]
     if missing:
-        messages.append(mark.message("", f"no column for {listing(missing)}; the first line should be {example}"))
+        messages.append(
+            mark.message(
+                "", f"no column for {listing(missing)}; the first line should be {example}"
+            )
+        )
     if messages:
         raise ExperimentError(messages)
     return names, factors
 
 
 def _cells(line: str) -> list[tuple[int, str]] | None:
-    """Split a line into cells with their columns, from 1; None if its quotation marks do not match."""
+    """Split a line into cells with their columns, from 1; None if its quotation marks do not
+    match.
+    """
     cells, start = [], 0
     while True:
         match = CELL.match(line, start)

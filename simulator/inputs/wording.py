@@ -44,7 +44,9 @@ COMPARISONS = {
 
 @dataclass(frozen=True)
 class Explanation:
-    """A path below the validated node and what to say about it; ``of_key``: about the key, not its value."""
+    """A path below the validated node and what to say about it; ``of_key``: about the key, not its
+    value.
+    """
 
     steps: Steps
     text: str
@@ -67,9 +69,11 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
             explanations.append(explanation)
             continue
         above, label = place.choice
-        # The choice fails already because of the form that was written, not because of a mistake within it.
+        # The choice fails already because of the form that was written, not because of a mistake
+        # within it.
         is_other_form = explanation.steps == above and (
-            error["type"] in EXPECTED or (error["type"] == "literal_error" and not isinstance(place.node, Scalar))
+            error["type"] in EXPECTED
+            or (error["type"] == "literal_error" and not isinstance(place.node, Scalar))
         )
         choices.setdefault(above, {}).setdefault(label, []).append((explanation, is_other_form))
     for by_label in choices.values():
@@ -78,13 +82,19 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
 
 
 def _nearest_choice(choices: list[list[tuple[Explanation, bool]]]) -> list[Explanation]:
-    same_form = [choice for choice in choices if not any(other_form for _, other_form in choice)] or choices
+    same_form = [
+        choice for choice in choices if not any(other_form for _, other_form in choice)
+    ] or choices
     deepest = max(len(explanation.steps) for choice in same_form for explanation, _ in choice)
-    nearest = [choice for choice in same_form if any(len(one.steps) == deepest for one, _ in choice)]
+    nearest = [
+        choice for choice in same_form if any(len(one.steps) == deepest for one, _ in choice)
+    ]
     if len(nearest) == 1:
         return [explanation for explanation, _ in nearest[0]]
     firsts = [choice[0][0] for choice in nearest]
-    return [Explanation(firsts[0].steps, " – or: ".join(dict.fromkeys(first.text for first in firsts)))]
+    return [
+        Explanation(firsts[0].steps, " – or: ".join(dict.fromkeys(first.text for first in firsts)))
+    ]
 
 
 @dataclass(frozen=True)
@@ -123,14 +133,20 @@ def _kind(node: Node) -> str | None:
 
 def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> Explanation:
     kind, context, steps, node = error["type"], error.get("ctx", {}), place.steps, place.node
-    value = to_python(node) if isinstance(node, Scalar) else () if isinstance(node, Sequence) else {}
+    value = (
+        to_python(node) if isinstance(node, Scalar) else () if isinstance(node, Sequence) else {}
+    )
     if kind == "missing":
         if isinstance(steps[-1], int):
             return Explanation(steps[:-1], _wrong_length(root, steps[:-1], schema))
         about = _description(schema, root, steps)
         return Explanation(steps, f'missing; add "{steps[-1]}"{about}')
     if kind == "extra_forbidden":
-        known = [key for one in _schemas_at(schema, root, steps[:-1]) for key in one.get("properties", {})]
+        known = [
+            key
+            for one in _schemas_at(schema, root, steps[:-1])
+            for key in one.get("properties", {})
+        ]
         written = to_python_keys(root, steps[:-1])
         free = [key for key in dict.fromkeys(known) if key not in written]
         # A misspelt key may stand beside the right one.
@@ -147,19 +163,25 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         if isinstance(tag, Scalar) and tag.value is not None:
             other = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
             meant = f'write "{other}"' if other in kinds else hint(str(tag.value), kinds)
-            return Explanation((*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}')
+            return Explanation(
+                (*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}'
+            )
         return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
     if kind == "literal_error":
         return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))
     if kind in EXPECTED:
         about = _description(schema, root, steps) if not steps or isinstance(steps[-1], str) else ""
         quotes = "; put it in quotes" if kind == "string_type" and isinstance(node, Scalar) else ""
-        return Explanation(steps, f"expected {EXPECTED[kind]}, found {describe(value)}{quotes}{about}")
+        return Explanation(
+            steps, f"expected {EXPECTED[kind]}, found {describe(value)}{quotes}{about}"
+        )
     if kind in ("too_short", "too_long", "string_too_short"):
         return Explanation(steps, _wrong_length(root, steps, schema))
     if kind in COMPARISONS:
         bound, word = COMPARISONS[kind]
-        return Explanation(steps, f"{describe(value)} is out of range; give one {word} {context[bound]}")
+        return Explanation(
+            steps, f"{describe(value)} is out of range; give one {word} {context[bound]}"
+        )
     if kind == "finite_number":
         return Explanation(steps, f"{describe(value)} is not finite; give a finite number")
     if kind == "string_pattern_mismatch":
@@ -195,14 +217,23 @@ def _wrong_length(root: Node, steps: Steps, schema: Schema) -> str:
         return "empty; give a text"
     items = getattr(node, "items", ())
     bounds = [
-        (one.get("minItems", one.get("minProperties", 0)), one.get("maxItems", one.get("maxProperties")))
+        (
+            one.get("minItems", one.get("minProperties", 0)),
+            one.get("maxItems", one.get("maxProperties")),
+        )
         for one in _schemas_at(schema, root, steps)
         if one.get("type") == ("array" if isinstance(node, Sequence) else "object")
     ]
     lower, upper = bounds[0] if bounds else (1, None)
     if not items and upper is None:
         return "empty; give at least one entry" + _description(schema, root, steps)
-    number = str(lower) if lower == upper else f"at least {lower}" if upper is None else f"{lower} to {upper}"
+    number = (
+        str(lower)
+        if lower == upper
+        else f"at least {lower}"
+        if upper is None
+        else f"{lower} to {upper}"
+    )
     if upper is not None and upper == lower + 1:
         number = f"{lower} or {upper}"
     plural = "entry" if len(items) == 1 else "entries"
@@ -220,7 +251,9 @@ def _description(schema: Schema, root: Node, steps: Steps) -> str:
 def _allowed(schema: Schema, root: Node, steps: Steps) -> list[str]:
     allowed: list[str] = []
     for one in _schemas_at(schema, root, steps, any_kind=True):
-        allowed += [str(value) for value in one.get("enum", [one["const"]] if "const" in one else [])]
+        allowed += [
+            str(value) for value in one.get("enum", [one["const"]] if "const" in one else [])
+        ]
     return list(dict.fromkeys(allowed))
 
 

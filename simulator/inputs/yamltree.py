@@ -1,8 +1,8 @@
 """A YAML file as a tree of nodes that know their line and column.
 
-The tree is built from PyYAML's events, because its constructors follow YAML 1.1 (where ``on`` is true and
-1e-6 is a text), drop duplicate keys and expand aliases without bound. Scalars follow the core schema of YAML
-1.2.
+The tree is built from PyYAML's events, because its constructors follow YAML 1.1 (where ``on`` is
+true and 1e-6 is a text), drop duplicate keys and expand aliases without bound. Scalars follow the
+core schema of YAML 1.2.
 """
 
 from __future__ import annotations
@@ -33,19 +33,31 @@ LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 REMEDIES = (
     (
         "mapping values are not allowed",
-        "a second “: ” in one line; put a text that contains it in quotes, and check the indentation",
+        (
+            "a second “: ” in one line; put a text that contains it in quotes, and check the"
+            " indentation"
+        ),
     ),
     ("unexpected end of stream", "a quotation mark is never closed; close it"),
     ("cannot start any token", "a text cannot begin with this character; put it in quotes"),
     ("',' or ']'", "a list in brackets is never closed or lacks a comma; write [a, b]"),
     (
         "',' or '}'",
-        "a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}, quotes about a text with brackets",
+        (
+            "a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}, quotes about"
+            " a text with brackets"
+        ),
     ),
     ("could not find expected ':'", "a key without “: ”; write key: value"),
     ("did not find expected key", "a key is expected here; check the indentation and the quotes"),
-    ("'-' indicator", "a list entry is expected here; begin it with “- ” and check the indentation"),
-    ("<block end>", "this does not belong to what stands above; check the indentation and the quotes"),
+    (
+        "'-' indicator",
+        "a list entry is expected here; begin it with “- ” and check the indentation",
+    ),
+    (
+        "<block end>",
+        "this does not belong to what stands above; check the indentation and the quotes",
+    ),
     ("version", "only YAML 1.2 is read; remove the %YAML line"),
     ("incompatible", "only YAML 1.2 is read; remove the %YAML line"),
 )
@@ -95,8 +107,9 @@ Node = Scalar | Sequence | Mapping
 def read_tree(path: Path, refused: list[Message] | None = None) -> Node:
     """Read a YAML file; see ``parse_tree``.
 
-    :raises ExperimentError: the file cannot be read, is not YAML, is empty, holds several documents, repeats
-        a key or uses what experiment files do not: merge keys, tags, recursive aliases.
+    :raises ExperimentError: the file cannot be read, is not YAML, is empty, holds several
+        documents, repeats a key or uses what experiment files do not: merge keys, tags, recursive
+        aliases.
     """
     return parse_tree(read_text(path), str(path), refused)
 
@@ -143,14 +156,17 @@ def read_text(path: Path | GivenText) -> str:
     except UnicodeDecodeError as error:
         before = content[: error.start].decode("utf-8", errors="replace")
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-        text = f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
+        text = (
+            f"byte 0x{content[error.start]:02x} is not UTF-8; save the file with the encoding UTF-8"
+        )
         raise ExperimentError([Message(file, line, column, "", text)]) from None
 
 
 def parse_tree(text: str, file: str, refused: list[Message] | None = None) -> Node:
     """Read YAML text; ``file`` is named in messages.
 
-    Errors that leave a usable tree, such as a repeated key, are added to ``refused`` if it is given.
+    Errors that leave a usable tree, such as a repeated key, are added to ``refused`` if it is
+    given.
 
     :raises ExperimentError: as ``read_tree``.
 
@@ -162,7 +178,9 @@ def parse_tree(text: str, file: str, refused: list[Message] | None = None) -> No
     if control is not None:
         before = text[: control.start()]
         place = Mark(file, before.count("\n") + 1, len(before) - before.rfind("\n"))
-        builder.stop(place, f"the control character U+{ord(control[0]):04X} is not allowed; remove it")
+        builder.stop(
+            place, f"the control character U+{ord(control[0]):04X} is not allowed; remove it"
+        )
     try:
         for event in yaml.parse(text, Loader=LOADER):
             builder.take(event)
@@ -174,7 +192,11 @@ def parse_tree(text: str, file: str, refused: list[Message] | None = None) -> No
     if refused is not None:
         refused += builder.messages
     if builder.root is None:
-        raise _refusal(file, "the file is empty; write at least title, machine, error_model, artefacts and positions")
+        raise _refusal(
+            file,
+            "the file is empty; write at least title, machine, error_model, artefacts and"
+            " positions",
+        )
     return builder.root
 
 
@@ -207,7 +229,8 @@ def written(root: Node, *steps: Step) -> Node | None:
 def mark_of(root: Node, steps: Steps, of_key: bool = False) -> Mark:
     """Return the place of a path, or of the nearest thing above it that exists.
 
-    A block below its key is placed at the key, since its own first line says nothing about the whole.
+    A block below its key is placed at the key, since its own first line says nothing about the
+    whole.
     """
     node, mark = root, root.mark
     for step in steps:
@@ -237,7 +260,8 @@ def resolve_scalar(text: str) -> str | int | float | bool | None:
 
     :raises ValueError: a whole number too long to be one.
 
-    >>> [resolve_scalar(text) for text in ("1e-6", "yes", "010", "0o10", "12:30", "~", "-.inf", "TRUE")]
+    >>> texts = ("1e-6", "yes", "010", "0o10", "12:30", "~", "-.inf", "TRUE")
+    >>> [resolve_scalar(text) for text in texts]
     [1e-06, 'yes', 10, 8, '12:30', None, -inf, True]
     """
     if text in ("", "~", "null", "Null", "NULL"):
@@ -304,7 +328,10 @@ class _Builder:
         if isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
-                self.stop(mark, "a second document begins here; write one experiment per file, or use variants")
+                self.stop(
+                    mark,
+                    "a second document begins here; write one experiment per file, or use variants",
+                )
         elif isinstance(event, yaml.ScalarEvent):
             self._tagged(event, mark)
             self._scalar(event, mark)
@@ -341,7 +368,12 @@ class _Builder:
     def _scalar(self, event: Any, mark: Mark) -> None:
         parent = self.stack[-1] if self.stack else None
         is_plain = event.implicit[0] and event.tag is None
-        if parent and parent.entries is not None and parent.key is None and not parent.key_is_refused:
+        if (
+            parent
+            and parent.entries is not None
+            and parent.key is None
+            and not parent.key_is_refused
+        ):
             self._key(parent, event.value, is_plain, mark)
             return
         value: str | int | float | bool | None = event.value
@@ -360,13 +392,17 @@ class _Builder:
         assert entries is not None and key_marks is not None
         parent.key_is_refused = True
         if key == "<<" and is_plain:
-            self.refuse(mark, "merge keys (<<) are not read; repeat the keys, or use an alias for a whole value")
+            self.refuse(
+                mark,
+                "merge keys (<<) are not read; repeat the keys, or use an alias for a whole value",
+            )
         elif not key:
             self.refuse(mark, "an empty key; write a name before the colon")
         elif key in entries:
             self.refuse(
                 mark,
-                f'the key "{shorten(key)}" stands already in line {key_marks[key].line}; remove one of the two',
+                f'the key "{shorten(key)}" stands already in line {key_marks[key].line}; remove one'
+                " of the two",
             )
         else:
             parent.key, parent.key_is_refused = key, False
@@ -378,11 +414,14 @@ class _Builder:
             self._add(replace(node, mark=mark), None, size, height)
             return
         if any(opened.anchor == anchor for opened in self.stack):
-            self.stop(mark, f"the alias *{anchor} stands inside what it refers to; write the value out")
+            self.stop(
+                mark, f"the alias *{anchor} stands inside what it refers to; write the value out"
+            )
         known = listing(f"&{name}" for name in self.anchors)
         self.refuse(
             mark,
-            f"nothing is anchored as &{anchor}; " + (f"known: {known}" if known else "write the value out"),
+            f"nothing is anchored as &{anchor}; "
+            + (f"known: {known}" if known else "write the value out"),
         )
         self._add(Scalar(mark, "?"), None)
 
@@ -400,7 +439,8 @@ class _Builder:
         if parent.size > MOST_NODES:
             self.stop(
                 node.mark,
-                f"more than {MOST_NODES} values, aliases counted in full; put long lists in a CSV file",
+                f"more than {MOST_NODES} values, aliases counted in full; put long lists in a CSV"
+                " file",
             )
         if parent.entries is None:
             parent.items.append(node)
@@ -426,8 +466,12 @@ def _syntax_message(error: yaml.MarkedYAMLError, text: str, file: str) -> Messag
     if line < len(lines) and lines[line][column : column + 1] == "\t":
         remedy = "a tab; indent with spaces"
     else:
-        remedy = next((remedy for part, remedy in REMEDIES if part in problem), f"{problem}; check the punctuation")
-    # The parser notices an unclosed bracket or quote only at the end; it was opened where the context says.
+        remedy = next(
+            (remedy for part, remedy in REMEDIES if part in problem),
+            f"{problem}; check the punctuation",
+        )
+    # The parser notices an unclosed bracket or quote only at the end; it was opened where the
+    # context says.
     if error.context_mark and "never closed" in remedy:
         line, column = error.context_mark.line, error.context_mark.column
     return Message(file, line + 1, column + 1, "", f"not valid YAML: {remedy}")

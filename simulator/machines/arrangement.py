@@ -11,8 +11,9 @@ AXES = ("x", "y", "z")
 class Arrangement:
     """Axes on the probe's side and on the workpiece's side, each listed from the ground outwards.
 
-    An axis on the probe's side carries all axes listed after it and the probe; one on the workpiece's side
-    carries those listed after it and the workpiece. Every axis stands on exactly one side.
+    An axis on the probe's side carries all axes listed after it and the probe; one on the
+    workpiece's side carries those listed after it and the workpiece. Every axis stands on exactly
+    one side.
     """
 
     probe_side: tuple[str, ...]
@@ -35,4 +36,6 @@ ARRANGEMENTS: dict[str, Arrangement] = {
     "CX1": Arrangement(("z",), ("x", "y")),
     "CY1": Arrangement(("z",), ("y", "x")),
 }
-"""The ten machines of Park, Burdekin and Peggs; MB2 is the kinematic model of NPL Report CISE 15/98."""
+"""The ten machines of Park, Burdekin and Peggs; MB2 is the kinematic model of NPL Report CISE
+15/98.
+"""

@@ -1,10 +1,12 @@
-"""Univariate functions on [0, 1]: Chebyshev polynomials, monomials and B-splines behind one protocol.
+"""Univariate functions on [0, 1]: Chebyshev polynomials, monomials and B-splines behind one
+protocol.
 
-Every family contains 1 and t, or a function in place of t; the rest are interior functions, which vanish at both ends.
-An error function that is zero at 0 takes what vanishes there, one that is zero at both ends the interior functions
-alone: end conditions are met by construction, and so are slopes of zero and periodic ends. A slope other than zero is
-no condition on a basis, whose functions are multiplied by any number; `simulator/splines` has fits with such. NPL
-Report CISE 15/98, section 2.1.1, has the families, section 2.6 why monomials will not do at high degrees.
+Every family contains 1 and t, or a function in place of t; the rest are interior functions, which
+vanish at both ends. An error function that is zero at 0 takes what vanishes there, one that is zero
+at both ends the interior functions alone: end conditions are met by construction, and so are slopes
+of zero and periodic ends. A slope other than zero is no condition on a basis, whose functions are
+multiplied by any number; `simulator/splines` has fits with such. NPL Report CISE 15/98, section
+2.1.1, has the families, section 2.6 why monomials will not do at high degrees.
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ from .protocol import Array
 
 @dataclass(frozen=True)
 class Quoted:
-    """Functions in the form the field quotes: `matrix` (names, functions) goes to the coefficients of `names`."""
+    """Functions in the form the field quotes: `matrix` (names, functions) goes to the coefficients
+    of `names`.
+    """
 
     names: tuple[str, ...]
     matrix: Array
@@ -48,7 +52,9 @@ class Basis(Protocol):
         ...
 
     def quoted(self, variable: str = "t") -> Quoted:
-        """The functions by monomials of the variable or by B-splines, those left out that are zero throughout."""
+        """The functions by monomials of the variable or by B-splines, those left out that are zero
+        throughout.
+        """
         ...
 
     def quoted_whole(self, variable: str = "t") -> Quoted:
@@ -97,7 +103,9 @@ class _Polynomials:
 
     def quoted(self, variable: str = "t") -> Quoted:
         """Coefficients of t, t^2, ..."""
-        return Quoted(tuple(power(variable, k + 1) for k in range(len(self.monomials))), self.monomials)
+        return Quoted(
+            tuple(power(variable, k + 1) for k in range(len(self.monomials))), self.monomials
+        )
 
     def quoted_whole(self, variable: str = "t") -> Quoted:
         """Coefficients of 1, t, t^2, ... for 1, t and the interior functions."""
@@ -110,7 +118,8 @@ class _Polynomials:
 
 @dataclass(frozen=True)
 class Polynomial(_Polynomials):
-    """t T_k(2t - 1), or t (1 - t) T_k(2t - 1), with T_k the Chebyshev polynomials: stable at any degree.
+    """t T_k(2t - 1), or t (1 - t) T_k(2t - 1), with T_k the Chebyshev polynomials: stable at any
+    degree.
 
     >>> Polynomial(5).size, Polynomial(5, zero_at_one=True).size
     (4, 3)
@@ -137,7 +146,9 @@ class Polynomial(_Polynomials):
             in_s = chebyshev.cheb2poly([0.0] * k + [1.0])
             in_t = np.array([0.0])
             for power_, coefficient in enumerate(in_s):
-                in_t = polynomial.polyadd(in_t, coefficient * polynomial.polypow([-1.0, 2.0], power_))
+                in_t = polynomial.polyadd(
+                    in_t, coefficient * polynomial.polypow([-1.0, 2.0], power_)
+                )
             product = polynomial.polymul(in_t, envelope)
             matrix[: len(product) - 1, k] = product[1:]
         return matrix
@@ -158,7 +169,9 @@ class Monomial(_Polynomials):
 
     @cached_property
     def monomials(self) -> Array:
-        """Matrix (coefficients - 1, size) from this basis to the monomials t, t^2, ... on [0, 1]."""
+        """Matrix (coefficients - 1, size) from this basis to the monomials t, t^2, ... on [0,
+        1].
+        """
         matrix = np.eye(max(self.coefficients - 1, 0), self.size)
         if self.zero_at_one:
             matrix -= np.eye(*matrix.shape, k=-1)
@@ -176,13 +189,15 @@ SMALLEST_PIECE = 1e-4
 class Spline:
     """Splines of an order (degree plus one, at least 2) with interior knots.
 
-    A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative less; order - 2 times
-    leaves value and slope, as between tangent features. Beyond [0, 1] the polynomial of the last piece goes on.
+    A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative
+    less; order - 2 times leaves value and slope, as between tangent features. Beyond [0, 1] the
+    polynomial of the last piece goes on.
 
-    `ends` holds for every function. With free ends, the functions are t and the B-splines N_2 to N_last-1. A slope of
-    zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives way to the last B-splines. Periodic ends
-    have the same derivatives 1 to order - 2: such a function is t times some factor, a scale error or squareness, and
-    one that goes on from 1 as from 0.
+    `ends` holds for every function. With free ends, the functions are t and the B-splines N_2 to
+    N_last-1. A slope of zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives
+    way to the last B-splines. Periodic ends have the same derivatives 1 to order - 2: such a
+    function is t times some factor, a scale error or squareness, and one that goes on from 1 as
+    from 0.
 
     >>> Spline(4, (0.5,)).size, Spline(4, (0.5,), zero_at_one=True).size
     (4, 3)
@@ -198,21 +213,35 @@ class Spline:
     def __post_init__(self) -> None:
         if self.order < 2:
             raise ValueError("a spline's order is 2 (broken lines) at least")
-        if any(not 0.0 < knot < 1.0 for knot in self.knots) or list(self.knots) != sorted(self.knots):
-            raise ValueError("interior knots are out of order or range; give them between 0 and 1, in ascending order")
+        if any(not 0.0 < knot < 1.0 for knot in self.knots) or list(self.knots) != sorted(
+            self.knots
+        ):
+            raise ValueError(
+                "interior knots are out of order or range; give them between 0 and 1, in ascending"
+                " order"
+            )
         if max(Counter(self.knots).values(), default=0) >= self.order:
             raise ValueError(
-                f"a knot stands too often at one place; give it {self.order - 1} times at most, one less than the order"
+                f"a knot stands too often at one place; give it {self.order - 1} times at most, one"
+                " less than the order"
             )
         if self.ends != "free" and self.order < 3:
-            raise ValueError("broken lines have no slope at their ends to be prescribed; give an order of 3 or more")
+            raise ValueError(
+                "broken lines have no slope at their ends to be prescribed; give an order of 3 or"
+                " more"
+            )
         if self.ends != "free" and self.count < 3 + int(self.ends == "zero slopes"):
             raise ValueError(
-                f"no spline of order {self.order} without knots has {self.ends}; give an order of 4 or knots"
+                f"no spline of order {self.order} without knots has {self.ends}; give an order of 4"
+                " or knots"
             )
-        if self.ends == "periodic" and np.diff([0.0, *sorted(set(self.knots)), 1.0]).min() < SMALLEST_PIECE:
+        if (
+            self.ends == "periodic"
+            and np.diff([0.0, *sorted(set(self.knots)), 1.0]).min() < SMALLEST_PIECE
+        ):
             raise ValueError(
-                f"knots of a periodic spline are too close together; leave {SMALLEST_PIECE:g} between them"
+                f"knots of a periodic spline are too close together; leave {SMALLEST_PIECE:g}"
+                " between them"
             )
 
     @property
@@ -252,12 +281,18 @@ class Spline:
 
     @cached_property
     def _first(self) -> Array:
-        """Coefficients (count,) of the function that is 1 at 1: of t means of order - 1 successive knots."""
+        """Coefficients (count,) of the function that is 1 at 1: of t means of order - 1 successive
+        knots.
+        """
         if self.contains_t:
             knots = self._all_knots
             return np.array([knots[j + 1 : j + self.order].mean() for j in range(self.count)])
         # The last B-spline has a slope at 1, and that before it the opposite one.
-        return np.eye(self.count)[-1 if self.ends == "zero slope at start" else [-2, -1]].reshape(-1, self.count).sum(0)
+        return (
+            np.eye(self.count)[-1 if self.ends == "zero slope at start" else [-2, -1]]
+            .reshape(-1, self.count)
+            .sum(0)
+        )
 
     @cached_property
     def _inner(self) -> Array:
@@ -271,7 +306,9 @@ class Spline:
         from scipy.interpolate import BSpline
 
         splines = BSpline(self._all_knots, whole, self.order - 1)
-        jumps = np.stack([splines(1.0, nu=k) - splines(0.0, nu=k) for k in range(1, self.order - 1)])
+        jumps = np.stack(
+            [splines(1.0, nu=k) - splines(0.0, nu=k) for k in range(1, self.order - 1)]
+        )
         jumps /= np.abs(jumps).max(axis=1, keepdims=True)
         # Orthonormal combinations that have no jumps.
         null = np.linalg.qr(jumps.T, mode="complete")[0][:, len(jumps) :]
@@ -292,10 +329,11 @@ class Spline:
 
 
 def spline_containing(parts: tuple[Basis, ...], raised: int = 0) -> Basis:
-    """The smallest family that contains the whole families of all `parts`, the last `raised` of them times t.
+    """The smallest family that contains the whole families of all `parts`, the last `raised` of
+    them times t.
 
-    Polynomials stay Chebyshev polynomials; as soon as there is a spline, so is the result. Its ends are free whatever
-    those of the parts are, as a product with t has other slopes.
+    Polynomials stay Chebyshev polynomials; as soon as there is a spline, so is the result. Its ends
+    are free whatever those of the parts are, as a product with t has other slopes.
 
     >>> spline_containing((Polynomial(5), Monomial(4))).coefficients
     5
@@ -308,10 +346,13 @@ def spline_containing(parts: tuple[Basis, ...], raised: int = 0) -> Basis:
         degrees.append(order + int(k >= len(parts) - raised))
     order = max(degrees)
     if not any(isinstance(part, Spline) and part.knots for part in parts):
-        return Spline(order) if any(isinstance(part, Spline) for part in parts) else Polynomial(order)
+        return (
+            Spline(order) if any(isinstance(part, Spline) for part in parts) else Polynomial(order)
+        )
     knots: Counter[float] = Counter()
     for part in parts:
-        # A knot of multiplicity m leaves order - 1 - m derivatives continuous, with a factor t as well.
+        # A knot of multiplicity m leaves order - 1 - m derivatives continuous, with a factor t as
+        # well.
         for knot, times in Counter(getattr(part, "knots", ())).items():
             knots[knot] = max(knots[knot], order - part.order + times)  # type: ignore[attr-defined]
     return Spline(order, tuple(sorted(knots.elements())))

@@ -1,7 +1,7 @@
 """From one error model to another: what contains what, to first order in the errors.
 
-NPL Report CISE 15/98, section 2.3: every kinematic model is a special case of some empirical model, and an empirical
-model has values along the axes from which a kinematic one can be made.
+NPL Report CISE 15/98, section 2.3: every kinematic model is a special case of some empirical model,
+and an empirical model has values along the axes from which a kinematic one can be made.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ class NotContainedError(ValueError):
 def containing(model: KinematicModel) -> EmpiricalModel:
     """The empirical model of sums of tensor products that contains a kinematic one.
 
-    On the workpiece's side an axis carries its own co-ordinate, which raises the degree by one, and a rotation moves
-    the corner by which the frame is fixed: conditions that the kinematic model does not meet are left out.
+    On the workpiece's side an axis carries its own co-ordinate, which raises the degree by one, and
+    a rotation moves the corner by which the frame is fixed: conditions that the kinematic model
+    does not meet are left out.
 
     >>> from .arrangement import ARRANGEMENTS
     >>> from .kinematic import kinematic_model
@@ -54,11 +55,13 @@ def containing(model: KinematicModel) -> EmpiricalModel:
 
 
 def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
-    """Matrix from the parameters of one model to those of another in the same volume, with the same first-order errors.
+    """Matrix from the parameters of one model to those of another in the same volume, with the same
+    first-order errors.
 
     Found by least squares at random places with several probe offsets.
 
-    :raises NotContainedError: some of the parameters of `inner` have effects that `outer` does not know.
+    :raises NotContainedError: some of the parameters of `inner` have effects that `outer` does not
+        know.
     """
     lower, upper = _volume(inner, outer)
     generator = np.random.default_rng(np.random.SeedSequence(1))
@@ -70,21 +73,27 @@ def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
     scale = np.sqrt((known**2).sum(axis=0))
     matrix = np.linalg.lstsq(known / scale, wanted, rcond=1e-13)[0] / scale[:, None]
     left = np.abs(known @ matrix - wanted).max(axis=0) / np.abs(wanted).max(axis=0)
-    missing = tuple(p.name for p, part in zip(inner.parameters, left, strict=True) if part > CONTAINED)
+    missing = tuple(
+        p.name for p, part in zip(inner.parameters, left, strict=True) if part > CONTAINED
+    )
     if missing:
         raise NotContainedError(missing)
     return np.asarray(matrix)
 
 
 def along_axes(model: ErrorModel, a: Array, kinematic: KinematicModel) -> tuple[Array, float]:
-    """Parameters of a kinematic model with the errors that `model` has along the axes, and the largest deviation there.
+    """Parameters of a kinematic model with the errors that `model` has along the axes, and the
+    largest deviation there.
 
-    The axes are the three edges of the volume at the lower corner. The deviation, in metres, is what the kinematic
-    model's functions cannot follow; elsewhere in the volume the two models differ in any case.
+    The axes are the three edges of the volume at the lower corner. The deviation, in metres, is
+    what the kinematic model's functions cannot follow; elsewhere in the volume the two models
+    differ in any case.
     """
     lower, upper = np.asarray(kinematic.lower), np.asarray(kinematic.upper)
     t = np.linspace(0.0, 1.0, 65)
-    places = np.concatenate([lower + t[:, None] * (upper - lower) * np.eye(3)[axis] for axis in range(3)])
+    places = np.concatenate(
+        [lower + t[:, None] * (upper - lower) * np.eye(3)[axis] for axis in range(3)]
+    )
     arm = USUAL_OFFSET * float((upper - lower).max())
     offsets = np.concatenate([np.zeros((1, 3)), arm * np.eye(3)])
     x, p = np.tile(places, (len(offsets), 1)), np.repeat(offsets, len(places), axis=0)

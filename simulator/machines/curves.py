@@ -1,7 +1,9 @@
-"""A machine with measured error curves: a kinematic model whose functions are the curves themselves.
+"""A machine with measured error curves: a kinematic model whose functions are the curves
+themselves.
 
-Values are taken as they are: nothing is subtracted, so that curves which are not zero at the lower corner, or
-straightness curves which are not zero at the far end, belong to another frame than the estimated models'.
+Values are taken as they are: nothing is subtracted, so that curves which are not zero at the lower
+corner, or straightness curves which are not zero at the far end, belong to another frame than the
+estimated models'.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ NAMES = tuple(f"E{kind}{axis}" for axis in TRANSLATIONS for kind in (*TRANSLATIO
 
 @dataclass(frozen=True)
 class Points:
-    """A measured curve: values, in metres or radians, at ascending positions along the axis in metres."""
+    """A measured curve: values, in metres or radians, at ascending positions along the axis in
+    metres.
+    """
 
     positions: tuple[float, ...]
     values: tuple[float, ...]
@@ -31,12 +35,16 @@ class Points:
     def curve(self, interpolation: Interpolation, lower: float, upper: float) -> Curve:
         """The function of t that is 0 at `lower` and 1 at `upper`, both in metres."""
         # Positions may differ by less than fractions of a long axis can.
-        t, first = np.unique((np.array(self.positions) - lower) / (upper - lower), return_index=True)
+        t, first = np.unique(
+            (np.array(self.positions) - lower) / (upper - lower), return_index=True
+        )
         return Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
 
 
 class SingleFunction:
-    """What a basis of one function, a stated one, has in common; `kind` says where it comes from."""
+    """What a basis of one function, a stated one, has in common; `kind` says where it comes
+    from.
+    """
 
     kind: ClassVar[str]
 
@@ -93,9 +101,13 @@ def curves_model(
     upper: tuple[float, ...],
     full_rotations: bool = False,
 ) -> KinematicModel:
-    """The machine with the given curves by ISO 230-1 name, each multiplied by a parameter; other functions are zero."""
+    """The machine with the given curves by ISO 230-1 name, each multiplied by a parameter; other
+    functions are zero.
+    """
     functions = []
     for name, points in curves.items():
         axis = TRANSLATIONS.index(name[2])
-        functions.append(error_function(name, points.curve(interpolation, lower[axis], upper[axis])))
+        functions.append(
+            error_function(name, points.curve(interpolation, lower[axis], upper[axis]))
+        )
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)

@@ -1,6 +1,7 @@
 """A user's own error model: found by name, called, and checked for what every error model promises.
 
-Whatever goes wrong in the user's code is told as a message about the experiment file, with the place in that code.
+Whatever goes wrong in the user's code is told as a message about the experiment file, with the
+place in that code.
 """
 
 from __future__ import annotations
@@ -22,20 +23,25 @@ from .protocol import Array, ErrorModel, Parameter
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
 
-# The packages that ballplate consisted of at first, and what models written then are to import in their place.
+# The packages that ballplate consisted of at first, and what models written then are to import in
+# their place.
 FORMER_PACKAGES = ("simulator", "analysis")
 NEW_LINE = "from ballplate.models import Parameter, Reported"
 
-# Parameters are tried at random values that move points by about this much, in metres, and are changed by as much.
+# Parameters are tried at random values that move points by about this much, in metres, and are
+# changed by as much.
 USUAL_ERROR = 1e-4
-# Largest difference of a derivative from the quotient of differences, in parts of the parameter's stated effect.
+# Largest difference of a derivative from the quotient of differences, in parts of the parameter's
+# stated effect.
 DERIVATIVE = 1e-4
 
 Result = TypeVar("Result")
 
 
 class CustomModelError(ValueError):
-    """A user's error model cannot be used; `key` of its settings, "object" or "options", is where to look."""
+    """A user's error model cannot be used; `key` of its settings, "object" or "options", is where
+    to look.
+    """
 
     def __init__(self, text: str, key: str = "object") -> None:
         self.key = key
@@ -43,18 +49,25 @@ class CustomModelError(ValueError):
 
 
 def custom_model(
-    name: str, options: Mapping[str, Any], folder: Path | None, lower: tuple[float, ...], upper: tuple[float, ...]
+    name: str,
+    options: Mapping[str, Any],
+    folder: Path | None,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
 ) -> ErrorModel:
-    """The model that the object `name`, module:function or an entry point's name, returns for a volume.
+    """The model that the object `name`, module:function or an entry point's name, returns for a
+    volume.
 
-    Modules are looked for where Python finds them and then in `folder`. Options that are quantities, such as "200 mm",
-    arrive in metres, radians, kelvins or as ratios.
+    Modules are looked for where Python finds them and then in `folder`. Options that are
+    quantities, such as "200 mm", arrive in metres, radians, kelvins or as ratios.
 
     :raises CustomModelError: no such object, or what it returns is no error model.
     """
     build = _named(name, folder)
     key = "options" if options else "object"
-    model = _attempt(f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key)
+    model = _attempt(
+        f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
+    )
     _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
     return model
 
@@ -83,7 +96,8 @@ def _named(name: str, folder: Path | None) -> Callable[..., Any]:
 def _imported(name: str, folder: Path | None) -> Any:
     beside = None if folder is None else module_file(folder.resolve(), name)
     if beside is not None:
-        # For other processes too, which are given this process's path; last, so that nothing else is hidden.
+        # For other processes too, which are given this process's path; last, so that nothing else
+        # is hidden.
         own = str(folder.resolve()) if folder is not None else ""
         if own not in sys.path:
             sys.path.append(own)
@@ -94,11 +108,16 @@ def _imported(name: str, folder: Path | None) -> Any:
     except CustomModelError as error:
         absent = error.__cause__.name if isinstance(error.__cause__, ModuleNotFoundError) else None
         if absent is not None and absent.partition(".")[0] in FORMER_PACKAGES:
-            text = f"{name} imports {absent}, which is no package of its own any more; write: {NEW_LINE}"
+            text = (
+                f"{name} imports {absent}, which is no package of its own any more; write:"
+                f" {NEW_LINE}"
+            )
             raise CustomModelError(text) from None
         if absent in name.split("."):
             where = "" if folder is None else f" nor in {folder}"
-            raise CustomModelError(f"no module {name} is installed{where}; install it, or correct its name") from None
+            raise CustomModelError(
+                f"no module {name} is installed{where}; install it, or correct its name"
+            ) from None
         raise
     found = getattr(module, "__file__", None)
     if beside is not None and found is not None and Path(found).resolve() != beside:
@@ -122,7 +141,9 @@ def _attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resu
     except (Exception, SystemExit) as error:
         # The innermost place in the user's code; without one, the call itself was wrong.
         frames = [
-            frame for frame in traceback.extract_tb(error.__traceback__)[1:] if not frame.filename.startswith("<")
+            frame
+            for frame in traceback.extract_tb(error.__traceback__)[1:]
+            if not frame.filename.startswith("<")
         ]
         inner = [frame for frame in frames if Path(frame.filename) != Path(__file__)]
         at = f" ({Path(inner[-1].filename).name}, line {inner[-1].lineno})" if inner else ""
@@ -132,13 +153,21 @@ def _attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resu
 
 def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
     """Raise what is wrong with a model, the first thing that is."""
-    missing = [member for member in MEMBERS if not hasattr(type(model), member) and not hasattr(model, member)]
+    missing = [
+        member
+        for member in MEMBERS
+        if not hasattr(type(model), member) and not hasattr(model, member)
+    ]
     if missing:
-        raise CustomModelError(f"what {name} returns, {type(model).__name__}, has no {listing(missing)}; add them")
+        raise CustomModelError(
+            f"what {name} returns, {type(model).__name__}, has no {listing(missing)}; add them"
+        )
     d = len(lower)
     dimension = _attempt(f"{name}: dimension has failed", lambda: model.dimension)
     if dimension != d:
-        raise CustomModelError(f"{name}: dimension is {dimension}, but machine.volume has {d} dimensions")
+        raise CustomModelError(
+            f"{name}: dimension is {dimension}, but machine.volume has {d} dimensions"
+        )
     parameters = _attempt(f"{name}: parameters has failed", lambda: tuple(model.parameters))
     _check_parameters(name, parameters)
     generator = np.random.default_rng(np.random.SeedSequence(1))
@@ -150,19 +179,32 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
     def values(what: str, call: Callable[[], Any], shape: tuple[int, ...]) -> Array:
         found = np.asarray(_attempt(f"{name}: {what} has failed", call))
         if found.shape != shape:
-            raise CustomModelError(f"{name}: {what} returns the shape {found.shape}; {shape} is needed")
+            raise CustomModelError(
+                f"{name}: {what} returns the shape {found.shape}; {shape} is needed"
+            )
         if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
             raise CustomModelError(f"{name}: {what} returns values that are no finite numbers")
         return np.asarray(found, float)
 
     without = values("error(x, 0, p)", lambda: model.error(x, np.zeros(n), p), (7, d))
     if np.abs(without - p).max() > 1e-12:
-        raise CustomModelError(f"{name}: error(x, 0, p) is not p; without errors the correction is the probe offset")
+        raise CustomModelError(
+            f"{name}: error(x, 0, p) is not p; without errors the correction is the probe offset"
+        )
     a = USUAL_ERROR / effect * generator.standard_normal(n)
     jacobian = values("jacobian(x, a, p)", lambda: model.jacobian(x, a, p), (7, d, n))
-    one, other = (_attempt(f"{name}: jacobian has failed", lambda: model.jacobian(x, a, p)) for _ in range(2))
-    if not isinstance(one, np.ndarray) or one.dtype != float or not one.flags.writeable or np.shares_memory(one, other):
-        raise CustomModelError(f"{name}: jacobian returns no new array of floats; make one at each call")
+    one, other = (
+        _attempt(f"{name}: jacobian has failed", lambda: model.jacobian(x, a, p)) for _ in range(2)
+    )
+    if (
+        not isinstance(one, np.ndarray)
+        or one.dtype != float
+        or not one.flags.writeable
+        or np.shares_memory(one, other)
+    ):
+        raise CustomModelError(
+            f"{name}: jacobian returns no new array of floats; make one at each call"
+        )
     for k, parameter in enumerate(parameters):
         step = np.zeros(n)
         step[k] = USUAL_ERROR / effect[k]
@@ -172,13 +214,20 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
         if np.abs(jacobian[:, :, k] - quotient).max() > DERIVATIVE * effect[k]:
             worst = np.unravel_index(np.abs(jacobian[:, :, k] - quotient).argmax(), quotient.shape)
             raise CustomModelError(
-                f'{name}: jacobian is not the derivative of error by "{parameter.name}": {jacobian[(*worst, k)]:.6g} '
-                f"instead of {quotient[worst]:.6g} in {'xyz'[int(worst[1])]}, at x = {x[worst[0]].round(4).tolist()}"
+                f'{name}: jacobian is not the derivative of error by "{parameter.name}":'
+                f" {jacobian[(*worst, k)]:.6g} "
+                f"instead of {quotient[worst]:.6g} in {'xyz'[int(worst[1])]}, at x ="
+                f" {x[worst[0]].round(4).tolist()}"
             )
     reported = _attempt(f"{name}: reported has failed", model.reported)
     shape = np.asarray(getattr(reported, "matrix", 0.0)).shape
-    if shape != (len(getattr(reported, "names", ())), n) or len(getattr(reported, "units", ())) != shape[0]:
-        raise CustomModelError(f"{name}: reported() has a matrix of shape {shape}; one row for each name is needed")
+    if (
+        shape != (len(getattr(reported, "names", ())), n)
+        or len(getattr(reported, "units", ())) != shape[0]
+    ):
+        raise CustomModelError(
+            f"{name}: reported() has a matrix of shape {shape}; one row for each name is needed"
+        )
 
 
 def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:
@@ -187,14 +236,20 @@ def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:
     for parameter in parameters:
         if not isinstance(parameter, Parameter):
             raise CustomModelError(
-                f"{name}: parameters has an entry of type {type(parameter).__name__}; each must be a Parameter of "
-                "ballplate.models"
+                f"{name}: parameters has an entry of type {type(parameter).__name__}; each must be"
+                " a Parameter of ballplate.models"
             )
         if parameter.unit not in ("m", "rad", "1"):
-            raise CustomModelError(f'{name}: the unit of "{parameter.name}" is "{parameter.unit}"; known: m, rad, 1')
+            raise CustomModelError(
+                f'{name}: the unit of "{parameter.name}" is "{parameter.unit}"; known: m, rad, 1'
+            )
         if not (np.isfinite(parameter.effect) and parameter.effect > 0):
-            raise CustomModelError(f'{name}: the effect of "{parameter.name}" is {parameter.effect}; give one above 0')
+            raise CustomModelError(
+                f'{name}: the effect of "{parameter.name}" is {parameter.effect}; give one above 0'
+            )
     names = [parameter.name for parameter in parameters]
     twice = sorted({one for one in names if names.count(one) > 1})
     if twice:
-        raise CustomModelError(f"{name}: several parameters are called {listing(twice)}; names must differ")
+        raise CustomModelError(
+            f"{name}: several parameters are called {listing(twice)}; names must differ"
+        )

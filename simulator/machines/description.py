@@ -1,7 +1,8 @@
 """A machine as a file describes it, and the error functions at its reference point that follow.
 
-Source: Park, Burdekin and Peggs, sections 3 to 5 and Appendix A.2. A parametric error measured on some line differs
-from that on the line through the reference point by its axis's rotations, times what separates the two lines.
+Source: Park, Burdekin and Peggs, sections 3 to 5 and Appendix A.2. A parametric error measured on
+some line differs from that on the line through the reference point by its axis's rotations, times
+what separates the two lines.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ class PowerSeries:
 
 @dataclass(frozen=True)
 class Lever:
-    """A rotation times the distance of its axis from the reference point, in metres: `length` (t - `t0`)."""
+    """A rotation times the distance of its axis from the reference point, in metres: `length` (t -
+    `t0`).
+    """
 
     rotation: Combination
     length: float
@@ -56,7 +59,9 @@ class Lever:
 
 @dataclass(frozen=True)
 class Combination(SingleFunction):
-    """A single function: a sum of multiples of others, less a straight line; beyond the ends `held` it is constant."""
+    """A single function: a sum of multiples of others, less a straight line; beyond the ends `held`
+    it is constant.
+    """
 
     parts: tuple[tuple[float, PowerSeries | Curve | Combination | Lever], ...]
     intercept: float = 0.0
@@ -82,11 +87,12 @@ class Combination(SingleFunction):
 class ParametricError:
     """An error of an axis, as stated or measured.
 
-    `line` has the positions of the axes on the line of measurement, its own axis's without meaning, and `probe` the
-    offset of what was measured, a tip or a reflector, from the machine's own point that the scales tell; None for the
-    line through the reference point. `on_table` says that a table, which the axis moves, held the straightedge;
-    otherwise a point fixed to what the axis moves was followed. `deviation` is the standard deviation of the random
-    part, along the axis or at points of it.
+    `line` has the positions of the axes on the line of measurement, its own axis's without meaning,
+    and `probe` the offset of what was measured, a tip or a reflector, from the machine's own point
+    that the scales tell; None for the line through the reference point. `on_table` says that a
+    table, which the axis moves, held the straightedge; otherwise a point fixed to what the axis
+    moves was followed. `deviation` is the standard deviation of the random part, along the axis or
+    at points of it.
     """
 
     name: str
@@ -112,7 +118,9 @@ class ParametricError:
 
 @dataclass(frozen=True)
 class Squareness:
-    """A squareness error by its ISO 230-1 name, and where the two lines cross on which it was measured."""
+    """A squareness error by its ISO 230-1 name, and where the two lines cross on which it was
+    measured.
+    """
 
     name: str
     value: float
@@ -122,7 +130,9 @@ class Squareness:
 
 @dataclass(frozen=True)
 class AxisTemperature:
-    """Expansion (1/K) of an axis whose temperature is off by `deviation` (K), known to `uncertainty` (K)."""
+    """Expansion (1/K) of an axis whose temperature is off by `deviation` (K), known to
+    `uncertainty` (K).
+    """
 
     expansion: float
     deviation: float
@@ -133,8 +143,9 @@ class AxisTemperature:
 class MachineDescription:
     """A machine's arrangement and errors, in metres and radians.
 
-    `arrangement_name` is one of the ten or "". `droop` has phi1 and phi2, in radians for each metre that the arm is
-    moved out; `probing` is the standard deviation of each co-ordinate that probing adds.
+    `arrangement_name` is one of the ten or "". `droop` has phi1 and phi2, in radians for each metre
+    that the arm is moved out; `probing` is the standard deviation of each co-ordinate that probing
+    adds.
     """
 
     title: str
@@ -169,10 +180,14 @@ def random_part(machine: MachineDescription) -> tuple[str, ...]:
     def is_random(deviation: float | Points | None) -> bool:
         return any(deviation.values) if isinstance(deviation, Points) else bool(deviation)
 
-    stated: list[tuple[str, float | Points | None]] = [(one.name, one.deviation) for one in machine.errors]
+    stated: list[tuple[str, float | Points | None]] = [
+        (one.name, one.deviation) for one in machine.errors
+    ]
     stated += [(one.name, one.deviation) for one in machine.squareness]
     bandwidths = [name for name, deviation in stated if is_random(deviation)]
-    uncertain = [axis for axis, one in machine.temperature.items() if one.uncertainty and one.expansion]
+    uncertain = [
+        axis for axis, one in machine.temperature.items() if one.uncertainty and one.expansion
+    ]
     return (
         *(f"bandwidth of {name}" for name in bandwidths),
         *(f"uncertain temperature of {axis}" for axis in uncertain),
@@ -181,11 +196,12 @@ def random_part(machine: MachineDescription) -> tuple[str, ...]:
 
 
 def coupling(machine: MachineDescription, error: ParametricError) -> Array:
-    """What the three rotations of an error's axis add to it on its line of measurement, (3,) in metres per radian.
+    """What the three rotations of an error's axis add to it on its line of measurement, (3,) in
+    metres per radian.
 
-    The rotation turns what the axis carries of the distance to the line through the reference point, and the probe.
-    Displacements along the axis itself count on both lines alike; what they do to a straightedge on a table comes in
-    addition.
+    The rotation turns what the axis carries of the distance to the line through the reference
+    point, and the probe. Displacements along the axis itself count on both lines alike; what they
+    do to a straightedge on a table comes in addition.
     """
     offset = np.zeros((1, 3))
     if error.line is not None:
@@ -196,18 +212,23 @@ def coupling(machine: MachineDescription, error: ParametricError) -> Array:
     return np.asarray(sign * np.cross(np.eye(3), vector)[:, component])
 
 
-def stated_function(machine: MachineDescription, error: ParametricError) -> PowerSeries | Curve | None:
+def stated_function(
+    machine: MachineDescription, error: ParametricError
+) -> PowerSeries | Curve | None:
     """The error as the file has it, a function of the fraction of the axis."""
     if isinstance(error.shape, Points):
-        return error.shape.curve(machine.interpolation, machine.lower[error.axis], machine.upper[error.axis])
+        return error.shape.curve(
+            machine.interpolation, machine.lower[error.axis], machine.upper[error.axis]
+        )
     return error.shape
 
 
 def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
     """Errors on lines through the reference point, zero there, by ISO 230-1 name.
 
-    Rotations first, as displacements measured elsewhere need them; then straightness errors lose their straight line.
-    Where a rotation is not stated it counts as zero. Beyond the ends of a table what is left there goes on.
+    Rotations first, as displacements measured elsewhere need them; then straightness errors lose
+    their straight line. Where a rotation is not stated it counts as zero. Beyond the ends of a
+    table what is left there goes on.
     """
     found: dict[str, Combination] = {}
     for error in sorted(machine.errors, key=lambda one: not one.is_rotation):
@@ -218,7 +239,11 @@ def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
         elsewhere = (*_by_rotations(machine, error, found), *_by_droop(machine, error))
         function = Combination(((1.0, shape), *elsewhere), held=held)
         if error.is_straightness:
-            t = np.asarray(shape.t) if isinstance(shape, Curve) else np.linspace(0.0, 1.0, REDUCTION_POINTS)
+            t = (
+                np.asarray(shape.t)
+                if isinstance(shape, Curve)
+                else np.linspace(0.0, 1.0, REDUCTION_POINTS)
+            )
             function = function.less(*reference_line(t, function.values(t)[:, 0], error.criterion))
         at_reference = machine.scaled(error.axis, machine.reference[error.axis])
         found[error.name] = function.less(float(function.values(np.atleast_1d(at_reference))[0, 0]))
@@ -228,7 +253,9 @@ def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
 def _by_rotations(
     machine: MachineDescription, error: ParametricError, known: Mapping[str, Combination]
 ) -> list[tuple[float, Combination | Lever]]:
-    """What the rotations of its axis have added to an error where it was measured, with the opposite sign."""
+    """What the rotations of its axis have added to an error where it was measured, with the
+    opposite sign.
+    """
     if error.is_rotation:
         return []
     own = np.eye(3)[error.axis]
@@ -246,11 +273,14 @@ def _by_rotations(
     return parts
 
 
-def _by_droop(machine: MachineDescription, error: ParametricError) -> list[tuple[float, PowerSeries]]:
-    """What the tilt of the column has added to a displacement where it was measured, with the opposite sign.
+def _by_droop(
+    machine: MachineDescription, error: ParametricError
+) -> list[tuple[float, PowerSeries]]:
+    """What the tilt of the column has added to a displacement where it was measured, with the
+    opposite sign.
 
-    It is linear along the line, and zero on the one through the reference point. The bend of the arm is the same on
-    all lines: it counts besides what is stated.
+    It is linear along the line, and zero on the one through the reference point. The bend of the
+    arm is the same on all lines: it counts besides what is stated.
     """
     if error.is_rotation or error.line is None or "phi1" not in machine.droop:
         return []
@@ -258,18 +288,25 @@ def _by_droop(machine: MachineDescription, error: ParametricError) -> list[tuple
     ends = np.array([error.line, error.line])
     ends[:, error.axis] = machine.lower[error.axis], machine.upper[error.axis]
     component = TRANSLATIONS.index(error.name[1])
-    start, end = (machine.droop["phi1"] * tilt.values(ends - np.array(machine.reference))[:, component]).tolist()
+    start, end = (
+        machine.droop["phi1"] * tilt.values(ends - np.array(machine.reference))[:, component]
+    ).tolist()
     return [(-1.0, PowerSeries((start, end - start)))]
 
 
 def true_volumetric(machine: MachineDescription) -> TrueMachine:
-    """The machine as an error model with its parameters: 1 for each function, and the numbers of the fields."""
+    """The machine as an error model with its parameters: 1 for each function, and the numbers of
+    the fields.
+    """
     functions = reference_functions(machine)
     chain = _chain(machine, functions)
     fields = [*_thermal(machine), *_droop(machine)]
     values = [value for _, value in fields]
     model = VolumetricModel(chain, tuple(one for one, _ in fields))
-    square = [(squareness_field(one.name), _at_reference(one, machine, model, values)) for one in machine.squareness]
+    square = [
+        (squareness_field(one.name), _at_reference(one, machine, model, values))
+        for one in machine.squareness
+    ]
     every = [*square, *fields]
     a = np.array([1.0] * len(chain.parameters) + [value for _, value in every])
     return TrueMachine(VolumetricModel(chain, tuple(one for one, _ in every)), a)
@@ -277,12 +314,17 @@ def true_volumetric(machine: MachineDescription) -> TrueMachine:
 
 def _chain(machine: MachineDescription, functions: Mapping[str, Basis]) -> KinematicModel:
     found = tuple(error_function(name, function) for name, function in functions.items())
-    return KinematicModel(machine.arrangement, found, machine.lower, machine.upper, origin=machine.reference)
+    return KinematicModel(
+        machine.arrangement, found, machine.lower, machine.upper, origin=machine.reference
+    )
 
 
 def _thermal(machine: MachineDescription) -> list[tuple[Field, float]]:
     known = machine.temperature
-    return [(thermal_field("xyz".index(axis)), known[axis].expansion * known[axis].deviation) for axis in known]
+    return [
+        (thermal_field("xyz".index(axis)), known[axis].expansion * known[axis].deviation)
+        for axis in known
+    ]
 
 
 def _droop(machine: MachineDescription) -> list[tuple[Field, float]]:
@@ -290,16 +332,20 @@ def _droop(machine: MachineDescription) -> list[tuple[Field, float]]:
         return []
     length = machine.arm_length
     return [
-        (droop_field(machine.arrangement_name, which, length), value * length) for which, value in machine.droop.items()
+        (droop_field(machine.arrangement_name, which, length), value * length)
+        for which, value in machine.droop.items()
     ]
 
 
-def _at_reference(one: Squareness, machine: MachineDescription, model: VolumetricModel, values: list[float]) -> float:
+def _at_reference(
+    one: Squareness, machine: MachineDescription, model: VolumetricModel, values: list[float]
+) -> float:
     """The squareness error between lines through the reference point.
 
-    Rotations of the axes, and the droop, tilt the two lines of measurement: the angle alpha that is measured between
-    them shows as a sum of slopes -alpha, which is the sum at the reference point, -alpha*, plus the tilts.
-    Displacements tilt nothing, as straightness errors have lost their straight line.
+    Rotations of the axes, and the droop, tilt the two lines of measurement: the angle alpha that is
+    measured between them shows as a sum of slopes -alpha, which is the sum at the reference point,
+    -alpha*, plus the tilts. Displacements tilt nothing, as straightness errors have lost their
+    straight line.
     """
     if one.at is None:
         return one.value
@@ -320,13 +366,15 @@ def _at_reference(one: Squareness, machine: MachineDescription, model: Volumetri
 def fitted_volumetric(
     machine: MachineDescription, lower: tuple[float, ...], upper: tuple[float, ...], knots: int
 ) -> VolumetricModel:
-    """The error model that estimates what the file states, in a volume from `lower` to `upper`; values are not used.
+    """The error model that estimates what the file states, in a volume from `lower` to `upper`;
+    values are not used.
 
-    Polynomials have the stated numbers of coefficients, tables become cubic splines with so many interior `knots`,
-    evenly spaced. The frame is that of the equations: functions are zero at the lower corner, straightness errors at
-    both ends; squareness errors that are not stated are zero. Expansion is part of the positioning errors, and the
-    arm's bend phi2 of its straightness where that is stated; neither is a parameter then. An axis with a temperature
-    has a positioning error that is linear at least.
+    Polynomials have the stated numbers of coefficients, tables become cubic splines with so many
+    interior `knots`, evenly spaced. The frame is that of the equations: functions are zero at the
+    lower corner, straightness errors at both ends; squareness errors that are not stated are zero.
+    Expansion is part of the positioning errors, and the arm's bend phi2 of its straightness where
+    that is stated; neither is a parameter then. An axis with a temperature has a positioning error
+    that is linear at least.
     """
     expanding = {f"E{axis.upper()}{axis.upper()}" for axis in machine.temperature}
     functions: dict[str, Basis] = {}
@@ -337,7 +385,9 @@ def fitted_volumetric(
         if isinstance(error.shape, Points):
             basis = Spline(4, tuple((np.arange(1, knots + 1) / (knots + 1)).tolist()))
         else:
-            basis = Polynomial(max(len(error.shape.coefficients), 2 if error.name in expanding else 1))
+            basis = Polynomial(
+                max(len(error.shape.coefficients), 2 if error.name in expanding else 1)
+            )
         basis = basis.interior() if error.is_straightness else basis
         if basis.size:
             functions[error.name] = basis

@@ -1,8 +1,10 @@
-"""The empirical error model: six functions of three variables, for displacement and rotation of the probe.
+"""The empirical error model: six functions of three variables, for displacement and rotation of the
+probe.
 
-Sources: NPL Report CISE 15/98, sections 2.1 and 2.4.1. A corrected point is x + e(x) + p + u(x) x p with the three
-positional functions e and the three rotational functions u, right-handed about the machine's axes and of opposite
-sign to those of the report. Unlike the kinematic model's, rotations move the probe's tip only.
+Sources: NPL Report CISE 15/98, sections 2.1 and 2.4.1. A corrected point is x + e(x) + p + u(x) x p
+with the three positional functions e and the three rotational functions u, right-handed about the
+machine's axes and of opposite sign to those of the report. Unlike the kinematic model's, rotations
+move the probe's tip only.
 """
 
 from __future__ import annotations
@@ -28,8 +30,9 @@ FUNCTIONS = {
 
 Condition = tuple[str, tuple[float, float, float]]
 
-# The frame's origin is the lower corner, its x axis the machine's and its xy plane that of the machine's x and y axes;
-# the probe's orientation is the one it has at the lower corner. Corners by fractions of the volume.
+# The frame's origin is the lower corner, its x axis the machine's and its xy plane that of the
+# machine's x and y axes; the probe's orientation is the one it has at the lower corner. Corners by
+# fractions of the volume.
 FRAME: tuple[Condition, ...] = (
     *((name, (0.0, 0.0, 0.0)) for name in FUNCTIONS),
     ("EY", (1.0, 0.0, 0.0)),
@@ -37,10 +40,12 @@ FRAME: tuple[Condition, ...] = (
     ("EZ", (0.0, 1.0, 0.0)),
 )
 
-# Rotations move the tip of the probe alone. What they do is stated for an offset of this fraction of the volume.
+# Rotations move the tip of the probe alone. What they do is stated for an offset of this fraction
+# of the volume.
 USUAL_OFFSET = 0.1
 
-# Where a function is looked at for its size and shape: lines parallel to the axes at these fractions.
+# Where a function is looked at for its size and shape: lines parallel to the axes at these
+# fractions.
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 AXES = ("x", "y", "z")
 
@@ -51,10 +56,12 @@ class FrameError(ValueError):
 
 @dataclass(frozen=True)
 class EmpiricalModel:
-    """e(x, a, p) of six functions in the same `terms`, each with the `columns` of them that are free.
+    """e(x, a, p) of six functions in the same `terms`, each with the `columns` of them that are
+    free.
 
-    `lower` and `upper` (3,) bound the volume in metres; the functions depend on the place scaled to [0, 1] in it.
-    `full_rotations` turns the probe offset by rotation matrices instead of adding the cross product.
+    `lower` and `upper` (3,) bound the volume in metres; the functions depend on the place scaled to
+    [0, 1] in it. `full_rotations` turns the probe offset by rotation matrices instead of adding the
+    cross product.
     """
 
     terms: Terms
@@ -79,14 +86,18 @@ class EmpiricalModel:
             unit: Unit = "rad" if k >= 3 else "m"
             for column in self.columns[k]:
                 effect = float(peaks[column]) * (arm if k >= 3 else 1.0)
-                found.append(Parameter(f"{function} {names[column]}", unit, function, meaning, effect))
+                found.append(
+                    Parameter(f"{function} {names[column]}", unit, function, meaning, effect)
+                )
         return tuple(found)
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
         """Where each function's coefficients stand in a."""
         ends = np.cumsum([0, *map(len, self.columns)])
-        return tuple(slice(int(start), int(end)) for start, end in zip(ends, ends[1:], strict=False))
+        return tuple(
+            slice(int(start), int(end)) for start, end in zip(ends, ends[1:], strict=False)
+        )
 
     @cached_property
     def _chosen(self) -> tuple[list[int], ...]:
@@ -100,20 +111,26 @@ class EmpiricalModel:
     def functions(self, x: Array, a: Array) -> Array:
         """The six functions at x (m, 3), as (m, 6)."""
         values = self.terms.values(self.scaled(x))
-        parts = [values[:, own] @ a[part] for own, part in zip(self._chosen, self.slices, strict=True)]
+        parts = [
+            values[:, own] @ a[part] for own, part in zip(self._chosen, self.slices, strict=True)
+        ]
         return np.stack(parts, axis=1)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         found = self.functions(x, a)
         if self.full_rotations:
-            return np.asarray(found[:, :3] + np.einsum("mij,mj->mi", rotation_and_derivatives(found[:, 3:])[0], p))
+            return np.asarray(
+                found[:, :3] + np.einsum("mij,mj->mi", rotation_and_derivatives(found[:, 3:])[0], p)
+            )
         return np.asarray(found[:, :3] + p + np.cross(found[:, 3:], p))
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         values = self.terms.values(self.scaled(x))
         if self.full_rotations:
             angles = self.functions(x, a)[:, 3:]
-            by_angle = [np.einsum("mij,mj->mi", part, p) for part in rotation_and_derivatives(angles)[1]]
+            by_angle = [
+                np.einsum("mij,mj->mi", part, p) for part in rotation_and_derivatives(angles)[1]
+            ]
             by_rotation = np.stack(by_angle, axis=2)
         else:
             by_rotation = cross_matrices(p)
@@ -126,7 +143,9 @@ class EmpiricalModel:
         return result
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function along lines parallel to the axes, those along the edges of the volume first."""
+        """The function along lines parallel to the axes, those along the edges of the volume
+        first.
+        """
         own = self._chosen[list(FUNCTIONS).index(function)]
         pairs = [(one, two) for one in LEVELS for two in LEVELS]
         pairs.sort(key=lambda pair: sum(level not in (0.0, 1.0) for level in pair))
@@ -134,16 +153,22 @@ class EmpiricalModel:
         for pair in pairs:
             for axis in range(3):
                 others = [k for k in range(3) if k != axis]
-                at = " and ".join(f"{AXES[k]} {_level(level)}" for k, level in zip(others, pair, strict=True))
+                at = " and ".join(
+                    f"{AXES[k]} {_level(level)}" for k, level in zip(others, pair, strict=True)
+                )
                 words.append(f"along {AXES[axis].upper()} at {at}")
                 line = np.zeros((len(t), 3))
                 line[:, axis], line[:, others] = t, pair
                 places.append(line)
-        values = self.terms.values(np.concatenate(places))[:, own].reshape(len(words), len(t), len(own))
+        values = self.terms.values(np.concatenate(places))[:, own].reshape(
+            len(words), len(t), len(own)
+        )
         return tuple(map(Line, words, values))
 
     def reported(self) -> Reported:
-        """Coefficients of monomials where the terms are polynomials, otherwise the parameters themselves."""
+        """Coefficients of monomials where the terms are polynomials, otherwise the parameters
+        themselves.
+        """
         quoted = self.terms.quoted()
         names: list[str] = []
         units: list[Unit] = []
@@ -169,7 +194,8 @@ def empirical_model(
     full_rotations: bool = False,
     frame: Sequence[Condition] = FRAME,
 ) -> EmpiricalModel:
-    """The model whose functions vanish where `frame` says: the terms that are not zero there are left out.
+    """The model whose functions vanish where `frame` says: the terms that are not zero there are
+    left out.
 
     >>> from .bases import Polynomial
     >>> from .terms import sums

@@ -1,8 +1,10 @@
-"""A true machine in the frame of the fitted model: a rigid motion of the frame changes nothing that is measured.
+"""A true machine in the frame of the fitted model: a rigid motion of the frame changes nothing that
+is measured.
 
-A machine file tells its errors from its reference point and its own straight lines, a fitted model from the lower
-corner of the volume and from lines of its own. Poses are told from that frame and offsets of probes as they are there,
-so that estimates can be compared with a true machine in the same frame only.
+A machine file tells its errors from its reference point and its own straight lines, a fitted model
+from the lower corner of the volume and from lines of its own. Poses are told from that frame and
+offsets of probes as they are there, so that estimates can be compared with a true machine in the
+same frame only.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ import numpy as np
 from .kinematic import cross_matrices
 from .protocol import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
 
-# Points at which the two are compared, at random in the volume, and largest probe offset there, in metres.
+# Points at which the two are compared, at random in the volume, and largest probe offset there, in
+# metres.
 POINTS, OFFSET = 400, 0.1
 
 _MOTIONS: tuple[tuple[str, Unit], ...] = (
@@ -30,10 +33,11 @@ _MOTIONS: tuple[tuple[str, Unit], ...] = (
 
 @dataclass(frozen=True)
 class FramedModel:
-    """The errors of `model` in a frame that is shifted and turned, with offsets of probes as at `corner` (3,).
+    """The errors of `model` in a frame that is shifted and turned, with offsets of probes as at
+    `corner` (3,).
 
-    e(x, a, p) = m(x, a, p) - (m(corner, a, p) - p) + shift + turn x (x - corner), where m is the model's error and the
-    last six parameters are the shift and the turn.
+    e(x, a, p) = m(x, a, p) - (m(corner, a, p) - p) + shift + turn x (x - corner), where m is the
+    model's error and the last six parameters are the shift and the turn.
     """
 
     model: ErrorModel
@@ -75,10 +79,11 @@ class FramedModel:
 def in_frame_of(
     fitted: ErrorModel, machine: TrueMachine, lower: tuple[float, ...], upper: tuple[float, ...]
 ) -> TrueMachine:
-    """The machine in the frame of a model that is fitted in the volume from `lower` to `upper`, in metres.
+    """The machine in the frame of a model that is fitted in the volume from `lower` to `upper`, in
+    metres.
 
-    That is where the machine comes nearest, by least squares over the volume, to what the model can be: exactly the
-    model's own frame if the model can follow the machine.
+    That is where the machine comes nearest, by least squares over the volume, to what the model can
+    be: exactly the model's own frame if the model can follow the machine.
     """
     framed = FramedModel(machine.model, lower)
     generator = np.random.default_rng(np.random.SeedSequence(0))

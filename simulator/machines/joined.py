@@ -13,7 +13,8 @@ from .protocol import Array, ErrorModel, Parameter, Reported
 class JoinedModel:
     """e(x, a, p) = e1(x, a1, p) + e2(x, a2, p) - p, with a = (a1, a2).
 
-    What both models can say is said by two sets of parameters: such a model tells ranks and sums of squares.
+    What both models can say is said by two sets of parameters: such a model tells ranks and sums of
+    squares.
     """
 
     first: ErrorModel
@@ -35,11 +36,15 @@ class JoinedModel:
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.first.parameters)
-        return np.concatenate([self.first.jacobian(x, a[:n], p), self.second.jacobian(x, a[n:], p)], axis=2)
+        return np.concatenate(
+            [self.first.jacobian(x, a[:n], p), self.second.jacobian(x, a[n:], p)], axis=2
+        )
 
     def reported(self) -> Reported:
         one, other = self.first.reported(), self.second.reported()
-        matrix = np.zeros((len(one.matrix) + len(other.matrix), one.matrix.shape[1] + other.matrix.shape[1]))
+        matrix = np.zeros(
+            (len(one.matrix) + len(other.matrix), one.matrix.shape[1] + other.matrix.shape[1])
+        )
         matrix[: len(one.matrix), : one.matrix.shape[1]] = one.matrix
         matrix[len(one.matrix) :, one.matrix.shape[1] :] = other.matrix
         names = one.names + tuple(f"second {name}" for name in other.names)

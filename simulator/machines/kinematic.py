@@ -1,8 +1,8 @@
 """The kinematic error model: 18 functions of one variable on a chain of axes.
 
-Sources: NPL Report CISE 15/98, section 2.2; Park, Burdekin and Peggs, Appendix A. Rotations are right-handed
-about the machine's axes (ISO 230-1: EAX, EBX, ECX about X, Y, Z as the X axis moves), of opposite sign to
-those of the NPL report.
+Sources: NPL Report CISE 15/98, section 2.2; Park, Burdekin and Peggs, Appendix A. Rotations are
+right-handed about the machine's axes (ISO 230-1: EAX, EBX, ECX about X, Y, Z as the X axis moves),
+of opposite sign to those of the NPL report.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from .protocol import Array, Line, Parameter, Reported, Unit
 TRANSLATIONS = ("X", "Y", "Z")
 ROTATIONS = ("A", "B", "C")
 
-# Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x axis
-# gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section 2.4.1).
+# Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
+# axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
+# 2.4.1).
 HELD_AT_FAR_END = ("EYX", "EZX", "EZY")
 
 
@@ -33,7 +34,9 @@ def describe(function: str) -> str:
     """
     kind, axis = function[1], function[2]
     if kind in TRANSLATIONS:
-        return f"positioning error of {axis}" if kind == axis else f"straightness of {axis} in {kind}"
+        return (
+            f"positioning error of {axis}" if kind == axis else f"straightness of {axis} in {kind}"
+        )
     about = TRANSLATIONS[ROTATIONS.index(kind)]
     if about == axis:
         word = "roll" if axis != "Z" else "yaw"
@@ -59,8 +62,9 @@ class ErrorFunction:
 class KinematicModel:
     """e(x, a, p) of a chain of axes; `full_rotations` multiplies rotation matrices out.
 
-    `lower` and `upper` (3,) bound the volume in metres: the error functions depend on the position along
-    their axis scaled to [0, 1], and the chain starts from `origin` (3,), by default the lower corner.
+    `lower` and `upper` (3,) bound the volume in metres: the error functions depend on the position
+    along their axis scaled to [0, 1], and the chain starts from `origin` (3,), by default the lower
+    corner.
     """
 
     arrangement: Arrangement
@@ -85,7 +89,13 @@ class KinematicModel:
             unit: Unit = "rad" if function.rotation else "m"
             for k, peak in enumerate(peaks):
                 found.append(
-                    Parameter(f"{function.name}[{k + 1}]", unit, function.name, describe(function.name), arm * peak)
+                    Parameter(
+                        f"{function.name}[{k + 1}]",
+                        unit,
+                        function.name,
+                        describe(function.name),
+                        arm * peak,
+                    )
                 )
         return tuple(found)
 
@@ -107,7 +117,9 @@ class KinematicModel:
         t = self.scaled(x)
         return {(f.axis, f.basis): f.basis.values(t[:, f.axis]) for f in self.functions}
 
-    def _motions(self, bases: dict[tuple[int, Basis], Array], a: Array, m: int) -> tuple[Array, Array]:
+    def _motions(
+        self, bases: dict[tuple[int, Basis], Array], a: Array, m: int
+    ) -> tuple[Array, Array]:
         """Displacement and rotation of every axis, each (m, 3 axes, 3 components)."""
         translation, rotation = np.zeros((m, 3, 3), a.dtype), np.zeros((m, 3, 3), a.dtype)
         for f in self.functions:
@@ -135,7 +147,10 @@ class KinematicModel:
                 self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
-            by_translation, by_rotation = None, _cross_matrices(carried_vectors(self.arrangement, from_origin, p))
+            by_translation, by_rotation = (
+                None,
+                _cross_matrices(carried_vectors(self.arrangement, from_origin, p)),
+            )
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
         for f in self.functions:
             values, columns = bases[f.axis, f.basis], self.slices[f.name]
@@ -155,7 +170,9 @@ class KinematicModel:
         return tuple(Line("", f.basis.values(t)) for f in self.functions if f.name == function)
 
     def reported(self) -> Reported:
-        """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or coefficients of B-splines."""
+        """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or
+        coefficients of B-splines.
+        """
         quoted = [f.basis.quoted() for f in self.functions]
         names: list[str] = []
         units: list[Unit] = []
@@ -210,23 +227,25 @@ def kinematic_model_of(
 ) -> KinematicModel:
     """The model with functions of the two families for its positional and its rotational errors.
 
-    All 18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and EZY at the far end
-    too.
+    All 18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and
+    EZY at the far end too.
     """
     functions = []
     for letters, basis in ((TRANSLATIONS, position), (ROTATIONS, rotation)):
         for axis in TRANSLATIONS:
             for letter in letters:
                 name = f"E{letter}{axis}"
-                functions.append(error_function(name, basis.interior() if name in HELD_AT_FAR_END else basis))
+                functions.append(
+                    error_function(name, basis.interior() if name in HELD_AT_FAR_END else basis)
+                )
     return KinematicModel(arrangement, tuple(functions), lower, upper, full_rotations)
 
 
 def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[float, Array]]:
     """For each axis the sign of its rotation's effect and the vector (m, 3) it carries.
 
-    On the probe's side: what follows in the chain, and the probe offset. On the workpiece's side: the whole
-    of x + p less the displacements of the axes between this one and the workpiece.
+    On the probe's side: what follows in the chain, and the probe offset. On the workpiece's side:
+    the whole of x + p less the displacements of the axes between this one and the workpiece.
     """
     found: dict[str, tuple[float, Array]] = {}
     for side, sign in ((arrangement.probe_side, 1.0), (arrangement.workpiece_side, -1.0)):
@@ -238,7 +257,9 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
 
 
 def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector, signed."""
+    """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector,
+    signed.
+    """
     return [cross_matrices(sign * vector) for sign, vector in carried]
 
 
@@ -280,7 +301,9 @@ def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
 
 @dataclass(frozen=True)
 class _Chain:
-    """Rigid-body product of all axes: where the probe's tip lies in the frame of the workpiece table."""
+    """Rigid-body product of all axes: where the probe's tip lies in the frame of the workpiece
+    table.
+    """
 
     arrangement: Arrangement
     x: Array
@@ -314,7 +337,8 @@ class _Chain:
             by_rotation[axis] = prefix @ by_rotation[axis]
             prefix = prefix @ rotation_and_derivatives(self.rotation[:, axis])[0]
 
-        # The table moves the other way: going outwards, undo each axis's displacement, then its rotation.
+        # The table moves the other way: going outwards, undo each axis's displacement, then its
+        # rotation.
         passed = list(on_probe_side)
         for name in self.arrangement.workpiece_side:
             axis = AXES.index(name)
@@ -326,7 +350,9 @@ class _Chain:
             for earlier in [*passed, axis]:
                 by_translation[earlier] = back @ by_translation[earlier]
                 by_rotation[earlier] = back @ by_rotation[earlier]
-            by_rotation[axis] = np.stack([turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2)
+            by_rotation[axis] = np.stack(
+                [turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2
+            )
             tip = turned(back, outside)
             passed.append(axis)
         return tip, by_translation, by_rotation
@@ -335,6 +361,8 @@ class _Chain:
         return self._walk()[0] - self.x
 
     def sensitivities(self) -> tuple[list[Array], list[Array]]:
-        """Derivatives of the tip by each axis's translation and rotation, lists by axis of (m, 3, 3)."""
+        """Derivatives of the tip by each axis's translation and rotation, lists by axis of (m, 3,
+        3).
+        """
         _, by_translation, by_rotation = self._walk()
         return by_translation, by_rotation

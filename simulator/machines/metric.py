@@ -1,7 +1,7 @@
 """The two-dimensional metric: scale difference and squareness of two straight axes.
 
-Source: NBSIR 79-1752, equations (1) to (5): a reading is A times the true co-ordinates, with alpha the
-departure from squareness and gamma the scale difference of x and y.
+Source: NBSIR 79-1752, equations (1) to (5): a reading is A times the true co-ordinates, with alpha
+the departure from squareness and gamma the scale difference of x and y.
 """
 
 from __future__ import annotations
@@ -40,7 +40,9 @@ class MetricModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        alpha = Parameter("alpha", "rad", "alpha", "departure of the axes from squareness", self.span)
+        alpha = Parameter(
+            "alpha", "rad", "alpha", "departure of the axes from squareness", self.span
+        )
         gamma = Parameter("gamma", "1", "gamma", "difference of the scales of x and y", self.span)
         return (alpha,) if self.scale == "none" else (alpha, gamma)
 

@@ -18,9 +18,9 @@ class Parameter:
     """A named parameter of an error model.
 
     `unit` is the unit of its value: metres, radians, or 1 for a ratio. `function` is the error it
-    belongs to, by its ISO 230-1 name where it has one, and `meaning` says in words what that error is.
-    `effect` is the displacement of a corrected point, in metres per `unit`, that the parameter causes where
-    in the volume it causes most: it makes parameters of different kinds comparable.
+    belongs to, by its ISO 230-1 name where it has one, and `meaning` says in words what that error
+    is. `effect` is the displacement of a corrected point, in metres per `unit`, that the parameter
+    causes where in the volume it causes most: it makes parameters of different kinds comparable.
     """
 
     name: str
@@ -39,7 +39,9 @@ class Reported:
     matrix: Array
 
     def known_names(self) -> dict[str, int]:
-        """Rows by all names under which they may be stated: `EXX t` is the coefficient `EXX t^1`, too."""
+        """Rows by all names under which they may be stated: `EXX t` is the coefficient `EXX t^1`,
+        too.
+        """
         found = {name: row for row, name in enumerate(self.names)}
         for row, name in enumerate(self.names):
             found.setdefault(name.removesuffix("^1"), row)
@@ -87,7 +89,8 @@ class TrueMachine:
 
 @dataclass(frozen=True)
 class Line:
-    """Values of an error function along a line: `basis` (points, parameters of the function) times its parameters.
+    """Values of an error function along a line: `basis` (points, parameters of the function) times
+    its parameters.
 
     `words` names the line where a function has more than one, such as "along X".
     """
@@ -98,11 +101,14 @@ class Line:
 
 @runtime_checkable
 class HasLines(Protocol):
-    """What an error model may offer besides: its error functions as curves, to describe and to draw them.
+    """What an error model may offer besides: its error functions as curves, to describe and to draw
+    them.
 
     A function has the parameters whose `function` is its name, in their order.
     """
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function at fractions t (m,) of lines through the volume; along its axis if it depends on one only."""
+        """The function at fractions t (m,) of lines through the volume; along its axis if it
+        depends on one only.
+        """
         ...

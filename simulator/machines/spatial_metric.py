@@ -1,9 +1,11 @@
-"""The three-dimensional metric: three straight axes, each with a scale error, not quite square to one another.
+"""The three-dimensional metric: three straight axes, each with a scale error, not quite square to
+one another.
 
-Source: US 4,437,151 (Hurt and Foss), equations (100) to (107). A difference D of readings is a true length d with
-d^2 = D' G D. Here G = M'M, where the columns of M are the directions of the axes times what their scales leave out;
-M is upper triangular because X gives the frame its x and X and Y its xy plane. G and M tell the same, exactly:
-sqrt(G_ii) - 1 is the scale error of axis i, and arccos(G_ij / sqrt(G_ii G_jj)) the angle between axes i and j.
+Source: US 4,437,151 (Hurt and Foss), equations (100) to (107). A difference D of readings is a true
+length d with d^2 = D' G D. Here G = M'M, where the columns of M are the directions of the axes
+times what their scales leave out; M is upper triangular because X gives the frame its x and X and Y
+its xy plane. G and M tell the same, exactly: sqrt(G_ii) - 1 is the scale error of axis i, and
+arccos(G_ij / sqrt(G_ii G_jj)) the angle between axes i and j.
 """
 
 from __future__ import annotations
@@ -20,12 +22,14 @@ SQUARENESS = ("C0Y", "B0Z", "A0Z")
 
 @dataclass(frozen=True)
 class SpatialMetricModel:
-    """Scale errors of X, Y and Z and squareness errors C0Y, B0Z and A0Z, in this order; or the latter alone.
+    """Scale errors of X, Y and Z and squareness errors C0Y, B0Z and A0Z, in this order; or the
+    latter alone.
 
-    A reading x is corrected to `lower` + M (x - `lower`) + p with the columns (1 + s_i) u_i of M. A scale error s
-    is positive where readings are too short. Squareness errors are turns about the positive axis C, B or A (ISO 230-1)
-    that the guideway has suffered: the angle between X and Y is 90 degrees + C0Y, that between X and Z 90 degrees less
-    B0Z, that between Y and Z 90 degrees + A0Z, exactly.
+    A reading x is corrected to `lower` + M (x - `lower`) + p with the columns (1 + s_i) u_i of M. A
+    scale error s is positive where readings are too short. Squareness errors are turns about the
+    positive axis C, B or A (ISO 230-1) that the guideway has suffered: the angle between X and Y is
+    90 degrees + C0Y, that between X and Z 90 degrees less B0Z, that between Y and Z 90 degrees +
+    A0Z, exactly.
     """
 
     with_scales: bool
@@ -40,11 +44,15 @@ class SpatialMetricModel:
     def parameters(self) -> tuple[Parameter, ...]:
         span = [end - start for start, end in zip(self.lower, self.upper, strict=True)]
         scales = tuple(
-            Parameter(f"scale {axis}", "1", f"scale {axis}", f"scale error of {axis.upper()}", span[i])
+            Parameter(
+                f"scale {axis}", "1", f"scale {axis}", f"scale error of {axis.upper()}", span[i]
+            )
             for i, axis in enumerate(AXES)
         )
         squareness = tuple(
-            Parameter(name, "rad", name, f"squareness of {name[2]} to {other}", span["XYZ".index(name[2])])
+            Parameter(
+                name, "rad", name, f"squareness of {name[2]} to {other}", span["XYZ".index(name[2])]
+            )
             for name, other in zip(SQUARENESS, "XXY", strict=True)
         )
         return scales + squareness if self.with_scales else squareness
@@ -64,7 +72,10 @@ class SpatialMetricModel:
         directions = np.array([[1.0, -sin_c, sin_b], [0.0, cos_c, w], [0.0, 0.0, v]], kind)
         turned = np.zeros((3, 3, 3), kind)
         turned[0, :2, 1] = -cos_c, -sin_c
-        by_w = np.array([(sin_b - sin_c * sin_a) / cos_c**2, sin_c * np.cos(b) / cos_c, -np.cos(a_) / cos_c], kind)
+        by_w = np.array(
+            [(sin_b - sin_c * sin_a) / cos_c**2, sin_c * np.cos(b) / cos_c, -np.cos(a_) / cos_c],
+            kind,
+        )
         turned[1, 0, 2] = np.cos(b)
         turned[:, 1, 2] = by_w
         turned[:, 2, 2] = -w * by_w / v
@@ -80,17 +91,25 @@ class SpatialMetricModel:
         return from_lower @ (self.axes(a) - np.eye(3)).T + p
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        return np.asarray(np.einsum("nij,mj->min", self._derivatives(a)[1], x - np.array(self.lower)))
+        return np.asarray(
+            np.einsum("nij,mj->min", self._derivatives(a)[1], x - np.array(self.lower))
+        )
 
     def reported(self) -> Reported:
         parameters = self.parameters
-        return Reported(tuple(p.name for p in parameters), tuple(p.unit for p in parameters), np.eye(len(parameters)))
+        return Reported(
+            tuple(p.name for p in parameters),
+            tuple(p.unit for p in parameters),
+            np.eye(len(parameters)),
+        )
 
 
 def parameters_of_metric(metric: Array) -> Array:
-    """Scale errors and squareness errors (6,) of a metric tensor G (3, 3): equations (102) to (107).
+    """Scale errors and squareness errors (6,) of a metric tensor G (3, 3): equations (102) to
+    (107).
 
-    :raises ValueError: a tensor that is not positive definite, so that some difference of readings has no length.
+    :raises ValueError: a tensor that is not positive definite, so that some difference of readings
+        has no length.
 
     >>> model = SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     >>> a = np.array([1e-5, -2e-5, 3e-5, 4e-5, -5e-5, 6e-5])
@@ -102,4 +121,6 @@ def parameters_of_metric(metric: Array) -> Array:
     size = np.sqrt(np.diag(metric))
     cosine = metric / np.outer(size, size)
     # The sine of the departure from a right angle is the cosine of the angle.
-    return np.array([*(size - 1.0), -np.arcsin(cosine[0, 1]), np.arcsin(cosine[0, 2]), -np.arcsin(cosine[1, 2])])
+    return np.array(
+        [*(size - 1.0), -np.arcsin(cosine[0, 1]), np.arcsin(cosine[0, 2]), -np.arcsin(cosine[1, 2])]
+    )

@@ -1,4 +1,6 @@
-"""The straight line that a straightness error is told from: least squares, end points or minimum zone."""
+"""The straight line that a straightness error is told from: least squares, end points or minimum
+zone.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,9 @@ Criterion = Literal["end points", "least squares", "minimum zone"]
 def reference_line(t: Array, y: Array, criterion: Criterion) -> tuple[float, float]:
     """Intercept and slope of the line from which y (m,) at ascending t (m,) deviates, m at least 2.
 
-    Least squares makes the sum of squared deviations smallest, the end points are the first and the last, and the
-    minimum zone is the narrowest strip that holds all points, the line being in its middle.
+    Least squares makes the sum of squared deviations smallest, the end points are the first and the
+    last, and the minimum zone is the narrowest strip that holds all points, the line being in its
+    middle.
 
     >>> t, y = np.array([0.0, 0.5, 1.0]), np.array([0.0, 1.0, 0.0])
     >>> [tuple(round(one, 9) for one in reference_line(t, y, criterion)) for criterion in
@@ -37,7 +40,8 @@ def _minimum_zone(t: Array, y: Array) -> tuple[float, float]:
     # SciPy takes longer to import than most experiments to check.
     from scipy.optimize import linprog
 
-    # The solver's tolerances are absolute: residuals of the line through the ends, in units of their size.
+    # The solver's tolerances are absolute: residuals of the line through the ends, in units of
+    # their size.
     start, tilt = reference_line(t, y, "end points")
     left = y - start - tilt * t
     size = float(np.abs(left).max())

@@ -1,7 +1,8 @@
 """Functions of three variables on [0, 1]^3, from which the empirical error model is built.
 
-Products of one univariate function along each axis: redundancy-free sums, quadratics and full tensor products; and
-radial basis functions. All but the last are NPL Report CISE 15/98, sections 2.1.2 and 5.3.
+Products of one univariate function along each axis: redundancy-free sums, quadratics and full
+tensor products; and radial basis functions. All but the last are NPL Report CISE 15/98, sections
+2.1.2 and 5.3.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class Terms(Protocol):
 
 @dataclass(frozen=True)
 class Products:
-    """Products of univariate functions: `factors` (terms, 3) index 1, t and the interior functions of each axis.
+    """Products of univariate functions: `factors` (terms, 3) index 1, t and the interior functions
+    of each axis.
 
     >>> sums(Spline(3)).names[:8]
     ('1', 'x', 'y', 'z', 'x*y', 'x*z', 'y*z', 's1(x)')
@@ -74,24 +76,34 @@ class Products:
         """Coefficients of monomials; splines are quoted as they are, with t and 1 among them."""
         if any(isinstance(axis, Spline) for axis in self.axes):
             return Quoted(self.names, np.eye(len(self.names)))
-        by_axis = [axis.quoted_whole(variable) for axis, variable in zip(self.axes, VARIABLES, strict=True)]
+        by_axis = [
+            axis.quoted_whole(variable) for axis, variable in zip(self.axes, VARIABLES, strict=True)
+        ]
         rows: dict[str, Array] = {}
         for powers in product(*(range(len(one.names)) for one in by_axis)):
             row = np.array(
                 [
-                    np.prod([one.matrix[power, index] for one, power, index in zip(by_axis, powers, term, strict=True)])
+                    np.prod(
+                        [
+                            one.matrix[power, index]
+                            for one, power, index in zip(by_axis, powers, term, strict=True)
+                        ]
+                    )
                     for term in self.factors
                 ]
             )
             if row.any():
-                names = [one.names[power].removesuffix("^1") for one, power in zip(by_axis, powers, strict=True)]
+                names = [
+                    one.names[power].removesuffix("^1")
+                    for one, power in zip(by_axis, powers, strict=True)
+                ]
                 rows["*".join(filter(None, names)) or "1"] = row
         return Quoted(tuple(rows), np.array(list(rows.values())))
 
 
 def sums(basis: Basis) -> Products:
-    """Sums of tensor products without redundancy: 1, x, y, z, xy, xz, yz and, for each interior function s,
-    s(x), s(x) y, s(x) z, and so for y and z.
+    """Sums of tensor products without redundancy: 1, x, y, z, xy, xz, yz and, for each interior
+    function s, s(x), s(x) y, s(x) z, and so for y and z.
     """
     inner = range(2, 2 + basis.interior().size)
     factors = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
@@ -111,7 +123,9 @@ def quadratic() -> Products:
     """All polynomials of degree 2: 1, x, y, z, xy, xz, yz and s(x) = x - x^2, s(y), s(z)."""
     basis = Monomial(3)
     factors = [term for term in _triples(3) if sum(term) <= 2]
-    return Products((basis, basis, basis), tuple(sorted(factors, key=lambda term: (max(term), sum(term)))))
+    return Products(
+        (basis, basis, basis), tuple(sorted(factors, key=lambda term: (max(term), sum(term))))
+    )
 
 
 def tensor(basis: Basis) -> Products:
@@ -125,11 +139,13 @@ def _triples(count: int) -> list[tuple[int, int, int]]:
 
 @dataclass(frozen=True)
 class Radial:
-    """Interpolants of multiquadrics sqrt(r^2 + constant^2) and a linear polynomial, by their values at centres.
+    """Interpolants of multiquadrics sqrt(r^2 + constant^2) and a linear polynomial, by their values
+    at centres.
 
-    The centres are a regular grid over the volume, corners included. A function's coefficients are its values at the
-    centres; the multiquadrics' own coefficients are orthogonal to linear polynomials, in the null space of those
-    conditions, so that linear functions come out exactly. Distances and `constant` are in fractions of the volume.
+    The centres are a regular grid over the volume, corners included. A function's coefficients are
+    its values at the centres; the multiquadrics' own coefficients are orthogonal to linear
+    polynomials, in the null space of those conditions, so that linear functions come out exactly.
+    Distances and `constant` are in fractions of the volume.
 
     >>> Radial((2, 2, 2), 0.5).names[:2]
     ('at (0, 0, 0)', 'at (0, 0, 1)')
@@ -147,7 +163,10 @@ class Radial:
     @property
     def names(self) -> tuple[str, ...]:
         """Names such as at (0, 0.5, 1)."""
-        return tuple("at ({})".format(", ".join(f"{value:.4g}" for value in centre)) for centre in self.centres)
+        return tuple(
+            "at ({})".format(", ".join(f"{value:.4g}" for value in centre))
+            for centre in self.centres
+        )
 
     def _functions(self, t: Array) -> tuple[Array, Array]:
         distance = ((t[:, None, :] - self.centres) ** 2).sum(axis=2)
@@ -155,7 +174,9 @@ class Radial:
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """Coefficients of the multiquadrics (n, n) and of 1, x, y, z (4, n) for each value at a centre."""
+        """Coefficients of the multiquadrics (n, n) and of 1, x, y, z (4, n) for each value at a
+        centre.
+        """
         kernel, linear = self._functions(self.centres)
         q, r = np.linalg.qr(linear, mode="complete")
         null = q[:, 4:]

@@ -36,8 +36,10 @@ class CoefficientSettings(Settings):
 
     kind: Literal["coefficients"] = Field(description="stated errors")
     values: dict[str, str] = Field(
-        description="Value with unit of each parameter that is not zero, by its name in the error model or in the "
-        'monomial form, for example "EXX t^2": 3 um.'
+        description=(
+            "Value with unit of each parameter that is not zero, by its name in the error model or"
+            ' in the monomial form, for example "EXX t^2": 3 um.'
+        )
     )
     error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
         default=None, description=OTHER_MODEL
@@ -49,10 +51,12 @@ class RandomSettings(Settings):
 
     kind: Literal["random"] = Field(description="errors drawn at random")
     position: PositiveLength | None = Field(
-        default=None, description="Root mean square of each positional error along its axis, or in the volume."
+        default=None,
+        description="Root mean square of each positional error along its axis, or in the volume.",
     )
     rotation: Angle | None = Field(
-        default=None, description="Root mean square of each rotational error along its axis, or in the volume."
+        default=None,
+        description="Root mean square of each rotational error along its axis, or in the volume.",
     )
     seed: int = Field(default=1, ge=0, description="Seed of the draw.")
     error_model: ErrorModelSettings | None = Field(  # type: ignore[valid-type]
@@ -65,13 +69,18 @@ class CurvesSettings(Settings):
 
     kind: Literal["curves"] = Field(description="measured error curves")
     files: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
-        description="CSV files, each with the columns position_mm and errors of one axis such as EXX_um and EAX_urad; "
-        "errors that no file has are zero."
+        description=(
+            "CSV files, each with the columns position_mm and errors of one axis such as EXX_um and"
+            " EAX_urad; errors that no file has are zero."
+        )
     )
     interpolation: Interpolation = Field(
-        default="linear", description="Between the points: linear, cubic splines, or monotone cubics."
+        default="linear",
+        description="Between the points: linear, cubic splines, or monotone cubics.",
     )
-    arrangement: ArrangementName | ArrangementSettings = Field(default="MB2", description=ARRANGEMENT)
+    arrangement: ArrangementName | ArrangementSettings = Field(
+        default="MB2", description=ARRANGEMENT
+    )
     rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
 
     # What the files hold, by ISO 230-1 name; filled in when the experiment is loaded.
@@ -84,7 +93,12 @@ class CurvesSettings(Settings):
     def model(self, lower: Corner, upper: Corner) -> ErrorModel:
         """The curves as an error model, all of whose parameters are one."""
         return curves_model(
-            self._curves, self.interpolation, arrangement_of(self.arrangement), lower, upper, self.rotations == "full"
+            self._curves,
+            self.interpolation,
+            arrangement_of(self.arrangement),
+            lower,
+            upper,
+            self.rotations == "full",
         )
 
 
@@ -95,8 +109,10 @@ class TrueMachineFileSettings(Settings):
     file: str = Field(description="Machine file (YAML), as for ballplate map.")
     random_part: Literal["omitted"] | None = Field(
         default=None,
-        description='"omitted": simulated readings are to be without the random part of the file, which '
-        "machine.repeatability covers. A file that has one is refused otherwise.",
+        description=(
+            '"omitted": simulated readings are to be without the random part of the file, which '
+            "machine.repeatability covers. A file that has one is refused otherwise."
+        ),
     )
 
     # What the file says; filled in when the experiment is loaded.

@@ -1,4 +1,6 @@
-"""The machine that synthetic readings come from: an error model, not always the estimated one, and its parameters."""
+"""The machine that synthetic readings come from: an error model, not always the estimated one, and
+its parameters.
+"""
 
 from __future__ import annotations
 
@@ -21,25 +23,30 @@ _PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
 
 class TruthError(ValueError):
-    """A stated true machine is not one of the error model; `problems` are (parameter name, text) pairs."""
+    """A stated true machine is not one of the error model; `problems` are (parameter name, text)
+    pairs.
+    """
 
     def __init__(self, problems: list[tuple[str, str]]) -> None:
         self.problems = tuple(problems)
         super().__init__("; ".join(f"{name}: {text}" for name, text in problems))
 
 
-def true_machine(settings: Settings, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
+def true_machine(
+    settings: Settings, fitted: ErrorModel, lower: Corner, upper: Corner
+) -> TrueMachine:
     """The true machine in a volume from `lower` to `upper` in metres.
 
-    Its error model is `fitted`, the one that is estimated, unless the settings name another. A machine that a file
-    describes is brought into the frame of `fitted`.
+    Its error model is `fitted`, the one that is estimated, unless the settings name another. A
+    machine that a file describes is brought into the frame of `fitted`.
 
     :raises TruthError: see `true_parameters`.
 
     >>> from .arrangement import ARRANGEMENTS
     >>> from .kinematic import kinematic_model
     >>> corners = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    >>> true_machine(ZeroSettings(), kinematic_model(ARRANGEMENTS["MB2"], 2, 1, *corners), *corners).a
+    >>> model = kinematic_model(ARRANGEMENTS["MB2"], 2, 1, *corners)
+    >>> true_machine(ZeroSettings(), model, *corners).a
     array([0., 0., 0., 0., 0., 0.])
     """
     if isinstance(settings, CurvesSettings):
@@ -67,7 +74,9 @@ def true_parameters(settings: Settings, model: ErrorModel) -> Array:
 
 
 def _stated(values: dict[str, str], model: ErrorModel) -> Array:
-    own = {p.name: (p.unit, np.eye(len(model.parameters))[i]) for i, p in enumerate(model.parameters)}
+    own = {
+        p.name: (p.unit, np.eye(len(model.parameters))[i]) for i, p in enumerate(model.parameters)
+    }
     reported = model.reported()
     rows = reported.known_names()
     quoted = {name: (reported.units[row], reported.matrix[row]) for name, row in rows.items()}
@@ -76,7 +85,9 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
     for name, text in values.items():
         entry = own.get(name) or quoted.get(name)
         if entry is None:
-            problems.append((name, f'the error model has no parameter "{name}"; {hint(name, [*own, *quoted])}'))
+            problems.append(
+                (name, f'the error model has no parameter "{name}"; {hint(name, [*own, *quoted])}')
+            )
             continue
         try:
             targets[name] = _PARSERS[entry[0]](text)
@@ -90,7 +101,10 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
         if name in own:
             continue
         if rows[name] in given_quoted:
-            text = f'is the coefficient "{given_quoted[rows[name]][0]}" by another name; remove one of the two'
+            text = (
+                f'is the coefficient "{given_quoted[rows[name]][0]}" by another name; remove one of'
+                " the two"
+            )
             raise TruthError([(name, text)])
         given_quoted[rows[name]] = name, value
     a = np.zeros(len(model.parameters))
@@ -104,7 +118,10 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
         for row, (name, value) in given_quoted.items():
             if abs(left[row]) > 1e-9 * max(abs(value), np.abs(wanted).max()):
                 function = name.split()[0]
-                text = f"{function} must be zero at both ends of its axis, where it fixes the machine's frame"
+                text = (
+                    f"{function} must be zero at both ends of its axis, where it fixes the"
+                    " machine's frame"
+                )
                 problems.append((name, f"{text}; let its coefficients add up to zero"))
         if problems:
             raise TruthError(problems)
@@ -115,9 +132,14 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
 def _random(settings: RandomSettings, model: ErrorModel) -> Array:
     """Each error function gets a random shape, scaled to the stated root mean square.
 
-    It is taken over the function's axis or, where it has several, over the lines on which the model shows it.
+    It is taken over the function's axis or, where it has several, over the lines on which the model
+    shows it.
     """
-    sizes = {"m": settings.position or 0.0, "rad": settings.rotation or 0.0, "1": settings.rotation or 0.0}
+    sizes = {
+        "m": settings.position or 0.0,
+        "rad": settings.rotation or 0.0,
+        "1": settings.rotation or 0.0,
+    }
     generator = np.random.default_rng(np.random.SeedSequence(settings.seed))
     drawn = generator.standard_normal(len(model.parameters))
     if not isinstance(model, HasLines):

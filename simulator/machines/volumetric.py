@@ -1,8 +1,8 @@
 """Volumetric errors: the chain of axes with squareness, thermal expansion and the droop of an arm.
 
-Source: Park, Burdekin and Peggs, section 5.1 and Appendix A.1, which prints the sum for ten arrangements. The errors
-are those of the kinematic model; what comes in addition is linear in a few numbers, each times a polynomial of the
-position from the reference point.
+Source: Park, Burdekin and Peggs, section 5.1 and Appendix A.1, which prints the sum for ten
+arrangements. The errors are those of the kinematic model; what comes in addition is linear in a few
+numbers, each times a polynomial of the position from the reference point.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ class Field:
     terms: tuple[Term, ...]
 
     def values(self, x: Array) -> Array:
-        """Displacement (m, 3) for each unit of the number, at positions x (m, 3) from the reference point."""
+        """Displacement (m, 3) for each unit of the number, at positions x (m, 3) from the reference
+        point.
+        """
         found = np.zeros(x.shape, x.dtype)
         for component, factor, exponents in self.terms:
             found[:, component] += factor * np.prod(x ** np.array(exponents), axis=1)
@@ -45,11 +47,13 @@ SQUARENESS: dict[str, tuple[Term, ...]] = {
 }
 """Displacements by squareness errors: of Y to X about Z, of Z to X about Y, of Z to Y about X.
 
-In the document's symbols alpha = EC0Y, beta1 = -EB0Z and beta2 = EA0Z. Its equations hold the Y axis and let X turn
-by -alpha, where ISO 230-1 holds X: the same angle in frames that are turned to one another.
+In the document's symbols alpha = EC0Y, beta1 = -EB0Z and beta2 = EA0Z. Its equations hold the Y
+axis and let X turn by -alpha, where ISO 230-1 holds X: the same angle in frames that are turned to
+one another.
 """
 
-# The arm's own axis, and the components in which the column's tilt and the arm's bend show, with the printed signs.
+# The arm's own axis, and the components in which the column's tilt and the arm's bend show, with
+# the printed signs.
 DROOP: dict[str, tuple[int, tuple[int, float], tuple[int, float]]] = {
     "MH1": (0, (0, 1.0), (2, -0.5)),
     "MH2": (1, (1, 1.0), (2, 0.5)),
@@ -58,34 +62,54 @@ DROOP: dict[str, tuple[int, tuple[int, float], tuple[int, float]]] = {
 
 def squareness_field(name: str) -> Field:
     """A squareness error by its ISO 230-1 name, in radians."""
-    return Field(name, "rad", f"squareness of {name[3]} to {'X' if name[1] in 'BC' else 'Y'}", SQUARENESS[name])
+    return Field(
+        name,
+        "rad",
+        f"squareness of {name[3]} to {'X' if name[1] in 'BC' else 'Y'}",
+        SQUARENESS[name],
+    )
 
 
 def thermal_field(axis: int) -> Field:
-    """Expansion of an axis; its number is the coefficient times the deviation of the temperature."""
-    exponents = tuple(int(k == axis) for k in range(3))
-    return Field(f"thermal {AXES[axis]}", "1", f"thermal expansion along {AXES[axis]}", ((axis, 1.0, exponents),))  # type: ignore[arg-type]
+    """Expansion of an axis; its number is the coefficient times the deviation of the
+    temperature.
+    """
+    exponents = int(axis == 0), int(axis == 1), int(axis == 2)
+    return Field(
+        f"thermal {AXES[axis]}",
+        "1",
+        f"thermal expansion along {AXES[axis]}",
+        ((axis, 1.0, exponents),),
+    )
 
 
 def droop_field(arrangement: str, which: str, length: float) -> Field:
-    """Droop of an arm; its number is phi1 or phi2 times `length`, the angle when the arm has moved so far.
+    """Droop of an arm; its number is phi1 or phi2 times `length`, the angle when the arm has moved
+    so far.
 
-    As printed: MH1 has phi1 x z in X and -phi2 x^2 / 2 in Z, MH2 has phi1 y z in Y and +phi2 y^2 / 2 in Z. An arm
-    that sinks as it is driven out has phi1 > 0 in both, phi2 > 0 in MH1, but phi2 < 0 in MH2: the printed phi2 y is
-    a right-handed rotation about X, which lifts what is at +y.
+    As printed: MH1 has phi1 x z in X and -phi2 x^2 / 2 in Z, MH2 has phi1 y z in Y and +phi2 y^2 /
+    2 in Z. An arm that sinks as it is driven out has phi1 > 0 in both, phi2 > 0 in MH1, but phi2 <
+    0 in MH2: the printed phi2 y is a right-handed rotation about X, which lifts what is at +y.
     """
     axis, tilt, bend = DROOP[arrangement]
     along = [int(k == axis) for k in range(3)]
     if which == "phi1":
         exponents = (along[0], along[1], 1)
-        return Field("phi1", "rad", "tilt of the column by the arm", ((tilt[0], tilt[1] / length, exponents),))
+        return Field(
+            "phi1",
+            "rad",
+            "tilt of the column by the arm",
+            ((tilt[0], tilt[1] / length, exponents),),
+        )
     squared = (2 * along[0], 2 * along[1], 0)
     return Field("phi2", "rad", "bend of the arm", ((bend[0], bend[1] / length, squared),))
 
 
 @dataclass(frozen=True)
 class VolumetricModel:
-    """e(x, a, p) of a chain of axes and of fields besides; a has the chain's parameters, then one for each field."""
+    """e(x, a, p) of a chain of axes and of fields besides; a has the chain's parameters, then one
+    for each field.
+    """
 
     chain: KinematicModel
     fields: tuple[Field, ...]
@@ -104,7 +128,9 @@ class VolumetricModel:
         return (*self.chain.parameters, *found)
 
     def _from_origin(self, x: Array) -> Array:
-        return np.asarray(x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin))
+        return np.asarray(
+            x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin)
+        )
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)

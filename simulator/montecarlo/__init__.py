@@ -1,1 +1,3 @@
-"""Many synthetic data sets of one true machine, each estimated in full, a batch of them at a time."""
+"""Many synthetic data sets of one true machine, each estimated in full, a batch of them at a
+time.
+"""

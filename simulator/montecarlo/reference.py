@@ -1,4 +1,6 @@
-"""What all replicates share: the readings without noise, the estimate from them and one factorisation there."""
+"""What all replicates share: the readings without noise, the estimate from them and one
+factorisation there.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,12 @@ from ..numerics.threads import single_threaded
 from ..readings.generate import scale_readings, true_lengths, true_priors
 from .expansion import Direct, LocalModel, expand
 
-# Readings handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
+# Readings handled at once: enough for the matrix products to be efficient, few enough to stay in
+# cache.
 READINGS_AT_ONCE = 512
 
-# How well, in standard uncertainties of a reading, the expansion of a model must agree with the model itself.
+# How well, in standard uncertainties of a reading, the expansion of a model must agree with the
+# model itself.
 FAITHFUL = 1e-8
 
 
@@ -39,7 +43,9 @@ class TooWildError(ValueError):
 
 @dataclass(frozen=True)
 class Truth:
-    """The true artefacts and poses, and the true machine, whose error model need not be the fitted one."""
+    """The true artefacts and poses, and the true machine, whose error model need not be the fitted
+    one.
+    """
 
     state: State
     model: ErrorModel
@@ -49,9 +55,9 @@ class Truth:
 class Group:
     """Readings `rows` of one position in which no ball occurs twice, at the reference.
 
-    `ball` are their m balls, a slice where they follow one another, `arm` (d, m) the balls turned into the machine's
-    axes, `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None where no probe's offset is a
-    parameter.
+    `ball` are their m balls, a slice where they follow one another, `arm` (d, m) the balls turned
+    into the machine's axes, `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None
+    where no probe's offset is a parameter.
     """
 
     rows: slice
@@ -68,11 +74,12 @@ class Group:
 class Reference:
     """What all replicates share.
 
-    The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty of each. `ends` are
-    the model at the first and the second ends of the length standards' lengths, so far as they are read, with
-    `end_noise` (d, ends) and `end_difference` (m, d), their difference at the reference; `is_expanded` tells that
-    models are expanded about readings, because that is faithful. `prior_residual` (m,) and `prior_derivative` (m, s)
-    are the rows of priors about the truth. `start` is the estimate from readings without noise.
+    The plates' readings stand in the order of `groups`; `noise` (d, m) is the standard uncertainty
+    of each. `ends` are the model at the first and the second ends of the length standards' lengths,
+    so far as they are read, with `end_noise` (d, ends) and `end_difference` (m, d), their
+    difference at the reference; `is_expanded` tells that models are expanded about readings,
+    because that is faithful. `prior_residual` (m,) and `prior_derivative` (m, s) are the rows of
+    priors about the truth. `start` is the estimate from readings without noise.
     """
 
     design: Design
@@ -92,13 +99,17 @@ class Reference:
 
     @property
     def sum_of_squares(self) -> float:
-        """S^2 of readings without noise: zero unless the true machine is none of the fitted model's."""
+        """S^2 of readings without noise: zero unless the true machine is none of the fitted
+        model's.
+        """
         return self.factor.sum_of_squares
 
     @property
     def linearisation(self) -> Linearisation:
         """The linearisation at the reference."""
-        return Linearisation(self.design, self.factor.layout, self.start, self.factor, self.spectrum)
+        return Linearisation(
+            self.design, self.factor.layout, self.start, self.factor, self.spectrum
+        )
 
     def local_model(self, points: Array, probes: Integers) -> LocalModel:
         """The model about readings (m, d) with probes of indices (m,)."""
@@ -116,7 +127,8 @@ def reference(design: Design, truth: Truth) -> Reference:
 
     :raises NoReferenceError: a rank deficient design.
     :raises TooWildError: readings without noise that cannot be fitted.
-    :raises NoReadingError: errors of the true machine so large that no reading belongs to some location.
+    :raises NoReadingError: errors of the true machine so large that no reading belongs to some
+        location.
     """
     observed = _observed(design)
     # As drawn, because a small machine error makes a direction that is open merely all but open.
@@ -125,8 +137,12 @@ def reference(design: Design, truth: Truth) -> Reference:
         raise NoReferenceError(f"the design is rank deficient by {deficiency}")
     readings = observed.readings
     p = probe_offsets(observed, truth.state)[readings.probe]
-    turned = np.einsum("mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball])
-    exact = scale_readings(truth.model, turned + truth.state.origins[readings.position], truth.state.a, p)
+    turned = np.einsum(
+        "mij,mj->mi", truth.state.rotations[readings.position], truth.state.balls[readings.ball]
+    )
+    exact = scale_readings(
+        truth.model, turned + truth.state.origins[readings.position], truth.state.a, p
+    )
     observed = replace(
         observed,
         priors=true_priors(observed, truth.model, truth.state),
@@ -137,7 +153,9 @@ def reference(design: Design, truth: Truth) -> Reference:
         raise TooWildError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
     p = probe_offsets(observed, start)[readings.probe]
-    is_expanded = _is_faithful(observed, solution.spectrum, solution.factor.layout.model, start, exact)
+    is_expanded = _is_faithful(
+        observed, solution.spectrum, solution.factor.layout.model, start, exact
+    )
 
     def local(x: Array, p: Array) -> LocalModel:
         return _local_model(observed, start.a, x, p, is_expanded)
@@ -165,11 +183,20 @@ def reference(design: Design, truth: Truth) -> Reference:
     given = observed.lengths
     read = ~given.to_pivot
     both = given.first, given.second[read]
-    ends = (local(exact[both[0]], p[both[0]]), local(exact[both[1]], p[both[1]])) if len(given) else None
+    ends = (
+        (local(exact[both[0]], p[both[0]]), local(exact[both[1]], p[both[1]]))
+        if len(given)
+        else None
+    )
     difference, end_noise = np.zeros((len(given), observed.dimension)), []
-    for sign, end, of_end in ((1.0, both[0], np.arange(len(given))), (-1.0, both[1], np.flatnonzero(read))):
+    for sign, end, of_end in (
+        (1.0, both[0], np.arange(len(given))),
+        (-1.0, both[1], np.flatnonzero(read)),
+    ):
         if len(end):
-            difference[of_end] += sign * (exact[end] + observed.model.error(exact[end], start.a, p[end]))
+            difference[of_end] += sign * (
+                exact[end] + observed.model.error(exact[end], start.a, p[end])
+            )
         end_noise.append((1.0 / reading_weights(observed, readings.select(end))).T)
     difference[~read] -= start.origins[readings.position[given.first[~read]]]
     return Reference(
@@ -190,7 +217,9 @@ def reference(design: Design, truth: Truth) -> Reference:
 
 
 def _observed(design: Design) -> Design:
-    """The design with a row for each repeat, but for length standards, whose lengths point to their readings."""
+    """The design with a row for each repeat, but for length standards, whose lengths point to their
+    readings.
+    """
     lengths, readings = design.lengths, design.readings
     times = readings.repeats.copy()
     times[np.setdiff1d(np.arange(len(readings)), design.plate_readings)] = 1
@@ -222,7 +251,9 @@ def _groups(design: Design) -> list[Integers]:
     found: list[Integers] = []
     for part in np.split(order, np.flatnonzero(changes) + 1):
         pieces = -(-len(part) // READINGS_AT_ONCE)
-        found += [piece for piece in np.array_split(part, pieces) if len(piece)] if len(part) else []
+        found += (
+            [piece for piece in np.array_split(part, pieces) if len(piece)] if len(part) else []
+        )
     return found
 
 
@@ -239,7 +270,9 @@ def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool
     return Direct(design.model, x, a, p, design.model.error(x, a, p))
 
 
-def _is_faithful(design: Design, found: Spectrum, columns: slice, start: State, exact: Array) -> bool:
+def _is_faithful(
+    design: Design, found: Spectrum, columns: slice, start: State, exact: Array
+) -> bool:
     """Whether an expansion of the model tells the same as the model itself."""
     p = probe_offsets(design, start)[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))

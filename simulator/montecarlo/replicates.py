@@ -1,12 +1,13 @@
 """Estimates of many replicates at once, refined until nothing changes.
 
-A pass computes the exact non-linear residuals of all replicates of a batch and their exact gradient; the step solves
-R'R step = -gradient with the triangular factor that all share. What the passes end at is each replicate's own
-least-squares estimate, whatever factor the steps were made with. Everything is counted from the reference, so that
-differences of a nanometre in a metre keep their digits.
+A pass computes the exact non-linear residuals of all replicates of a batch and their exact
+gradient; the step solves R'R step = -gradient with the triangular factor that all share. What the
+passes end at is each replicate's own least-squares estimate, whatever factor the steps were made
+with. Everything is counted from the reference, so that differences of a nanometre in a metre keep
+their digits.
 
-A batch has a seed of its own and a fixed size, so that neither the number of workers nor the size of their tasks
-changes a bit of the result.
+A batch has a seed of its own and a fixed size, so that neither the number of workers nor the size
+of their tasks changes a bit of the result.
 """
 
 from __future__ import annotations
@@ -25,14 +26,16 @@ from ..numerics.threads import single_threaded
 from .expansion import Single
 from .reference import Group, Reference
 
-# Replicates of a batch. The size of a matrix product decides the last bits of its result: it must be constant.
+# Replicates of a batch. The size of a matrix product decides the last bits of its result: it must
+# be constant.
 BATCH = 128
 
 # Passes after which a replicate counts as not converged.
 PASSES = 20
 
-# A replicate has converged when its step is below this fraction of its first, which is as long as its errors are. Each
-# pass shortens it a hundredfold at least, so that a few millionths of the errors are left at the most.
+# A replicate has converged when its step is below this fraction of its first, which is as long as
+# its errors are. Each pass shortens it a hundredfold at least, so that a few millionths of the
+# errors are left at the most.
 SMALLEST_STEP = 1e-4
 
 
@@ -40,8 +43,9 @@ SMALLEST_STEP = 1e-4
 class Deviations:
     """What b replicates differ by from the reference.
 
-    `balls` (b, d, n), `rotations` (b, k, pose size - d) as vectors about the machine's axes, `origins` (b, k, d), `a`
-    (b, n) and `offsets` of probes (b, l, d). `shared` (b, s) are the sums of all steps of the shared parameters.
+    `balls` (b, d, n), `rotations` (b, k, pose size - d) as vectors about the machine's axes,
+    `origins` (b, k, d), `a` (b, n) and `offsets` of probes (b, l, d). `shared` (b, s) are the sums
+    of all steps of the shared parameters.
     """
 
     balls: Array
@@ -65,8 +69,9 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Draw:
-    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the certificates' distances, co-ordinates
-    and lengths (b, m), of priors (b, m), and of the readings of the lengths' two ends (b, d, m)."""
+    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the certificates'
+    distances, co-ordinates and lengths (b, m), of priors (b, m), and of the readings of the
+    lengths' two ends (b, d, m)."""
 
     moved: Single
     distances: Array
@@ -101,9 +106,13 @@ def _drawn_lengths(given: Lengths, generator: np.random.Generator) -> Array:
 
 
 def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
-    """Noise of the readings that lengths are formed of; a reading that serves several is drawn once."""
+    """Noise of the readings that lengths are formed of; a reading that serves several is drawn
+    once.
+    """
     given = shared.design.lengths
-    read, place = np.unique(np.concatenate([given.first, given.second[~given.to_pivot]]), return_inverse=True)
+    read, place = np.unique(
+        np.concatenate([given.first, given.second[~given.to_pivot]]), return_inverse=True
+    )
     drawn = generator.standard_normal((BATCH, shared.design.dimension, len(read)))
     first, second = np.split(place.ravel(), [len(given)])
     return drawn[:, :, first] * shared.end_noise[0], drawn[:, :, second] * shared.end_noise[1]
@@ -131,7 +140,8 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
         for number in range(PASSES):
             now, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
             balls, common = _step(shared.factor, by_ball, by_shared)
-            # A replicate that has converged is left alone, so that its end does not depend on its neighbours.
+            # A replicate that has converged is left alone, so that its end does not depend on its
+            # neighbours.
             active = ~converged
             balls, common = balls * active[:, None, None], common * active[:, None]
             poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
@@ -144,7 +154,8 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
                 at.offsets + np.where(offset >= 0, common[:, np.maximum(offset, 0)], 0.0),
                 at.shared + common,
             )
-            # S^2 after the step, which the quadratic that the factor stands for foretells to its own accuracy.
+            # S^2 after the step, which the quadratic that the factor stands for foretells to its
+            # own accuracy.
             after = now + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
             squares = np.where(active, after, squares)
             size = np.maximum(
@@ -162,7 +173,9 @@ def estimate_batch(shared: Reference, seed: int, batch: int) -> Estimates:
     return Estimates(batch * BATCH + np.arange(BATCH), at, squares, passes, converged)
 
 
-def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) -> tuple[Array, Array, Array]:
+def _gradient(
+    shared: Reference, drawn: Draw, at: Deviations, is_start: bool
+) -> tuple[Array, Array, Array]:
     """S^2 (b,), its half gradient by the balls (b, d, n) and by the shared parameters (b, s).
 
     At the start all deviations are zero, and less is to be computed.
@@ -176,14 +189,20 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) ->
     for group in shared.groups:
         k = group.position
         moved = drawn.moved[:, :, group.rows]
-        rotation = shared.start.rotations[k] if is_start else _turn(at.rotations[:, k]) @ shared.start.rotations[k]
+        rotation = (
+            shared.start.rotations[k]
+            if is_start
+            else _turn(at.rotations[:, k]) @ shared.start.rotations[k]
+        )
         pull, arm = _pull(shared, group, moved, at, is_start)
         squares += np.einsum("bim,bim->b", pull, pull)
         pull *= group.weight
         by_pose[:, k, :d] -= pull.sum(axis=2)
         by_pose[:, k, d:] -= _moment(arm, pull)
         by_ball[:, :, group.ball] -= np.swapaxes(rotation, -1, -2) @ pull
-        by_shared[:, layout.model] += group.model.gather(moved, step, pull, _offsets(at, group.probe))
+        by_shared[:, layout.model] += group.model.gather(
+            moved, step, pull, _offsets(at, group.probe)
+        )
         if group.probe is not None:
             _add_by_offset(by_shared, layout, group.probe, group.model.gather_offsets(step, pull))
     position, parameter = np.nonzero(layout.pose_columns >= 0)
@@ -192,14 +211,20 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations, is_start: bool) ->
     _lengths(shared, drawn, at, is_start, squares, by_shared)
     if drawn.priors.shape[1]:
         weight = 1.0 / shared.design.priors.uncertainty
-        residual = shared.prior_residual + at.shared @ shared.prior_derivative.T - weight * drawn.priors
+        residual = (
+            shared.prior_residual + at.shared @ shared.prior_derivative.T - weight * drawn.priors
+        )
         squares += (residual**2).sum(axis=1)
         by_shared += residual @ shared.prior_derivative
     return squares, by_ball, by_shared
 
 
-def _pull(shared: Reference, group: Group, moved: Single, at: Deviations, is_start: bool) -> tuple[Array, Array]:
-    """Weighted residuals (b, d, m) of a group, and its balls about their position's origin, (d, m) or (b, d, m)."""
+def _pull(
+    shared: Reference, group: Group, moved: Single, at: Deviations, is_start: bool
+) -> tuple[Array, Array]:
+    """Weighted residuals (b, d, m) of a group, and its balls about their position's origin, (d, m)
+    or (b, d, m).
+    """
     residual = group.residual + moved
     arm = group.arm
     if is_start:
@@ -219,7 +244,9 @@ def _pull(shared: Reference, group: Group, moved: Single, at: Deviations, is_sta
 
 
 def _turn_less_one(turn: Array) -> Array:
-    """Rotation matrices (b, d, d) of rotation vectors (b, r), less the unit matrix, to full relative accuracy."""
+    """Rotation matrices (b, d, d) of rotation vectors (b, r), less the unit matrix, to full
+    relative accuracy.
+    """
     b = len(turn)
     if turn.shape[1] == 1:
         s, half = np.sin(turn[:, 0]), np.sin(0.5 * turn[:, 0])
@@ -227,7 +254,10 @@ def _turn_less_one(turn: Array) -> Array:
         return np.stack([np.stack([less, -s], axis=1), np.stack([s, less], axis=1)], axis=1)
     angle = np.sqrt((turn**2).sum(axis=1))
     # sin(t)/t and (1 - cos t)/t^2, both smooth at 0, where np.sinc is exact.
-    first, second = np.sinc(angle / np.pi)[:, None, None], (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None]
+    first, second = (
+        np.sinc(angle / np.pi)[:, None, None],
+        (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None],
+    )
     cross = np.zeros((b, 3, 3))
     cross[:, 0, 1], cross[:, 0, 2] = -turn[:, 2], turn[:, 1]
     cross[:, 1, 0], cross[:, 1, 2] = turn[:, 2], -turn[:, 0]
@@ -242,7 +272,9 @@ def _turn(turn: Array) -> Array:
 
 
 def _moment(arm: Array, pull: Array) -> Array:
-    """Sum over m of arm x pull, with arm (d, m) or (b, d, m) and pull (b, d, m): (b, 3), in the plane (b, 1)."""
+    """Sum over m of arm x pull, with arm (d, m) or (b, d, m) and pull (b, d, m): (b, 3), in the
+    plane (b, 1).
+    """
     planes = [(0, 1)] if pull.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
     if arm.ndim == 2:
         products = (pull.reshape(-1, arm.shape[1]) @ arm.T).reshape(len(pull), *arm.shape[:1], -1)
@@ -256,13 +288,17 @@ def _moment(arm: Array, pull: Array) -> Array:
 
 
 def _bracket(turn: Array, before: Array) -> Array:
-    """turn x before, both (b, k, r): what two small rotations one after the other add to their sum, twice over."""
+    """turn x before, both (b, k, r): what two small rotations one after the other add to their sum,
+    twice over.
+    """
     if turn.shape[2] == 1:
         return np.zeros_like(turn)
     return np.cross(turn, before)
 
 
-def _certificates(shared: Reference, drawn: Draw, balls: Array, squares: Array, by_ball: Array) -> None:
+def _certificates(
+    shared: Reference, drawn: Draw, balls: Array, squares: Array, by_ball: Array
+) -> None:
     """Add the part of calibrated distances and co-ordinates to S^2 and its gradient."""
     design, start = shared.design, shared.start
     true = shared.truth.state.balls
@@ -285,15 +321,21 @@ def _certificates(shared: Reference, drawn: Draw, balls: Array, squares: Array, 
     known = design.coordinates
     if len(known):
         offset = start.balls[known.ball, known.axis] - true[known.ball, known.axis]
-        residual = (offset + balls[:, known.axis, known.ball] - drawn.coordinates) / known.uncertainty
+        residual = (
+            offset + balls[:, known.axis, known.ball] - drawn.coordinates
+        ) / known.uncertainty
         squares += (residual**2).sum(axis=1)
         # A co-ordinate may be certified twice.
         certified = np.zeros((start.balls.size, BATCH))
-        np.add.at(certified, design.dimension * known.ball + known.axis, (residual / known.uncertainty).T)
+        np.add.at(
+            certified, design.dimension * known.ball + known.axis, (residual / known.uncertainty).T
+        )
         by_ball += certified.reshape(*start.balls.shape, BATCH).transpose(2, 1, 0)
 
 
-def _add_by_offset(by_shared: Array, layout: SharedLayout, probe: Integers, gradient: Array) -> None:
+def _add_by_offset(
+    by_shared: Array, layout: SharedLayout, probe: Integers, gradient: Array
+) -> None:
     """Add a gradient (b, d, m) by the offsets of the probes (m,) that readings were made with."""
     for k in np.unique(probe):
         columns = layout.offset_columns[k]
@@ -306,7 +348,9 @@ def _offsets(at: Deviations, probe: Integers | None) -> Array | None:
     return None if probe is None else at.offsets[:, probe].swapaxes(1, 2)
 
 
-def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squares: Array, by_shared: Array) -> None:
+def _lengths(
+    shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squares: Array, by_shared: Array
+) -> None:
     """Add the part of length standards read in the volume."""
     step = None if is_start else at.a
     given = shared.design.lengths
@@ -348,11 +392,15 @@ def _lengths(shared: Reference, drawn: Draw, at: Deviations, is_start: bool, squ
     if given.free is not None and is_free:
         tight = white.pulled(residual).T
         for number in range(len(design.length_names)):
-            by_shared[:, layout.lengths.start + number] -= tight[:, given.free == number].sum(axis=1)
+            by_shared[:, layout.lengths.start + number] -= tight[:, given.free == number].sum(
+                axis=1
+            )
 
 
 def _step(factor: Factor, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
-    """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared parameters (b, s)."""
+    """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared
+    parameters (b, s).
+    """
     b, d, n = by_ball.shape
     e, s = len(factor.eliminated), by_shared.shape[1]
     rows = factor.ball_shared.reshape(e * d, s)

@@ -1,8 +1,8 @@
 """Comparisons and printed digits that rounding cannot change.
 
-Linear algebra kernels differ in the order of their sums, and so in the last digits of a result. Numbers that are equal
-but for rounding, as those of a symmetrical design, are made equal to the bit before they are compared, sorted or
-chosen from; of equal ones the first is taken then.
+Linear algebra kernels differ in the order of their sums, and so in the last digits of a result.
+Numbers that are equal but for rounding, as those of a symmetrical design, are made equal to the bit
+before they are compared, sorted or chosen from; of equal ones the first is taken then.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ NOTHING = 1e-12
 
 
 def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None) -> Array:
-    """Numbers (...) to `digits` binary digits, and 0 for what is nothing beside the largest, of all or along an axis.
+    """Numbers (...) to `digits` binary digits, and 0 for what is nothing beside the largest, of all
+    or along an axis.
 
-    Binary ones, as a decimal fraction or one with a small divisor then never lies half-way between two of them.
+    Binary ones, as a decimal fraction or one with a small divisor then never lies half-way between
+    two of them.
 
     >>> int(np.argmax([0.3, 0.1 + 0.2])), int(np.argmax(comparable([0.3, 0.1 + 0.2])))
     (1, 0)

@@ -1,12 +1,13 @@
-"""Certificate values in a file of their own: those of an experiment's certificates, offsets of probes and priors.
+"""Certificate values in a file of their own: those of an experiment's certificates, offsets of
+probes and priors.
 
-A row for each value has the columns item (a path in the experiment file), first and second (what it is of) and value:
+A row for each value has the columns item (a path in the experiment file), first and second (what it
+is of) and value:
 
     calibration[0],r1c1,r1c5,600.0001 mm    a distance between two balls
-    calibration[1],r1c1,x,0.0002 mm         a co-ordinate of a ball
-    calibration[2],gauge,radius,300 mm      the radius of a Bryan gauge
-    probes.right,offset,x,50.001 mm         an offset that is estimated, and has a standard uncertainty
-    priors[0],EXX t^2,value,3.1 um          a prior
+    calibration[1],r1c1,x,0.0002 mm         a co-ordinate of a ball calibration[2],gauge,radius,300
+    mm      the radius of a Bryan gauge probes.right,offset,x,50.001 mm         an offset that is
+    estimated, and has a standard uncertainty priors[0],EXX t^2,value,3.1 um          a prior
 """
 
 from __future__ import annotations
@@ -20,7 +21,13 @@ import numpy as np
 
 from ..design.arrays import Design, State
 from ..experiment.calibrations import FAR_FROM_DRAWING, far_from_drawing, far_spread
-from ..experiment.model import Calibration, CoordinateCalibration, DistanceCalibration, Experiment, RadiusCalibration
+from ..experiment.model import (
+    Calibration,
+    CoordinateCalibration,
+    DistanceCalibration,
+    Experiment,
+    RadiusCalibration,
+)
 from ..inputs.messages import MOST_MESSAGES, ExperimentError, Message, format_path
 from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, listing
@@ -37,9 +44,11 @@ UNIT_NAMES = {"rad": "rad", "1": "m/m"}
 
 @dataclass(frozen=True)
 class CertifiedValue:
-    """A value that a certificate states: its item's path, what it is of, and value and standard uncertainty in `unit`.
+    """A value that a certificate states: its item's path, what it is of, and value and standard
+    uncertainty in `unit`.
 
-    `is_pair`: the two names are balls, in either order. `drawn` is what the drawing has for a length, otherwise None.
+    `is_pair`: the two names are balls, in either order. `drawn` is what the drawing has for a
+    length, otherwise None.
     """
 
     item: str
@@ -60,22 +69,37 @@ class CertifiedValue:
 
 def certified_values(experiment: Experiment) -> list[CertifiedValue]:
     """All values that certificates, probes and priors of an experiment state, in its order."""
-    found = [one for k, item in enumerate(experiment.calibration) for one in _of_calibration(experiment, k, item)]
+    found = [
+        one
+        for k, item in enumerate(experiment.calibration)
+        for one in _of_calibration(experiment, k, item)
+    ]
     for name, axis in _certified_offsets(experiment):
-        value, u = float(experiment.probes[name][axis]), float(experiment.offset_uncertainties[name][axis])
+        value, u = (
+            float(experiment.probes[name][axis]),
+            float(experiment.offset_uncertainties[name][axis]),
+        )
         found.append(CertifiedValue(format_path(("probes", name)), "offset", AXES[axis], value, u))
     for prior in experiment.priors:
         item = prior.path.rpartition(".")[0]
-        found.append(CertifiedValue(item, prior.name, "value", prior.value, prior.standard_uncertainty, prior.unit))
+        found.append(
+            CertifiedValue(
+                item, prior.name, "value", prior.value, prior.standard_uncertainty, prior.unit
+            )
+        )
     return found
 
 
-def _of_calibration(experiment: Experiment, number: int, item: Calibration) -> Iterator[CertifiedValue]:
+def _of_calibration(
+    experiment: Experiment, number: int, item: Calibration
+) -> Iterator[CertifiedValue]:
     path, layout = format_path(("calibration", number)), experiment.layouts[item.artefact]
     if isinstance(item, DistanceCalibration):
         between = layout.coordinates[item.pairs[:, 0]] - layout.coordinates[item.pairs[:, 1]]
         drawn = np.sqrt((between[:, : item.dimensions] ** 2).sum(axis=1)).tolist()
-        for (i, j), value, u, length in zip(item.pairs, item.values, item.standard_uncertainties, drawn, strict=True):
+        for (i, j), value, u, length in zip(
+            item.pairs, item.values, item.standard_uncertainties, drawn, strict=True
+        ):
             names = layout.names[i], layout.names[j]
             yield CertifiedValue(path, *names, float(value), float(u), is_pair=True, drawn=length)
     elif isinstance(item, CoordinateCalibration):
@@ -84,7 +108,9 @@ def _of_calibration(experiment: Experiment, number: int, item: Calibration) -> I
                 yield CertifiedValue(path, layout.names[ball], AXES[axis], float(value), float(u))
     else:
         radius = float(np.sqrt((layout.coordinates[0] ** 2).sum()))
-        yield CertifiedValue(path, item.artefact, "radius", item.value, item.standard_uncertainty, drawn=radius)
+        yield CertifiedValue(
+            path, item.artefact, "radius", item.value, item.standard_uncertainty, drawn=radius
+        )
 
 
 def _certified_offsets(experiment: Experiment) -> Iterator[tuple[str, int]]:
@@ -95,7 +121,9 @@ def _certified_offsets(experiment: Experiment) -> Iterator[tuple[str, int]]:
 
 
 def with_values(experiment: Experiment, values: Array) -> Experiment:
-    """An experiment whose `certified_values` are others (m,), in the same order, in metres, radians and ratios."""
+    """An experiment whose `certified_values` are others (m,), in the same order, in metres, radians
+    and ratios.
+    """
     at = 0
 
     def taken(count: int) -> Array:
@@ -122,17 +150,24 @@ def with_values(experiment: Experiment, values: Array) -> Experiment:
 
 
 def drawn_values(
-    experiment: Experiment, design: Design, truth: State, model: ErrorModel, generator: np.random.Generator | None
+    experiment: Experiment,
+    design: Design,
+    truth: State,
+    model: ErrorModel,
+    generator: np.random.Generator | None,
 ) -> Array:
-    """Values (m,) of the `certified_values` of artefacts, probes and a machine that truly are `truth`.
+    """Values (m,) of the `certified_values` of artefacts, probes and a machine that truly are
+    `truth`.
 
-    Each is wrong by its standard uncertainty times a normal number; without a `generator` they are exact. `design` is
-    the experiment's, and `model` the error model of the true machine. Priors about another model's parameters are
-    drawn about what the file states.
+    Each is wrong by its standard uncertainty times a normal number; without a `generator` they are
+    exact. `design` is the experiment's, and `model` the error model of the true machine. Priors
+    about another model's parameters are drawn about what the file states.
     """
     true: list[float] = []
     names = list(experiment.artefacts)
-    first_ball = {name: int(np.flatnonzero(design.ball_artefact == names.index(name))[0]) for name in names}
+    first_ball = {
+        name: int(np.flatnonzero(design.ball_artefact == names.index(name))[0]) for name in names
+    }
     for item in experiment.calibration:
         balls = truth.balls[first_ball[item.artefact] :]
         if isinstance(item, DistanceCalibration):
@@ -157,21 +192,26 @@ def write_certificate(stream: TextIO, experiment: Experiment, comment: str) -> N
     writer = CsvWriter(stream)
     writer.writerow(COLUMNS)
     for one in certified_values(experiment):
-        text = length_text(one.value) if one.unit == "m" else f"{one.value!r} {UNIT_NAMES[one.unit]}"
+        text = (
+            length_text(one.value) if one.unit == "m" else f"{one.value!r} {UNIT_NAMES[one.unit]}"
+        )
         writer.writerow([one.item, one.first, one.second, text])
 
 
 def read_certificate(path: Path, experiment: Experiment) -> Experiment:
     """An experiment with the certificate values of a file in place of its own.
 
-    :raises ExperimentError: a wrong table; a value that the experiment does not have, or has already, or that is far
-        from the drawing; values that are missing. All of them at once.
+    :raises ExperimentError: a wrong table; a value that the experiment does not have, or has
+        already, or that is far from the drawing; values that are missing. All of them at once.
     """
     problems: list[Message] = []
     rows = read_table(path, COLUMNS, [], problems=problems)
     known = certified_values(experiment)
     if not known:
-        text = "the experiment has no certificate, prior or probe offset with an uncertainty; leave the file out"
+        text = (
+            "the experiment has no certificate, prior or probe offset with an uncertainty; leave"
+            " the file out"
+        )
         raise ExperimentError([Message(str(path), 0, 0, "", text)])
     place = {one.key: k for k, one in enumerate(known)}
     pairs = {one.item for one in known if one.is_pair}
@@ -184,7 +224,10 @@ def read_certificate(path: Path, experiment: Experiment) -> Experiment:
             problems.append(row.mark.message("", _unknown(row, known)))
             continue
         if k in lines:
-            told = f"{item} has {first}, {second} in line {lines[k].mark.line} already; remove one of the two"
+            told = (
+                f"{item} has {first}, {second} in line {lines[k].mark.line} already; remove one of"
+                " the two"
+            )
             problems.append(row.mark.message("", told))
             continue
         lines[k] = row
@@ -197,7 +240,9 @@ def read_certificate(path: Path, experiment: Experiment) -> Experiment:
         if drawn is not None and not abs(values[k] - drawn) <= FAR_FROM_DRAWING * drawn:
             told = f"{far_from_drawing(values[k], drawn)}; correct the one or the other"
             problems.append(row.mark.message("", told))
-    missing = [f"{one.item} {one.first}, {one.second}" for k, one in enumerate(known) if k not in lines]
+    missing = [
+        f"{one.item} {one.first}, {one.second}" for k, one in enumerate(known) if k not in lines
+    ]
     if missing and not problems:
         problems.append(Message(str(path), 1, 1, "", f"no value of {listing(missing)}; add it"))
     if problems:
@@ -217,6 +262,9 @@ def _unknown(row: Row, known: list[CertifiedValue]) -> str:
     item, first, second, _ = row.texts
     own = [one for one in known if one.item == item]
     if not own:
-        return f'the experiment has no certified "{item}"; {hint(item, dict.fromkeys(one.item for one in known))}'
+        return (
+            f'the experiment has no certified "{item}";'
+            f" {hint(item, dict.fromkeys(one.item for one in known))}"
+        )
     names = [f"{one.first}, {one.second}" for one in own]
     return f'{item} has no "{first}, {second}"; {hint(f"{first}, {second}", names)}'

@@ -6,7 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import Design, State, locations, nominal_state, probe_offsets, reading_uncertainties
+from ..design.arrays import (
+    Design,
+    State,
+    locations,
+    nominal_state,
+    probe_offsets,
+    reading_uncertainties,
+)
 from ..design.joint_lengths import FLAT
 from ..design.observations import Priors, Readings
 from ..estimation.observations import distance_rows, prior_values
@@ -19,9 +26,13 @@ class NoReadingError(ValueError):
 
 
 def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State]:
-    """The design as drawn on the true machine, whose error model may be another than the design's."""
+    """The design as drawn on the true machine, whose error model may be another than the
+    design's.
+    """
     drawn = nominal_state(design)
-    return replace(design, model=machine.model), State(drawn.balls, drawn.rotations, drawn.origins, machine.a)
+    return replace(design, model=machine.model), State(
+        drawn.balls, drawn.rotations, drawn.origins, machine.a
+    )
 
 
 def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
@@ -39,7 +50,9 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
             if largest <= rounding:
                 return x
     if not largest <= 10 * rounding:
-        raise NoReadingError("the errors of the true machine are too large for its readings to be found")
+        raise NoReadingError(
+            "the errors of the true machine are too large for its readings to be found"
+        )
     return x
 
 
@@ -50,25 +63,35 @@ def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
 
 
-def noisy_readings(design: Design, truth: State, generator: np.random.Generator) -> tuple[Readings, Array]:
-    """The same with normal noise of the readings' standard uncertainties added to each co-ordinate."""
+def noisy_readings(
+    design: Design, truth: State, generator: np.random.Generator
+) -> tuple[Readings, Array]:
+    """The same with normal noise of the readings' standard uncertainties added to each
+    co-ordinate.
+    """
     readings, x = exact_readings(design, truth)
-    return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(design, readings)
+    return readings, x + generator.standard_normal(x.shape) * reading_uncertainties(
+        design, readings
+    )
 
 
 def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
-    """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its uncertainty.
+    """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its
+    uncertainty.
 
-    Of all artefacts that differ so from their certificate, the nearest to the drawing; where there are more certified
-    items than can vary independently, as nearly as a real artefact can. The length of a bar moves the second of its
-    balls along the line between the two, that of a Bryan gauge the places of its ball; lengths that share balls move
-    these together. Lengths without certificates are as drawn.
+    Of all artefacts that differ so from their certificate, the nearest to the drawing; where there
+    are more certified items than can vary independently, as nearly as a real artefact can. The
+    length of a bar moves the second of its balls along the line between the two, that of a Bryan
+    gauge the places of its ball; lengths that share balls move these together. Lengths without
+    certificates are as drawn.
     """
     balls = design.balls.copy()
     tied = distance_rows(design, nominal_state(design))
     known = design.coordinates
     stated = design.dimension * known.ball + known.axis
-    off = np.concatenate([tied.residual, (balls[known.ball, known.axis] - known.value) / known.uncertainty])
+    off = np.concatenate(
+        [tied.residual, (balls[known.ball, known.axis] - known.value) / known.uncertainty]
+    )
     wanted = generator.standard_normal(len(off)) - off
     # Balls that no distance ties to others vary by themselves, however many there are.
     ends = np.unique(np.concatenate([design.distances.first, design.distances.second]))
@@ -76,7 +99,9 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     weight = 1.0 / known.uncertainty[alone]
     pull = np.bincount(stated[alone], weight * wanted[len(tied.residual) :][alone], balls.size)
     stiffness = np.bincount(stated[alone], weight**2, balls.size)
-    balls += np.divide(pull, stiffness, out=np.zeros(balls.size), where=stiffness > 0).reshape(balls.shape)
+    balls += np.divide(pull, stiffness, out=np.zeros(balls.size), where=stiffness > 0).reshape(
+        balls.shape
+    )
     among = np.zeros(len(design.balls), np.int64)
     among[ends] = np.arange(len(ends))
     together = ~np.concatenate([np.zeros(len(tied.residual), bool), alone])
@@ -84,10 +109,16 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
         rows = np.zeros((int(together.sum()), design.dimension * len(ends)))
         at = np.arange(len(tied.residual))
         for axis in range(design.dimension):
-            rows[at, design.dimension * among[design.distances.first] + axis] = tied.derivative[:, axis]
-            rows[at, design.dimension * among[design.distances.second] + axis] = -tied.derivative[:, axis]
+            rows[at, design.dimension * among[design.distances.first] + axis] = tied.derivative[
+                :, axis
+            ]
+            rows[at, design.dimension * among[design.distances.second] + axis] = -tied.derivative[
+                :, axis
+            ]
         at = len(at) + np.arange(len(rows) - len(at))
-        rows[at, design.dimension * among[known.ball[~alone]] + known.axis[~alone]] = 1.0 / known.uncertainty[~alone]
+        rows[at, design.dimension * among[known.ball[~alone]] + known.axis[~alone]] = (
+            1.0 / known.uncertainty[~alone]
+        )
         used = np.flatnonzero(rows.any(axis=0))
         move = np.zeros(rows.shape[1])
         move[used] = np.linalg.lstsq(rows[:, used], wanted[together], rcond=None)[0]
@@ -120,7 +151,9 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
 
 
 def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty: Array) -> Array:
-    """The least displacements (n, d) of balls that bring the lengths of `pairs` (2, m) nearest to those wanted (m,)."""
+    """The least displacements (n, d) of balls that bring the lengths of `pairs` (2, m) nearest to
+    those wanted (m,).
+    """
     ends, place = np.unique(pairs, return_inverse=True)
     place = place.reshape(pairs.shape)
     moved = np.zeros_like(balls)
@@ -130,19 +163,25 @@ def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty:
         rows = np.zeros((len(wanted), len(ends), balls.shape[1]))
         rows[np.arange(len(wanted)), place[0]] = between / (length * uncertainty)[:, None]
         rows[np.arange(len(wanted)), place[1]] = -rows[np.arange(len(wanted)), place[0]]
-        step = np.linalg.lstsq(rows.reshape(len(wanted), -1), (wanted - length) / uncertainty, rcond=FLAT)[0]
+        step = np.linalg.lstsq(
+            rows.reshape(len(wanted), -1), (wanted - length) / uncertainty, rcond=FLAT
+        )[0]
         moved[ends] += step.reshape(len(ends), -1)
     return moved
 
 
 def true_lengths(design: Design, truth: State) -> Array:
-    """Lengths (m,) of the design's standards as they truly are; the same wherever one certificate's is read."""
+    """Lengths (m,) of the design's standards as they truly are; the same wherever one certificate's
+    is read.
+    """
     given = design.lengths
     if not len(given):
         return given.value
     there = locations(design, truth, design.readings)
     pivot = truth.origins[design.readings.position[given.first]]
-    between = there[given.first] - np.where(given.to_pivot[:, None], pivot, there[np.maximum(given.second, 0)])
+    between = there[given.first] - np.where(
+        given.to_pivot[:, None], pivot, there[np.maximum(given.second, 0)]
+    )
     along = np.abs(np.einsum("md,md->m", given.direction, between))
     length = np.where(given.projected, along, np.sqrt((between**2).sum(axis=1)))
     _, first = np.unique(given.certificate, return_index=True)
@@ -167,7 +206,8 @@ def true_priors(design: Design, model: ErrorModel, truth: State) -> Priors:
 def noisy_certificate(
     design: Design, truth: State, generator: np.random.Generator, model: ErrorModel | None = None
 ) -> Design:
-    """The design with calibration values, of length standards as well, and priors, drawn about those of the truth.
+    """The design with calibration values, of length standards as well, and priors, drawn about
+    those of the truth.
 
     `model` is the error model of the true machine where it is not the design's.
     """
@@ -182,7 +222,9 @@ def noisy_certificate(
         return np.asarray(value + uncertainty * generator.standard_normal(len(uncertainty)))
 
     # One error for each certificate, wherever it is read.
-    error = generator.standard_normal(int(lengths.certificate.max(initial=-1)) + 1)[lengths.certificate]
+    error = generator.standard_normal(int(lengths.certificate.max(initial=-1)) + 1)[
+        lengths.certificate
+    ]
     return replace(
         design,
         distances=replace(distances, value=drawn(true_distance, distances.uncertainty)),

@@ -17,10 +17,11 @@ from .gross_errors import WrongPosition, WrongReading, find_misreadings
 
 
 def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
-    """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they are said to be of.
+    """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they
+    are said to be of.
 
-    `marks` tell where each of the design's readings stands. The rules are those of `estimation.misreadings` and
-    `estimation.length_ratios`.
+    `marks` tell where each of the design's readings stands. The rules are those of
+    `estimation.misreadings` and `estimation.length_ratios`.
 
     :raises ExperimentError: some readings are wrong; names all of them.
     """
@@ -33,7 +34,11 @@ def refuse_misreadings(design: Design, x: Array, marks: Sequence[Mark]) -> None:
             told |= {wrong.reading, wrong.partner}
     if not messages:
         doubtful = doubtful_lengths(design, x)
-        messages = [marks[one.reading].message("", _of_length(design, one)) for one in doubtful if one.is_impossible]
+        messages = [
+            marks[one.reading].message("", _of_length(design, one))
+            for one in doubtful
+            if one.is_impossible
+        ]
     if messages:
         raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
 
@@ -46,7 +51,8 @@ def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
 def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
     """A sentence about readings outside the volume, where error models are extrapolated, or none.
 
-    By less than a thousandth of the volume a reading is outside if an artefact was not set up just as drawn.
+    By less than a thousandth of the volume a reading is outside if an artefact was not set up just
+    as drawn.
     """
     beyond = np.maximum(design.lower - x, x - design.upper)
     far = np.flatnonzero((beyond > SLIGHTLY * (design.upper - design.lower)).any(axis=1))
@@ -59,10 +65,14 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
     where = f" (line {marks[i].line})" if marks else ""
     count = "1 reading is" if len(far) == 1 else f"{len(far)} readings are"
     return (
-        f"{count} outside the measuring volume, and the error model is extrapolated there; furthest is ball "
-        f"{design.ball_label(int(readings.ball[i]))} in position {design.position_names[readings.position[i]]} "
-        f"with probe {design.probe_names[readings.probe[i]]}, at {'xyz'[axis]} = {_shown(float(x[i, axis]))}, "
-        f"{_shown(float(beyond[i, axis]))} {how} it{where}; correct machine.volume, or the readings",
+        (
+            f"{count} outside the measuring volume, and the error model is extrapolated there;"
+            f" furthest is ball {design.ball_label(int(readings.ball[i]))} in position"
+            f" {design.position_names[readings.position[i]]} with probe"
+            f" {design.probe_names[readings.probe[i]]}, at {'xyz'[axis]} ="
+            f" {_shown(float(x[i, axis]))}, {_shown(float(beyond[i, axis]))} {how} it{where};"
+            " correct machine.volume, or the readings"
+        ),
     )
 
 
@@ -71,11 +81,14 @@ def _of_length(design: Design, one: LengthRatio) -> str:
     what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
     word = "stated" if one.is_known else "drawn"
     stated = f"the {word} {format_length(one.stated)}" if one.is_radius else f"the {word} ones"
-    why = "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    why = (
+        "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+    )
     ratio = f"{one.ratio:.3g}" if one.is_impossible else f"{one.ratio:.4f}"
     return (
-        f"{name}: the read {what} {verb} {ratio} of {stated}{f'; {why}' if one.is_known else ''}: correct the "
-        f"{'radius' if one.is_radius else 'length'} in the experiment file, or the unit of the readings"
+        f"{name}: the read {what} {verb} {ratio} of {stated}{f'; {why}' if one.is_known else ''}:"
+        f" correct the {'radius' if one.is_radius else 'length'} in the experiment file, or the"
+        " unit of the readings"
     )
 
 
@@ -85,13 +98,14 @@ def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) ->
     artefact = design.artefact_names[design.position_artefact[wrong.position]]
     if wrong.turned:
         text = (
-            f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the names of the balls "
-            "that are read there, or the turn that the experiment file states for the position"
+            f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the"
+            " names of the balls that are read there, or the turn that the experiment file states"
+            " for the position"
         )
     else:
         text = (
-            f"position {name}: only {wrong.agreeing} of {wrong.count} readings fit the {artefact} in any one pose; "
-            "correct the names of the balls that are read there, or the artefact"
+            f"position {name}: only {wrong.agreeing} of {wrong.count} readings fit the {artefact}"
+            " in any one pose; correct the names of the balls that are read there, or the artefact"
         )
     return first.message("", text)
 
@@ -104,26 +118,36 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
     if wrong.undecided:
         elsewhere = design.position_names[readings.position[wrong.partner]]
         text = (
-            f"ball {ball} in position {position} stands {far} from where it stands in position {elsewhere}, "
-            f"line {marks[wrong.partner].line}; correct or remove one of the two lines"
+            f"ball {ball} in position {position} stands {far} from where it stands in position"
+            f" {elsewhere}, line {marks[wrong.partner].line}; correct or remove one of the two"
+            " lines"
         )
     elif wrong.other_ball >= 0:
         other = design.ball_label(wrong.other_ball)
         text = f"ball {ball} in position {position} stands where ball {other} should be; "
         if wrong.partner >= 0:
-            text += f"swap the names of the balls in lines {marks[i].line} and {marks[wrong.partner].line}"
+            text += (
+                f"swap the names of the balls in lines {marks[i].line} and"
+                f" {marks[wrong.partner].line}"
+            )
         else:
             text += "correct its name, or remove the line"
     elif wrong.other_probe >= 0:
         probe, other = design.probe_names[readings.probe[i]], design.probe_names[wrong.other_probe]
-        text = f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the name of the probe"
+        text = (
+            f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the"
+            " name of the probe"
+        )
     else:
         along = ", ".join(
             f"{axis} {'+' if part > 0 else ''}{_shown(float(part))}"
             for axis, part in zip("xyz", wrong.misfit, strict=False)
             if abs(part) > 0.01 * np.abs(wrong.misfit).max()
         )
-        text = f"ball {ball} in position {position} is {far} from where it should be ({along}); correct or remove it"
+        text = (
+            f"ball {ball} in position {position} is {far} from where it should be ({along});"
+            " correct or remove it"
+        )
     return marks[i].message("", text)
 
 

@@ -1,14 +1,18 @@
 """Readings that cannot be of the ball they are said to be of, and what they probably are.
 
-Two comparisons are made before anything is fitted, both of places after the best rigid motion of each position:
+Two comparisons are made before anything is fitted, both of places after the best rigid motion of
+each position:
 
-- against the drawing: a reading is wrong if it is further from its ball's place than 0.3 of the distance from that
-  ball to its nearest neighbour. A drawing that is off by a tenth of that distance passes.
-- against the other readings of the same ball: a reading is wrong if it is further from their median than 0.02 of
-  that distance *and* than ten times the median of all such differences. The latter is what the machine's own
-  errors and the noise amount to, so that a bad machine is not taken for bad readings.
+- against the drawing: a reading is wrong if it is further from its ball's place than 0.3 of the
+  distance from that ball to its nearest neighbour. A drawing that is off by a tenth of that
+  distance passes.
+- against the other readings of the same ball: a reading is wrong if it is further from their median
+  than 0.02 of that distance *and* than ten times the median of all such differences. The latter is
+  what the machine's own errors and the noise amount to, so that a bad machine is not taken for bad
+  readings.
 
-Uncertain probe offsets widen the second limit by six of their standard uncertainties, up to the first limit.
+Uncertain probe offsets widen the second limit by six of their standard uncertainties, up to the
+first limit.
 """
 
 from __future__ import annotations
@@ -37,10 +41,11 @@ EXPLAINED = 0.25
 
 @dataclass(frozen=True)
 class WrongReading:
-    """A reading that is off by `misfit` (d,) metres; `other_ball`, `other_probe` explain it where they are not -1.
+    """A reading that is off by `misfit` (d,) metres; `other_ball`, `other_probe` explain it where
+    they are not -1.
 
-    `partner` is a reading that is wrong in the reverse way (exchanged balls), or that disagrees with this one where
-    nothing tells which of the two is right (`undecided`); -1 without.
+    `partner` is a reading that is wrong in the reverse way (exchanged balls), or that disagrees
+    with this one where nothing tells which of the two is right (`undecided`); -1 without.
     """
 
     reading: int
@@ -55,7 +60,8 @@ class WrongReading:
 class WrongPosition:
     """A position whose readings fit the artefact turned onto itself, or in no pose at all.
 
-    `turned` tells the turn in words and is empty in the latter case, where only `agreeing` of `count` readings fit.
+    `turned` tells the turn in words and is empty in the latter case, where only `agreeing` of
+    `count` readings fit.
     """
 
     position: int
@@ -66,7 +72,9 @@ class WrongPosition:
 
 @dataclass(frozen=True)
 class _Motions:
-    """Poses (k, d, d) and (k, d) that the readings of each position agree on, and which readings agree (m,)."""
+    """Poses (k, d, d) and (k, d) that the readings of each position agree on, and which readings
+    agree (m,).
+    """
 
     rotations: Array
     origins: Array
@@ -81,12 +89,15 @@ def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], lis
     compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
     if len(compared) < len(design.readings):
         of_others = replace(
-            design, readings=design.readings.select(compared), lengths=design.lengths.select(np.zeros(0, np.int64))
+            design,
+            readings=design.readings.select(compared),
+            lengths=design.lengths.select(np.zeros(0, np.int64)),
         )
         positions, found = _misreadings(of_others, x[compared]) if len(compared) else ([], [])
         back = np.append(compared, -1)
         return positions, [
-            replace(one, reading=int(back[one.reading]), partner=int(back[one.partner])) for one in found
+            replace(one, reading=int(back[one.reading]), partner=int(back[one.partner]))
+            for one in found
         ]
     return _misreadings(design, x)
 
@@ -105,12 +116,16 @@ def _misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[Wr
     named = _explained(design, seen, pitch, found, shape, np.flatnonzero(wrong))
     for first, second in pairs:
         apart = _in_frame(found, readings.position, seen)
-        named.append(WrongReading(first, apart[first] - apart[second], partner=second, undecided=True))
+        named.append(
+            WrongReading(first, apart[first] - apart[second], partner=second, undecided=True)
+        )
     return positions, sorted(named, key=lambda one: one.reading)
 
 
 def _pitches(design: Design) -> Array:
-    """Distance (n,) from each ball to the nearest one of its artefact, infinite for a single ball."""
+    """Distance (n,) from each ball to the nearest one of its artefact, infinite for a single
+    ball.
+    """
     from scipy.spatial import cKDTree
 
     pitch = np.full(len(design.balls), np.inf)
@@ -121,7 +136,9 @@ def _pitches(design: Design) -> Array:
     return pitch
 
 
-def _against_drawing(design: Design, seen: Array, pitch: Array) -> tuple[_Motions, list[WrongPosition]]:
+def _against_drawing(
+    design: Design, seen: Array, pitch: Array
+) -> tuple[_Motions, list[WrongPosition]]:
     readings = design.readings
     rotations, origins = design.rotations.copy(), design.origins.copy()
     agreeing = np.ones(len(readings), bool)
@@ -151,7 +168,9 @@ def _in_line(places: Array) -> bool:
 
 
 def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: Array) -> str:
-    """In words the turn, against the pose as planned, that puts every ball where another one should be; or ''."""
+    """In words the turn, against the pose as planned, that puts every ball where another one should
+    be; or ''.
+    """
     from scipy.spatial import cKDTree
 
     own = np.flatnonzero(design.ball_artefact == design.position_artefact[position])
@@ -168,7 +187,9 @@ def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: A
 
 def _in_frame(found: _Motions, position: Integers, seen: Array) -> Array:
     """Places seen (m, d) in the frames of the artefacts."""
-    return np.asarray(np.einsum("mji,mj->mi", found.rotations[position], seen - found.origins[position]))
+    return np.asarray(
+        np.einsum("mji,mj->mi", found.rotations[position], seen - found.origins[position])
+    )
 
 
 def _against_readings(
@@ -176,8 +197,8 @@ def _against_readings(
 ) -> tuple[_Motions, Array, NDArray[np.bool_], list[tuple[int, int]]]:
     """Compare readings of the same ball, after assembling each plate from its positions.
 
-    Returns the motions of the assembled artefacts, their shapes (n, d), which readings are wrong, and pairs of
-    readings of which one must be.
+    Returns the motions of the assembled artefacts, their shapes (n, d), which readings are wrong,
+    and pairs of readings of which one must be.
     """
     readings, wrong = design.readings, wrong.copy()
     right = np.flatnonzero(~wrong)
@@ -191,7 +212,10 @@ def _against_readings(
         rows = np.flatnonzero(readings.position == k)
         nominal = design.balls[readings.ball[rows]]
         off_drawing[rows] = distances(nominal, seen[rows], found.rotations[k], found.origins[k])
-    limit = AGAINST_READINGS * pitch[readings.ball] + TIMES_OFFSET * _offset_uncertainties(design)[readings.probe]
+    limit = (
+        AGAINST_READINGS * pitch[readings.ball]
+        + TIMES_OFFSET * _offset_uncertainties(design)[readings.probe]
+    )
     limit = np.minimum(limit, AGAINST_DRAWING * pitch[readings.ball])
     undecided: list[tuple[int, int]] = []
     apart = np.zeros(len(readings))
@@ -208,10 +232,13 @@ def _against_readings(
         suspect = several & (apart > np.maximum(limit, TIMES_USUAL * usual))
         if sweep >= 3:
             fresh = _worst_of_each_ball(readings.ball, apart, suspect & (count[readings.ball] > 2))
-            # Two readings are equally far from their mean; the drawing may tell which of them is wrong.
+            # Two readings are equally far from their mean; the drawing may tell which of them is
+            # wrong.
             halves = np.flatnonzero(suspect & (count[readings.ball] == 2))
             two = halves[np.argsort(readings.ball[halves], kind="stable")].reshape(-1, 2)
-            clear = off_drawing[two].max(axis=1, initial=0.0) > 4 * off_drawing[two].min(axis=1, initial=np.inf)
+            clear = off_drawing[two].max(axis=1, initial=0.0) > 4 * off_drawing[two].min(
+                axis=1, initial=np.inf
+            )
             decided = two[clear]
             fresh[decided[np.arange(len(decided)), off_drawing[decided].argmax(axis=1)]] = True
             undecided = [(int(i), int(j)) for i, j in two[~clear]]
@@ -254,7 +281,9 @@ def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Int
     return result, count
 
 
-def _worst_of_each_ball(ball: Integers, apart: Array, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _worst_of_each_ball(
+    ball: Integers, apart: Array, suspect: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """Of the suspect readings, the one of each ball that is furthest off."""
     worst = np.zeros(len(ball), bool)
     rows = np.flatnonzero(suspect)
@@ -266,7 +295,9 @@ def _worst_of_each_ball(ball: Integers, apart: Array, suspect: NDArray[np.bool_]
 def _explained(
     design: Design, seen: Array, pitch: Array, found: _Motions, shape: Array, wrong: Integers
 ) -> list[WrongReading]:
-    """What the wrong readings probably are: of another ball, with another probe, or simply wrong."""
+    """What the wrong readings probably are: of another ball, with another probe, or simply
+    wrong.
+    """
     from scipy.spatial import cKDTree
 
     readings = design.readings
@@ -280,12 +311,21 @@ def _explained(
         apart, nearest = tree.query(local[rows])
         ball = own[nearest]
         misfit = np.sqrt(((local[rows] - shape[readings.ball[rows]]) ** 2).sum(axis=1))
-        there = (apart < np.minimum(AGAINST_DRAWING * pitch[ball], EXPLAINED * misfit)) & (ball != readings.ball[rows])
+        there = (apart < np.minimum(AGAINST_DRAWING * pitch[ball], EXPLAINED * misfit)) & (
+            ball != readings.ball[rows]
+        )
         other_ball[rows[there]] = ball[there]
-    key = {(int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])): int(i) for i in wrong}
+    key = {
+        (int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])): int(i)
+        for i in wrong
+    }
     # A loop over the wrong ones only, and these are few.
     for i in map(int, wrong):
-        position, probe, ball_of = int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])
+        position, probe, ball_of = (
+            int(readings.position[i]),
+            int(readings.probe[i]),
+            int(readings.ball[i]),
+        )
         should = found.rotations[position] @ shape[ball_of] + found.origins[position]
         misfit_of = seen[i] - should
         size = float(np.sqrt(misfit_of @ misfit_of))

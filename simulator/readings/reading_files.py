@@ -1,4 +1,6 @@
-"""Readings as a CSV file: one row for each reading, lengths with their unit in the column's name."""
+"""Readings as a CSV file: one row for each reading, lengths with their unit in the column's
+name.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +31,12 @@ AS_PLANNED = 0.01
 
 @dataclass(frozen=True)
 class ObservedReadings:
-    """A design whose readings are those of a file, with their scale readings x (readings, d) in metres.
+    """A design whose readings are those of a file, with their scale readings x (readings, d) in
+    metres.
 
-    `missing` names planned readings that the file lacks, `unplanned` those in the file that the design did not foresee.
-    `marks` tell where each reading stands; of the mean of several, where the first does.
+    `missing` names planned readings that the file lacks, `unplanned` those in the file that the
+    design did not foresee. `marks` tell where each reading stands; of the mean of several, where
+    the first does.
     """
 
     design: Design
@@ -45,7 +49,9 @@ class ObservedReadings:
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
     """Write readings in millimetres with all digits: position, ball, probe, x_mm, y_mm and z_mm."""
     writer = CsvWriter(stream)
-    writer.writerow(["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])])
+    writer.writerow(
+        ["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])]
+    )
     positions, balls, probes = design.position_names, design.ball_names, design.probe_names
     for ball, position, probe, row in zip(
         readings.ball, readings.position, readings.probe, (1e3 * x).tolist(), strict=True
@@ -53,17 +59,19 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
         writer.writerow([positions[position], balls[ball], probes[probe], *map(repr, row)])
 
 
-def read_readings(path: Path | GivenText, design: Design, every_ball: bool = True) -> ObservedReadings:
+def read_readings(
+    path: Path | GivenText, design: Design, every_ball: bool = True
+) -> ObservedReadings:
     """Readings of a file as observations of a design.
 
-    The probe's column may be left out where there is one probe only. An optional column u, with a unit as in u_um,
-    states the standard uncertainty of each co-ordinate of a reading; without it a reading has the uncertainty that
-    the design plans for it, and one that is not planned the machine's repeatability. A reading stands in the file no
-    more often than the design plans it; one that is not planned, once. Unless `every_ball` has to be read, some may be
-    missing.
+    The probe's column may be left out where there is one probe only. An optional column u, with a
+    unit as in u_um, states the standard uncertainty of each co-ordinate of a reading; without it a
+    reading has the uncertainty that the design plans for it, and one that is not planned the
+    machine's repeatability. A reading stands in the file no more often than the design plans it;
+    one that is not planned, once. Unless `every_ball` has to be read, some may be missing.
 
-    :raises ExperimentError: a wrong table, names that the design does not know, or readings that cannot be of the
-        ball they name (`estimation.misreadings`); all of a kind at once.
+    :raises ExperimentError: a wrong table, names that the design does not know, or readings that
+        cannot be of the ball they name (`estimation.misreadings`); all of a kind at once.
     """
     texts = ["position", "ball", "probe"]
     columns, d = column_names(path), design.dimension
@@ -82,14 +90,22 @@ def read_readings(path: Path | GivenText, design: Design, every_ball: bool = Tru
     x, stated = lengths[:, :d], lengths[:, d]
     _refuse_far_outside(rows, x, design)
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
-    uncertainty = np.repeat(stated[:, None], d, axis=1) if "u" in columns else _planned_uncertainty(design, readings)
+    uncertainty = (
+        np.repeat(stated[:, None], d, axis=1)
+        if "u" in columns
+        else _planned_uncertainty(design, readings)
+    )
     readings = replace(readings, uncertainty=uncertainty)
     missing, unplanned = _compare(design, readings, [row.mark.line for row in rows])
     unread = np.setdiff1d(design.plate_balls, readings.ball)
     if len(unread) and every_ball:
         names = listing(f'"{design.ball_label(int(ball))}"' for ball in unread)
         raise ExperimentError(
-            [Message(str(path), 1, 1, "", f"no reading of the balls {names}; read each at least once")]
+            [
+                Message(
+                    str(path), 1, 1, "", f"no reading of the balls {names}; read each at least once"
+                )
+            ]
         )
     marks = tuple(row.mark for row in rows)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
@@ -124,20 +140,28 @@ def _indices(rows: tuple[Row, ...], design: Design) -> tuple[Integers, list[Mess
             else:
                 own = balls[design.position_artefact[positions[position]]]
                 texts += [] if ball in own else [f'unknown ball "{ball}"; {hint(ball, own)}']
-                texts += [] if probe in probes else [f'unknown probe "{probe}"; {hint(probe, probes)}']
+                texts += (
+                    [] if probe in probes else [f'unknown probe "{probe}"; {hint(probe, probes)}']
+                )
             places[row.texts] = own.get(ball, 0), positions.get(position, 0), probes.get(probe, 0)
         for text in wrong[row.texts]:
             unknown.setdefault(text, []).append(row)
         index.append(places[row.texts])
     messages = []
     for text, found in unknown.items():
-        more = f" (and in {len(found) - 1} line{'s' * (len(found) > 2)} more)" if len(found) > 1 else ""
+        more = (
+            f" (and in {len(found) - 1} line{'s' * (len(found) > 2)} more)"
+            if len(found) > 1
+            else ""
+        )
         messages.append(found[0].mark.message("", text + more))
     return np.array(index, np.int64).reshape(-1, 3), messages
 
 
 def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
-    """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in another unit."""
+    """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in
+    another unit.
+    """
     size = float((design.upper - design.lower).max())
     return np.asarray((x < design.lower - size) | (x > design.upper + size))
 
@@ -149,14 +173,19 @@ def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None
         if len(messages) >= MOST_MESSAGES:
             messages.append(rows[i].mark.message("", ENOUGH))
             break
-        text = f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the column's name"
+        text = (
+            f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit in the"
+            " column's name"
+        )
         messages.append(rows[i].mark.message("", text))
     if messages:
         raise ExperimentError(messages)
 
 
 def _refuse_repeated(rows: tuple[Row, ...], readings: Readings, design: Design) -> None:
-    """Refuse readings that stand in the file more often than planned: a copied line counts as knowledge otherwise."""
+    """Refuse readings that stand in the file more often than planned: a copied line counts as
+    knowledge otherwise.
+    """
     planned = Counter(_key(design.readings.expanded()))
     places: dict[tuple[int, int, int], list[Row]] = {}
     for key, row in zip(_key(readings), rows, strict=True):
@@ -167,9 +196,10 @@ def _refuse_repeated(rows: tuple[Row, ...], readings: Readings, design: Design) 
         # Some of each ball's, so that no ball is left out and no list is endless.
         for row in found[allowed : allowed + 10]:
             text = (
-                f'ball "{design.ball_label(ball)}" is repeated in position "{design.position_names[position]}" '
-                f'with probe "{design.probe_names[probe]}" (first in line {found[0].mark.line}); remove the line, '
-                f"or state repeats: {len(found)} for that position in the experiment"
+                f'ball "{design.ball_label(ball)}" is repeated in position'
+                f' "{design.position_names[position]}" with probe "{design.probe_names[probe]}"'
+                f" (first in line {found[0].mark.line}); remove the line, or state repeats:"
+                f" {len(found)} for that position in the experiment"
             )
             messages.append(row.mark.message("", text))
     if messages:
@@ -182,7 +212,9 @@ def _key(readings: Readings) -> list[tuple[int, int, int]]:
 
 
 def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
-    """Standard uncertainties (m, d) that the design plans for the readings, None where it plans none in particular."""
+    """Standard uncertainties (m, d) that the design plans for the readings, None where it plans
+    none in particular.
+    """
     planned = design.readings
     if planned.uncertainty is None:
         return None
@@ -190,12 +222,17 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
     return np.array([of_key.get(key, design.repeatability) for key in _key(readings)])
 
 
-def _compare(design: Design, readings: Readings, lines: list[int]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _compare(
+    design: Design, readings: Readings, lines: list[int]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, found = _key(design.readings.expanded()), _key(readings)
 
     def name(key: tuple[int, int, int]) -> str:
         position, ball, probe = key
-        return f"{design.position_names[position]}: ball {design.ball_label(ball)} with {design.probe_names[probe]}"
+        return (
+            f"{design.position_names[position]}: ball {design.ball_label(ball)} with"
+            f" {design.probe_names[probe]}"
+        )
 
     def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> list[int]:
         left = Counter(others)
@@ -212,7 +249,9 @@ def _compare(design: Design, readings: Readings, lines: list[int]) -> tuple[tupl
 
 
 def observe(design: Design, readings: Readings, x: Array) -> ObservedReadings:
-    """Readings of a design, one row for each repeat, with scale readings `x` (readings, d), as if a file had them."""
+    """Readings of a design, one row for each repeat, with scale readings `x` (readings, d), as if a
+    file had them.
+    """
     return _combine_standards(design, readings, x, (), (), ())
 
 
@@ -226,8 +265,8 @@ def _combine_standards(
 ) -> ObservedReadings:
     """Take the mean of what a length standard's repeats read, and let its lengths point to it.
 
-    A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of its own, since its
-    ball need not be where it was before.
+    A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of
+    its own, since its ball need not be where it was before.
     """
     on_plate = design.is_plate[design.ball_artefact[readings.ball]]
     groups: dict[tuple[int, int, int], list[int]] = {}
@@ -237,7 +276,9 @@ def _combine_standards(
         groups.setdefault(keys[i], []).append(int(i))
     carried = np.flatnonzero(of_gauge)
     plate = np.flatnonzero(on_plate)
-    means = np.array([x[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
+    means = np.array([x[members].mean(axis=0) for members in groups.values()]).reshape(
+        -1, x.shape[1]
+    )
     first = np.array([members[0] for members in groups.values()], np.int64)
     repeats = np.array([len(members) for members in groups.values()], np.int64)
     place = {key: len(plate) + i for i, key in enumerate(groups)}
@@ -253,25 +294,35 @@ def _combine_standards(
         lengths = _with_radii(design, lengths, readings, x, carried, len(plate) + len(first))
     chosen = np.concatenate([plate, first, carried])
     ones = np.ones(len(readings), np.int64)
-    combined = replace(readings.select(chosen), repeats=np.concatenate([ones[plate], repeats, ones[carried]]))
+    combined = replace(
+        readings.select(chosen), repeats=np.concatenate([ones[plate], repeats, ones[carried]])
+    )
     if readings.uncertainty is not None:
         variance = readings.uncertainty**2
         # The mean is a plain one, whatever the uncertainties of its parts.
-        of_means = np.sqrt([variance[members].mean(axis=0) for members in groups.values()]).reshape(-1, x.shape[1])
+        of_means = np.sqrt([variance[members].mean(axis=0) for members in groups.values()]).reshape(
+            -1, x.shape[1]
+        )
         of_others = readings.uncertainty
-        combined = replace(combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]]))
+        combined = replace(
+            combined, uncertainty=np.concatenate([of_others[plate], of_means, of_others[carried]])
+        )
     observed = replace(design, readings=combined, lengths=lengths)
     chosen_marks = tuple(marks[i] for i in chosen) if marks else ()
-    return ObservedReadings(observed, np.concatenate([x[plate], means, x[carried]]), missing, unplanned, chosen_marks)
+    return ObservedReadings(
+        observed, np.concatenate([x[plate], means, x[carried]]), missing, unplanned, chosen_marks
+    )
 
 
 def _with_radii(
     design: Design, lengths: Lengths, readings: Readings, x: Array, carried: Integers, start: int
 ) -> Lengths:
-    """Lengths with those of the readings `carried` of Bryan gauges added, which stand from `start` on.
+    """Lengths with those of the readings `carried` of Bryan gauges added, which stand from `start`
+    on.
 
-    Their directions are those of the readings about the centre of a sphere; the nearest planned ones, whatever their
-    names, if all of a position are met, so that noise and errors do not seem to tell what the plan leaves open.
+    Their directions are those of the readings about the centre of a sphere; the nearest planned
+    ones, whatever their names, if all of a position are met, so that noise and errors do not seem
+    to tell what the plan leaves open.
     """
     from scipy.spatial import cKDTree
 

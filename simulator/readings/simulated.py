@@ -13,12 +13,19 @@ from ..experiment.model import Experiment
 from ..inputs.messages import ExperimentError
 from ..machines.protocol import Array, ErrorModel
 from ..machines.truth import true_machine
-from .generate import NoReadingError, exact_readings, noisy_readings, on_true_machine, true_artefacts
+from .generate import (
+    NoReadingError,
+    exact_readings,
+    noisy_readings,
+    on_true_machine,
+    true_artefacts,
+)
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """Scale readings `x` (readings, d) in metres of the true artefacts on the true machine, `truth` on `model`.
+    """Scale readings `x` (readings, d) in metres of the true artefacts on the true machine, `truth`
+    on `model`.
 
     `generator` goes on where the readings have ended; None where there is no noise.
     """
@@ -32,16 +39,22 @@ class Simulated:
     generator: np.random.Generator | None
 
 
-def simulated_readings(experiment: Experiment, seed: int | None = None, exact: bool = False) -> Simulated:
-    """Readings that the true machine gives of artefacts that differ from their certificates as stated, with noise.
+def simulated_readings(
+    experiment: Experiment, seed: int | None = None, exact: bool = False
+) -> Simulated:
+    """Readings that the true machine gives of artefacts that differ from their certificates as
+    stated, with noise.
 
-    `seed` replaces that of the experiment. `exact` leaves all noise out, and artefacts are as drawn.
+    `seed` replaces that of the experiment. `exact` leaves all noise out, and artefacts are as
+    drawn.
 
     :raises ExperimentError: the true machine's errors are so large that there is no reading.
     """
     design = lay_out(experiment)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(experiment.true_machine, design.model, *corners)
+    )
     chosen = experiment.seed if seed is None else seed
     generator = None if exact else np.random.default_rng(np.random.SeedSequence(chosen))
     try:
@@ -51,5 +64,7 @@ def simulated_readings(experiment: Experiment, seed: int | None = None, exact: b
             truth = replace(truth, balls=true_artefacts(design, generator))
             readings, x = noisy_readings(on_truth, truth, generator)
     except NoReadingError as error:
-        raise ExperimentError([experiment.message(("true_machine",), f"{error}; state smaller ones")]) from None
+        raise ExperimentError(
+            [experiment.message(("true_machine",), f"{error}; state smaller ones")]
+        ) from None
     return Simulated(design, truth, on_truth.model, readings, x, chosen, generator)

@@ -1,1 +1,3 @@
-"""Least-squares splines with prescribed values and slopes: spaces, constraints, fits, pieces for a controller."""
+"""Least-squares splines with prescribed values and slopes: spaces, constraints, fits, pieces for a
+controller.
+"""

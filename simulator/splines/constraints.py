@@ -1,7 +1,7 @@
 """Linear conditions on a spline, as data.
 
-NISTIR 6517 prescribes values and slopes at both ends, equations (12) to (16). Here a condition may stand anywhere,
-concern any derivative, and tie one place to another.
+NISTIR 6517 prescribes values and slopes at both ends, equations (12) to (16). Here a condition may
+stand anywhere, concern any derivative, and tie one place to another.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ NAMES = ("value", "slope", "second derivative")
 
 @dataclass(frozen=True)
 class Term:
-    """`factor` times a derivative (0 is the value) of the curve at a place, from one side where it jumps."""
+    """`factor` times a derivative (0 is the value) of the curve at a place, from one side where it
+    jumps.
+    """
 
     at: float
     derivative: int = 0
@@ -27,7 +29,9 @@ class Term:
 
 @dataclass(frozen=True)
 class Constraint:
-    """The sum of the terms is the value, in metres or radians (of y) per metre or radian (of x) to some power."""
+    """The sum of the terms is the value, in metres or radians (of y) per metre or radian (of x) to
+    some power.
+    """
 
     terms: tuple[Term, ...]
     value: float = 0.0
@@ -44,7 +48,11 @@ class Constraint:
         >>> prescribed(0.5, 1, 0.0).words
         'slope at {0}'
         """
-        name = NAMES[self.derivative] if self.derivative < len(NAMES) else f"derivative {self.derivative}"
+        name = (
+            NAMES[self.derivative]
+            if self.derivative < len(NAMES)
+            else f"derivative {self.derivative}"
+        )
         return f"{name} at {{0}}" if len(self.terms) == 1 else f"equal {name}s at {{0}} and {{1}}"
 
     @property
@@ -65,7 +73,8 @@ def periodic(space: SplineSpace) -> tuple[Constraint, ...]:
     3
     """
     return tuple(
-        Constraint((Term(space.lower, k), Term(space.upper, k, -1.0, "below"))) for k in range(space.order - 1)
+        Constraint((Term(space.lower, k), Term(space.upper, k, -1.0, "below")))
+        for k in range(space.order - 1)
     )
 
 
@@ -85,7 +94,9 @@ def rows(space: SplineSpace, constraints: tuple[Constraint, ...]) -> tuple[Array
     matrix, values = np.zeros((len(constraints), space.count)), np.zeros(len(constraints))
     for k, constraint in enumerate(constraints):
         for term in constraint.terms:
-            matrix[k] += term.factor * space.rows(np.array([term.at]), term.derivative, term.side)[0]
+            matrix[k] += (
+                term.factor * space.rows(np.array([term.at]), term.derivative, term.side)[0]
+            )
         # Whatever the unit of x, a slope's row then counts as much as a value's.
         size = float(np.linalg.norm(matrix[k])) or 1.0
         matrix[k] /= size

@@ -1,8 +1,9 @@
 """Least squares under constraints by orthogonal factorisation.
 
-The constraints C c = f are met by c = c0 + Z z, where C' P = Q R gives the particular solution c0 and the columns Z of
-Q that C does not see; then || W (A Z z - (y - A c0)) || is made small by a second factorisation. NISTIR 6517, equation
-(25), is the same solution by pseudo-inverses; Lawson and Hanson, Solving Least Squares Problems, chapter 20, has this.
+The constraints C c = f are met by c = c0 + Z z, where C' P = Q R gives the particular solution c0
+and the columns Z of Q that C does not see; then || W (A Z z - (y - A c0)) || is made small by a
+second factorisation. NISTIR 6517, equation (25), is the same solution by pseudo-inverses; Lawson
+and Hanson, Solving Least Squares Problems, chapter 20, has this.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ UNDETERMINED = 1e-9
 class SplineFit:
     """A fitted spline.
 
-    `coefficients` (count,) are those of the B-splines of `space`; with `root` (count, free) their covariance is
-    sigma² root root'. x, y (m,) are the points, `uncertainties` (m,) those of y, all 1 where none are stated: then
-    `sigma` is a standard uncertainty, otherwise a factor. `redundant` are constraints that the others imply.
+    `coefficients` (count,) are those of the B-splines of `space`; with `root` (count, free) their
+    covariance is sigma² root root'. x, y (m,) are the points, `uncertainties` (m,) those of y, all
+    1 where none are stated: then `sigma` is a standard uncertainty, otherwise a factor. `redundant`
+    are constraints that the others imply.
     """
 
     space: SplineSpace
@@ -62,7 +64,9 @@ class SplineFit:
 
         :raises SplineError: an x beyond the ends.
         """
-        return np.asarray(np.sqrt(((self.space.rows(x, derivative, side) @ self.root) ** 2).sum(axis=1)))
+        return np.asarray(
+            np.sqrt(((self.space.rows(x, derivative, side) @ self.root) ** 2).sum(axis=1))
+        )
 
     @cached_property
     def residuals(self) -> Array:
@@ -85,7 +89,8 @@ class SplineFit:
         """By how much the curve misses a constraint, in the constraint's own unit."""
         terms = constraint.terms
         return float(
-            sum(t.factor * self.values(np.array([t.at]), t.derivative, t.side)[0] for t in terms) - constraint.value
+            sum(t.factor * self.values(np.array([t.at]), t.derivative, t.side)[0] for t in terms)
+            - constraint.value
         )
 
 
@@ -100,13 +105,15 @@ def fit(
 
     Points count by the inverse squares of their `uncertainties` (m,), alike where there are none.
 
-    :raises SplineError: constraints that contradict one another, points that do not determine the curve, or places
-        beyond its ends; all of a kind at once.
+    :raises SplineError: constraints that contradict one another, points that do not determine the
+        curve, or places beyond its ends; all of a kind at once.
     """
     from scipy.linalg import solve_triangular
 
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    weights = np.ones(len(x)) if uncertainties is None else 1.0 / np.asarray(uncertainties, dtype=float)
+    weights = (
+        np.ones(len(x)) if uncertainties is None else 1.0 / np.asarray(uncertainties, dtype=float)
+    )
     particular, null, redundant = _constrained(space, constraints)
     design = space.rows(x)
     _refuse_undetermined(space, x, design @ null, null)
@@ -120,7 +127,9 @@ def fit(
 def _constrained(
     space: SplineSpace, constraints: tuple[Constraint, ...]
 ) -> tuple[Array, Array, tuple[Constraint, ...]]:
-    """A solution (count,) of the constraints, what they leave free (count, free), and constraints that others imply."""
+    """A solution (count,) of the constraints, what they leave free (count, free), and constraints
+    that others imply.
+    """
     from scipy.linalg import qr, solve_triangular
 
     matrix, values = rows(space, constraints)
@@ -138,16 +147,21 @@ def _constrained(
     return particular, q[:, rank:], tuple(constraints[k] for k in rest)
 
 
-def _contradiction(constraints: tuple[Constraint, ...], matrix: Array, kept: Array, k: int) -> Problem:
+def _contradiction(
+    constraints: tuple[Constraint, ...], matrix: Array, kept: Array, k: int
+) -> Problem:
     """Say what a constraint contradicts: those of which it is a combination."""
     if not matrix[k].any():
         text = f"the {constraints[k].words} is zero for every spline of this order; leave it out"
         return Problem(text, constraints[k].places)
     parts = np.linalg.lstsq(matrix[kept].T, matrix[k], rcond=None)[0]
-    others = [constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING]
+    others = [
+        constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING
+    ]
     if len(others) == 1 and _is_same(constraints[k], others[0]):
         return Problem(
-            f"the {constraints[k].words} is prescribed twice, differently; leave one of them out", constraints[k].places
+            f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
+            constraints[k].places,
         )
     texts: list[str] = []
     places: list[float] = []
@@ -155,13 +169,18 @@ def _contradiction(constraints: tuple[Constraint, ...], matrix: Array, kept: Arr
         indices = [f"{{{len(places) + i}}}" for i in range(len(one.places))]
         texts.append(one.words.format(*indices))
         places += one.places
-    text = f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; leave one of them out or add a knot"
+    text = (
+        f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; leave one of them out or add a"
+        " knot"
+    )
     return Problem(text, tuple(places))
 
 
 def _is_same(one: Constraint, other: Constraint) -> bool:
     """Whether two constraints prescribe the same thing."""
-    return one.words == other.words and bool(np.allclose(one.places, other.places, rtol=1e-12, atol=0.0))
+    return one.words == other.words and bool(
+        np.allclose(one.places, other.places, rtol=1e-12, atol=0.0)
+    )
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:

@@ -8,16 +8,20 @@ import numpy as np
 
 from .space import Array
 
-# With fewer points between a knot and a boundary the curvature, which jumps there, is hardly determined.
+# With fewer points between a knot and a boundary the curvature, which jumps there, is hardly
+# determined.
 NEXT_TO_BOUNDARY = 3
 
 
-def at_every(x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()) -> tuple[float, ...]:
-    """Knots at every r-th of the points x between neighbouring boundaries, as NISTIR 6517, equation (5), has them.
+def at_every(
+    x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()
+) -> tuple[float, ...]:
+    """Knots at every r-th of the points x between neighbouring boundaries, as NISTIR 6517, equation
+    (5), has them.
 
-    A knot that no point of its feature lies beyond would have nothing to determine it, and is left out. So is one with
-    fewer than three points from it to a boundary, the knot's own not counted. Points of the same x count as one, a
-    point on a boundary in both features.
+    A knot that no point of its feature lies beyond would have nothing to determine it, and is left
+    out. So is one with fewer than three points from it to a boundary, the knot's own not counted.
+    Points of the same x count as one, a point on a boundary in both features.
 
     >>> at_every(np.arange(1.0, 9.0), 3, 1.0, 8.0)
     (3.0, 6.0)
@@ -36,7 +40,9 @@ def at_every(x: Array, r: int, lower: float, upper: float, boundaries: Sequence[
     return tuple(found)
 
 
-def with_boundaries(knots: Sequence[float], boundaries: Sequence[float], order: int) -> tuple[float, ...]:
+def with_boundaries(
+    knots: Sequence[float], boundaries: Sequence[float], order: int
+) -> tuple[float, ...]:
     """All knots in order, with those that leave only value and slope continuous at the boundaries.
 
     >>> with_boundaries((1.0, 3.0), (2.0,), 4)

@@ -1,7 +1,8 @@
 """A spline as polynomials, one for each piece, for a controller that evaluates nothing else.
 
-NISTIR 6517, equations (27) to (33), has them in powers of x itself. Far from x = 0 their terms are larger than their
-sum and cancel, so that powers of the distance from the start of the piece are what to use where there is a choice.
+NISTIR 6517, equations (27) to (33), has them in powers of x itself. Far from x = 0 their terms are
+larger than their sum and cancel, so that powers of the distance from the start of the piece are
+what to use where there is a choice.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ Powers = Literal["local", "global"]
 
 @dataclass(frozen=True)
 class Pieces:
-    """`coefficients` (pieces, order) of 1, x, x², … from each of `breaks` (pieces + 1,) to the next."""
+    """`coefficients` (pieces, order) of 1, x, x², … from each of `breaks` (pieces + 1,) to the
+    next.
+    """
 
     breaks: Array
     coefficients: Array
@@ -37,13 +40,17 @@ class Pieces:
         return found
 
     def cancellation(self) -> float:
-        """The largest sum of absolute terms over the curve's largest value: how many times rounding is magnified."""
+        """The largest sum of absolute terms over the curve's largest value: how many times rounding
+        is magnified.
+        """
         x = np.unique(np.linspace(self.breaks[:-1], self.breaks[1:], 17))
         return float(np.abs(_absolute(self, x)).max() / np.abs(self.values(x)).max())
 
 
 def pieces(fitted: SplineFit, powers: Powers = "local") -> Pieces:
-    """The fitted curve in powers of x less the start of each piece, or of x, in metres and radians."""
+    """The fitted curve in powers of x less the start of each piece, or of x, in metres and
+    radians.
+    """
     space = fitted.space
     scale = space.length ** -np.arange(space.order)
     local = (space.pieces @ fitted.coefficients) * scale
@@ -60,4 +67,6 @@ def pieces(fitted: SplineFit, powers: Powers = "local") -> Pieces:
 def _absolute(found: Pieces, x: Array) -> Array:
     piece = np.clip(np.searchsorted(found.breaks, x, "right") - 1, 0, len(found.coefficients) - 1)
     u = np.abs(x - found.breaks[piece] if found.powers == "local" else x)
-    return np.asarray(sum(np.abs(found.coefficients[piece, k]) * u**k for k in range(found.coefficients.shape[1])))
+    return np.asarray(
+        sum(np.abs(found.coefficients[piece, k]) * u**k for k in range(found.coefficients.shape[1]))
+    )

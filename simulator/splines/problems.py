@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Problem:
-    """What is wrong and what would be right; `text` has {0}, {1}, … for the `places`, in metres or radians."""
+    """What is wrong and what would be right; `text` has {0}, {1}, … for the `places`, in metres or
+    radians.
+    """
 
     text: str
     places: tuple[float, ...] = ()
@@ -23,8 +25,12 @@ class Problem:
 
 
 class SplineError(ValueError):
-    """A spline is impossible or undetermined, or is asked for where it is not defined; `problems` has all reasons."""
+    """A spline is impossible or undetermined, or is asked for where it is not defined; `problems`
+    has all reasons.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("; ".join(problem.told(lambda place: f"{place:g}") for problem in self.problems))
+        super().__init__(
+            "; ".join(problem.told(lambda place: f"{place:g}") for problem in self.problems)
+        )

@@ -1,4 +1,6 @@
-"""Points of an error curve from a CSV file: an abscissa, or the nominal profile of a part, and an error."""
+"""Points of an error curve from a CSV file: an abscissa, or the nominal profile of a part, and an
+error.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,23 @@ from typing import Literal
 import numpy as np
 
 from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
-from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, exact_number, metres_or_radians
+from ..inputs.quantities import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    QuantityError,
+    exact_number,
+    metres_or_radians,
+)
 from ..inputs.settings import hint, listing, shorten
-from ..inputs.tables import MOST_ROWS, _cells, refuse_columns, refuse_separators, table_lines, wrong_count, wrong_number
+from ..inputs.tables import (
+    MOST_ROWS,
+    _cells,
+    refuse_columns,
+    refuse_separators,
+    table_lines,
+    wrong_count,
+    wrong_number,
+)
 from ..inputs.yamltree import Mark
 from .space import Array
 
@@ -46,8 +62,9 @@ class Column:
 class Points:
     """Points in the order of the file, in metres and radians.
 
-    `x` (m,) is not there where the abscissa is the arc length along the profile; `places` (m, 2), radius and axial
-    co-ordinate, are not there where the file has no profile, unit `normals` (m, 2) where it does not state them.
+    `x` (m,) is not there where the abscissa is the arc length along the profile; `places` (m, 2),
+    radius and axial co-ordinate, are not there where the file has no profile, unit `normals` (m, 2)
+    where it does not state them.
     """
 
     names: tuple[str, ...]
@@ -77,29 +94,39 @@ class Points:
 
 
 def read_points(path: Path, x: str | None = None, y: str | None = None) -> Points:
-    """Read points from a file whose first line names the columns, each with its unit, such as position_mm,error_um.
+    """Read points from a file whose first line names the columns, each with its unit, such as
+    position_mm,error_um.
 
-    `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc length along the profile
-    if the file has the columns nominal_x and nominal_z (or x and z), otherwise the first column with a unit; without
-    `y` the error is the only column left. `point` and `feature` are texts, `u` a standard uncertainty of the error,
-    `normal_x` and `normal_z`, without unit, the direction out of the material. Other columns are not read.
+    `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc length
+    along the profile if the file has the columns nominal_x and nominal_z (or x and z), otherwise
+    the first column with a unit; without `y` the error is the only column left. `point` and
+    `feature` are texts, `u` a standard uncertainty of the error, `normal_x` and `normal_z`, without
+    unit, the direction out of the material. Other columns are not read.
 
     :raises ExperimentError: everything that is wrong with the file at once.
     """
     file = str(path)
     if path.suffix.lower() in NO_TABLES:
-        text = f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV file that begins"
+        text = (
+            f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV"
+            " file that begins"
+        )
         raise ExperimentError([Message(file, 0, 0, "", f"{text} with a line such as {EXAMPLE}")])
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError([Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")])
+        raise ExperimentError(
+            [Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")]
+        )
     header = _Header(Mark(file, lines[0][0], 1), lines[0][1])
     x_column, y_column, profile = header.choose(x, y)
     wanted = [*([] if x_column is None else [x_column]), y_column, *profile]
     if UNCERTAINTY in header.columns:
         wanted.append(header.columns[UNCERTAINTY])
         if wanted[-1].kind != y_column.kind:
-            text = f"the uncertainty is an {wanted[-1].kind} and {y_column.name} a {y_column.kind}; correct the unit"
+            text = (
+                f"the uncertainty is an {wanted[-1].kind} and {y_column.name} a {y_column.kind};"
+                " correct the unit"
+            )
             raise ExperimentError([Message(file, lines[0][0], 1, "", text)])
     messages: list[Message] = []
     values: list[list[float]] = []
@@ -130,19 +157,31 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
             try:
                 normals.append(_direction([cells[header.texts[part]][1] for part in NORMALS]))
             except QuantityError as error:
-                messages.append(Mark(file, number, cells[header.texts[NORMALS[0]]][0]).message("", str(error)))
+                messages.append(
+                    Mark(file, number, cells[header.texts[NORMALS[0]]][0]).message("", str(error))
+                )
         name = cells[header.texts[POINT]][1] if POINT in header.texts else str(len(names) + 1)
         if name in seen:
-            messages.append(mark.message("", f'a second point "{shorten(name)}", as in line {seen[name]}; rename one'))
+            messages.append(
+                mark.message(
+                    "", f'a second point "{shorten(name)}", as in line {seen[name]}; rename one'
+                )
+            )
         seen[name] = number
         names.append(name)
         features.append(cells[header.texts[FEATURE]][1] if FEATURE in header.texts else "")
     if len(messages) >= MOST_MESSAGES:
         messages.append(Message(file, lines[0][0], 1, "", ENOUGH))
     if len(lines) == 1:
-        messages.append(Message(file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"))
+        messages.append(
+            Message(
+                file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"
+            )
+        )
     if len(values) > MOST_POINTS or len(lines) > MOST_ROWS:
-        messages.append(Message(file, lines[0][0], 1, "", f"more than {MOST_POINTS} points; leave some out"))
+        messages.append(
+            Message(file, lines[0][0], 1, "", f"more than {MOST_POINTS} points; leave some out")
+        )
     if messages:
         raise ExperimentError(messages)
     table = np.array(values)
@@ -168,7 +207,9 @@ def _direction(cells: Sequence[str]) -> list[float]:
     parts = [float(exact_number(cell)) for cell in cells]
     length = math.hypot(*parts)
     if not 0 < length < math.inf:
-        raise QuantityError(f'"{cells[0]}" and "{cells[1]}" are no direction; give its parts, such as 0.6 and 0.8')
+        raise QuantityError(
+            f'"{cells[0]}" and "{cells[1]}" are no direction; give its parts, such as 0.6 and 0.8'
+        )
     return [part / length for part in parts]
 
 
@@ -186,13 +227,18 @@ def choose_points(points: Points, text: str, file: str) -> list[int]:
         if part in by_name:
             found.add(by_name[part])
         elif span and numbers and (int(span[1]) < min(numbers) or int(span[2]) > max(numbers)):
-            text = f'"{shorten(part)}" goes beyond the points, {min(numbers)} to {max(numbers)}; leave those out'
+            text = (
+                f'"{shorten(part)}" goes beyond the points, {min(numbers)} to {max(numbers)}; leave'
+                " those out"
+            )
             messages.append(Message(file, 0, 0, "", text))
         elif span and any(int(span[1]) <= number <= int(span[2]) for number in numbers):
             found |= {k for number, k in numbers.items() if int(span[1]) <= number <= int(span[2])}
         else:
             what = "no points" if span else "no point"
-            messages.append(Message(file, 0, 0, "", f'{what} "{shorten(part)}"; {hint(part, points.names)}'))
+            messages.append(
+                Message(file, 0, 0, "", f'{what} "{shorten(part)}"; {hint(part, points.names)}')
+            )
     if messages:
         raise ExperimentError(messages)
     return sorted(found)
@@ -219,7 +265,9 @@ class _Header:
             units: Mapping[str, Fraction] = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
             if name in self.columns or cell in self.texts:
                 place = Mark(mark.file, mark.line, column)
-                messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one of them'))
+                messages.append(
+                    place.message("", f'a second column "{shorten(cell)}"; remove one of them')
+                )
             elif cell in (POINT, FEATURE, *NORMALS):
                 self.texts[cell] = k
             elif name and unit in units:
@@ -227,7 +275,9 @@ class _Header:
                 self.factors[name], self._index[name] = units[unit], k
         self.has_normals = all(part in self.texts for part in NORMALS)
         if any(part in self.texts for part in NORMALS) and not self.has_normals:
-            messages.append(mark.message("", "a normal has two parts; add the other of normal_x and normal_z"))
+            messages.append(
+                mark.message("", "a normal has two parts; add the other of normal_x and normal_z")
+            )
         if messages:
             raise ExperimentError(messages)
 
@@ -235,14 +285,22 @@ class _Header:
         """Where a column stands."""
         return self._index[column.name]
 
-    def choose(self, x: str | None, y: str | None) -> tuple[Column | None, Column, tuple[Column, ...]]:
-        """The abscissa, None for the arc length, the error, and the profile's two columns where there are."""
+    def choose(
+        self, x: str | None, y: str | None
+    ) -> tuple[Column | None, Column, tuple[Column, ...]]:
+        """The abscissa, None for the arc length, the error, and the profile's two columns where
+        there are.
+        """
         profile: tuple[Column, ...] = ()
         for names in PROFILES:
             if all(name in self.columns and self.columns[name].kind == "length" for name in names):
                 profile = tuple(self.columns[name] for name in names)
                 break
-        left = [column for column in self.columns.values() if column not in profile and column.name != UNCERTAINTY]
+        left = [
+            column
+            for column in self.columns.values()
+            if column not in profile and column.name != UNCERTAINTY
+        ]
         messages: list[Message] = []
         x_column = None
         if x is not None and not (x == ARC_LENGTH and ARC_LENGTH not in self.columns):
@@ -259,19 +317,32 @@ class _Header:
         elif len(left) == 1:
             y_column = left[0]
         elif left:
-            text = f"several columns may be the error: {listing(c.name for c in left)}; choose one with --y"
+            text = (
+                f"several columns may be the error: {listing(c.name for c in left)}; choose one"
+                " with --y"
+            )
             messages.append(self.mark.message("", text))
         else:
             text = f"no column is left for the error; its name needs a unit, as in {EXAMPLE}"
             messages.append(self.mark.message("", text))
         if not profile and x_column is None and not messages:
             assert y_column is not None
-            bare = [name for name in self.order if name not in self.texts and name.rpartition("_")[0] != y_column.name]
-            lack = f"; {listing(bare)} has no unit, and columns without are not read" if bare else ""
+            bare = [
+                name
+                for name in self.order
+                if name not in self.texts and name.rpartition("_")[0] != y_column.name
+            ]
+            lack = (
+                f"; {listing(bare)} has no unit, and columns without are not read" if bare else ""
+            )
             text = f"there is no abscissa beside the error{lack}; write for example {EXAMPLE}"
             messages.append(self.mark.message("", text))
         if x_column is not None and x_column is y_column:
-            messages.append(self.mark.message("", f"{x_column.name} is chosen for x and for y; choose another for one"))
+            messages.append(
+                self.mark.message(
+                    "", f"{x_column.name} is chosen for x and for y; choose another for one"
+                )
+            )
         if messages:
             raise ExperimentError(messages)
         assert y_column is not None
@@ -281,8 +352,15 @@ class _Header:
         plain = name if name in self.columns else name.rpartition("_")[0]
         if plain not in self.columns:
             known = hint(name, self.columns)
-            unit = f'the column "{shorten(name)}" has no unit of length or angle; add it, as in {shorten(name)}_um'
-            text = unit if name in self.order else f'no column "{shorten(name)}" for --{option}; {known}'
+            unit = (
+                f'the column "{shorten(name)}" has no unit of length or angle; add it, as in'
+                f" {shorten(name)}_um"
+            )
+            text = (
+                unit
+                if name in self.order
+                else f'no column "{shorten(name)}" for --{option}; {known}'
+            )
             messages.append(self.mark.message("", text))
             return None
         return self.columns[plain]

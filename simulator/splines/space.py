@@ -1,4 +1,5 @@
-"""Splines of one order over breakpoints, in B-splines: their values, their derivatives from either side, their pieces.
+"""Splines of one order over breakpoints, in B-splines: their values, their derivatives from either
+side, their pieces.
 
 The abscissa is scaled to [0, 1] inside, so that neither its unit nor its origin costs digits.
 """
@@ -22,10 +23,11 @@ Side = Literal["above", "below"]
 
 @dataclass(frozen=True)
 class SplineSpace:
-    """Splines of an `order` (degree plus one) from `lower` to `upper` with interior `knots` in ascending order.
+    """Splines of an `order` (degree plus one) from `lower` to `upper` with interior `knots` in
+    ascending order.
 
-    A knot that stands m times leaves order - 1 - m derivatives continuous, the value counted as one of none: twice for
-    cubic splines leaves value and slope. Abscissae are in metres or radians.
+    A knot that stands m times leaves order - 1 - m derivatives continuous, the value counted as one
+    of none: twice for cubic splines leaves value and slope. Abscissae are in metres or radians.
 
     >>> SplineSpace(4, 0.0, 2.0, (0.5, 1.0, 1.0)).count
     7
@@ -41,7 +43,11 @@ class SplineSpace:
         if self.order < 2:
             found.append(Problem("a spline's order is 2 (broken lines) at least"))
         if not self.lower < self.upper:
-            found.append(Problem("the curve ends at {0}, not above its start at {1}", (self.upper, self.lower)))
+            found.append(
+                Problem(
+                    "the curve ends at {0}, not above its start at {1}", (self.upper, self.lower)
+                )
+            )
         outside = [knot for knot in self.knots if not self.lower < knot < self.upper]
         for knot in dict.fromkeys(outside):
             found.append(
@@ -53,7 +59,11 @@ class SplineSpace:
         for knot, times in Counter(self.knots).items():
             if times >= self.order:
                 found.append(
-                    Problem(f"the knot at {{0}} stands {times} times; give it {self.order - 1} times at most", (knot,))
+                    Problem(
+                        f"the knot at {{0}} stands {times} times; give it {self.order - 1} times at"
+                        " most",
+                        (knot,),
+                    )
                 )
         if list(self.knots) != sorted(self.knots):
             found.append(Problem("the knots are out of order; give them in ascending order"))
@@ -86,7 +96,9 @@ class SplineSpace:
 
     @cached_property
     def pieces(self) -> Array:
-        """Taylor coefficients (pieces, order, count) of each B-spline about the start of each piece, in x scaled."""
+        """Taylor coefficients (pieces, order, count) of each B-spline about the start of each
+        piece, in x scaled.
+        """
         start = (self.breaks[:-1] - self.lower) / self.length
         found = np.empty((len(start), self.order, self.count))
         factorial = 1.0
@@ -96,7 +108,8 @@ class SplineSpace:
         return found
 
     def rows(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
-        """The B-splines' values or derivatives at x (m,), as (m, count), per metre or radian to the power `derivative`.
+        """The B-splines' values or derivatives at x (m,), as (m, count), per metre or radian to the
+        power `derivative`.
 
         :raises SplineError: an x beyond the ends, where there is no curve.
         """
@@ -105,7 +118,8 @@ class SplineSpace:
         if len(outside):
             raise SplineError(
                 Problem(
-                    "{0} is outside the curve, from {1} to {2}; it is not extrapolated", (u, self.lower, self.upper)
+                    "{0} is outside the curve, from {1} to {2}; it is not extrapolated",
+                    (u, self.lower, self.upper),
                 )
                 for u in outside.tolist()
             )

@@ -21,7 +21,9 @@ def test_a_scale_that_reads_too_short_is_to_read_more(k: int, sign: float) -> No
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("k", "guideway", "other"), [(3, 1, 0), (4, 2, 0), (5, 2, 1)])
-def test_a_guideway_is_turned_back_to_square(k: int, guideway: int, other: int, sign: float) -> None:
+def test_a_guideway_is_turned_back_to_square(
+    k: int, guideway: int, other: int, sign: float
+) -> None:
     values = sign * 1e-4 * np.eye(6)[k]
     one = adjustments(values, np.eye(6))[k]
     axes = MODEL.axes(values)

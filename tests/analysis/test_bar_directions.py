@@ -14,35 +14,51 @@ from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 
 FOLDER = Path("designs/hurt_foss")
-NO_LENGTH = "no length is known (bar: length): the overall scale of the machine stays open until one is calibrated"
+NO_LENGTH = (
+    "no length is known (bar: length): the overall scale of the machine stays open until one is"
+    " calibrated"
+)
 SHIPPED = {
     ("bar-bell", "length known"): (),
     ("bar-bell", "length unknown"): (NO_LENGTH,),
     ("bar-bell", "flat"): (
-        "every bar lies parallel to the xy plane: nothing tells the scale of Z nor its squareness to X and Y; add for "
-        "example a bar along z, one in the xz plane at 45 deg and one in the yz plane at 45 deg",
+        (
+            "every bar lies parallel to the xy plane: nothing tells the scale of Z nor its"
+            " squareness to X and Y; add for example a bar along z, one in the xz plane at 45 deg"
+            " and one in the yz plane at 45 deg"
+        ),
     ),
     ("bar-bell", "one axis"): (
-        "every bar lies along x: nothing tells the scales of Y and Z nor the squareness of Y to X, Z to X and Z to Y; "
-        "add for example a bar along y, one along z, one in the xy plane at 45 deg, one in the xz plane at 45 deg and "
-        "one in the yz plane at 45 deg",
+        (
+            "every bar lies along x: nothing tells the scales of Y and Z nor the squareness of Y to"
+            " X, Z to X and Z to Y; add for example a bar along y, one along z, one in the xy plane"
+            " at 45 deg, one in the xz plane at 45 deg and one in the yz plane at 45 deg"
+        ),
     ),
     ("bar-bell", "axes only"): (
-        "the bars' directions are too few or too much alike: nothing tells the squareness of Y to X, Z to X and Z to "
-        "Y; add for example a bar in the xy plane at 45 deg, one in the xz plane at 45 deg and one in the yz plane at "
-        "45 deg",
+        (
+            "the bars' directions are too few or too much alike: nothing tells the squareness of Y"
+            " to X, Z to X and Z to Y; add for example a bar in the xy plane at 45 deg, one in the"
+            " xz plane at 45 deg and one in the yz plane at 45 deg"
+        ),
     ),
     ("bryan-gauge", "radius known"): (),
     ("bryan-gauge", "radius unknown"): (NO_LENGTH.replace("bar: length", "gauge: radius"),),
     ("bryan-gauge", "two pivots"): (),
     ("bryan-gauge", "one height"): (
-        "every place of the ball lies in a plane parallel to the xy plane: nothing tells the scale of Z nor its "
-        "squareness to X and Y nor a combination of the scale of X and the scale of Y; read the ball for example all "
-        "round at elevations of 60 and 45 deg as well",
+        (
+            "every place of the ball lies in a plane parallel to the xy plane: nothing tells the"
+            " scale of Z nor its squareness to X and Y nor a combination of the scale of X and the"
+            " scale of Y; read the ball for example all round at elevations of 60 and 45 deg as"
+            " well"
+        ),
     ),
     ("bryan-gauge", "one plane"): (
-        "every place of the ball lies in a plane parallel to the xz plane: nothing tells the scale of Y nor its "
-        "squareness to X and Z; read the ball for example all round at elevations of 60 and 30 deg as well",
+        (
+            "every place of the ball lies in a plane parallel to the xz plane: nothing tells the"
+            " scale of Y nor its squareness to X and Z; read the ball for example all round at"
+            " elevations of 60 and 30 deg as well"
+        ),
     ),
 }
 
@@ -60,7 +76,9 @@ def test_shipped_designs(file: str, variant: str) -> None:
     assert experiment.expected_rank_deficiency == verdict.deficiency
 
 
-def with_bars(tmp_path: Path, directions: list[tuple[float, float]], **sections: object) -> Experiment:
+def with_bars(
+    tmp_path: Path, directions: list[tuple[float, float]], **sections: object
+) -> Experiment:
     """The shipped machine with bars at azimuths and elevations in degrees."""
     content = yaml.safe_load((FOLDER / "bar-bell.yaml").read_text(encoding="utf-8"))
     del content["variants"]
@@ -68,7 +86,10 @@ def with_bars(tmp_path: Path, directions: list[tuple[float, float]], **sections:
     content["positions"] = [
         {
             "name": str(k),
-            "pose": {"origin": ["0 m", "0 m", "0 m"], "rotation": ["0 deg", f"{-up} deg", f"{round_} deg"]},
+            "pose": {
+                "origin": ["0 m", "0 m", "0 m"],
+                "rotation": ["0 deg", f"{-up} deg", f"{round_} deg"],
+            },
         }
         for k, (round_, up) in enumerate(directions)
     ]
@@ -87,17 +108,20 @@ def reason(tmp_path: Path, directions: list[tuple[float, float]], **sections: ob
 def test_bars_on_a_cone(tmp_path: Path) -> None:
     """At the same angle to an axis: then the squares of direction cosines are not independent."""
     told = reason(tmp_path, [(20.0 * k, 30.0) for k in range(12)])
-    assert told == (
-        "every bar is at 60 deg to z: nothing tells a combination of the scale of X, the scale of Y and the scale of Z"
-        "; add for example a bar along x"
+    assert (
+        told
+        == "every bar is at 60 deg to z: nothing tells a combination of the scale of X, the scale"
+        " of Y and the scale of Z; add for example a bar along x"
     )
 
 
 def test_bars_in_two_planes(tmp_path: Path) -> None:
-    told = reason(tmp_path, [(90.0 * side, up) for side in (0, 1) for up in (0, 30, 60, 90, 120, 150)])
+    told = reason(
+        tmp_path, [(90.0 * side, up) for side in (0, 1) for up in (0, 30, 60, 90, 120, 150)]
+    )
     assert told in {
-        f"every bar lies parallel to the {one} plane or the {other} plane: nothing tells the squareness of Y to X; "
-        "add for example a bar in the xy plane at 45 deg"
+        f"every bar lies parallel to the {one} plane or the {other} plane: nothing tells the"
+        " squareness of Y to X; add for example a bar in the xy plane at 45 deg"
         for one, other in (("xz", "yz"), ("yz", "xz"))
     }
 
@@ -110,24 +134,32 @@ def test_a_gauge_in_two_planes(tmp_path: Path) -> None:
     (tmp_path / "gauge.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     (told,) = check(load(tmp_path / "gauge.yaml")[0]).verdict.reasons
     assert told.startswith("every direction of the bar lies parallel to the ")
-    assert ": nothing tells the squareness of Y to X; read the ball for example all round at an elevation of" in told
+    assert (
+        ": nothing tells the squareness of Y to X; read the ball for example all round at an"
+        " elevation of" in told
+    )
 
 
 def test_bars_in_an_oblique_plane(tmp_path: Path) -> None:
     told = reason(tmp_path, [(45.0, up) for up in (0, 30, 60, 90, 120, 150)])
     assert told.startswith(
-        "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing tells 3 combinations"
+        "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing tells 3"
+        " combinations"
     )
 
 
 def test_a_common_angle_without_a_known_length_leaves_two_open(tmp_path: Path) -> None:
-    verdict = check(with_bars(tmp_path, [(20.0 * k, 30.0) for k in range(12)], calibration=[])).verdict
+    verdict = check(
+        with_bars(tmp_path, [(20.0 * k, 30.0) for k in range(12)], calibration=[])
+    ).verdict
     assert verdict.deficiency == 2 and verdict.reasons[0] == NO_LENGTH
     assert verdict.reasons[1].startswith("every bar is at 60 deg to z")
 
 
 def test_other_models_are_told_the_same(tmp_path: Path) -> None:
-    """Of the many errors that bars in a plane leave to a kinematic machine, the reason for scales and squareness."""
+    """Of the many errors that bars in a plane leave to a kinematic machine, the reason for scales
+    and squareness.
+    """
     directions = [(30.0 * k, 0.0) for k in range(6)]
     model = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}
     told = reason(tmp_path, directions, error_model=model, true_machine={"kind": "zero"})
@@ -135,15 +167,23 @@ def test_other_models_are_told_the_same(tmp_path: Path) -> None:
 
 
 def test_planes_and_axes_are_told_without_a_length_or_without_scales(tmp_path: Path) -> None:
-    upright = check(with_bars(tmp_path, [(0.0, 30.0 * k) for k in range(6)], calibration=[])).verdict
+    upright = check(
+        with_bars(tmp_path, [(0.0, 30.0 * k) for k in range(6)], calibration=[])
+    ).verdict
     assert upright.deficiency == 4 and upright.reasons[0] == NO_LENGTH
     assert upright.reasons[1].startswith(
-        "every bar lies parallel to the xz plane: nothing tells the scale of Y nor its squareness to X and Z; add for"
+        "every bar lies parallel to the xz plane: nothing tells the scale of Y nor its squareness"
+        " to X and Z; add for"
     )
-    squareness = {"error_model": {"kind": "metric", "scale": "none"}, "true_machine": {"kind": "zero"}}
-    assert reason(tmp_path, [(30.0 * k, 0.0) for k in range(6)], **squareness) == (
-        "every bar lies parallel to the xy plane: nothing tells the squareness of Z to X and Z to Y; add for example a "
-        "bar in the xz plane at 45 deg and one in the yz plane at 45 deg"
+    squareness = {
+        "error_model": {"kind": "metric", "scale": "none"},
+        "true_machine": {"kind": "zero"},
+    }
+    assert (
+        reason(tmp_path, [(30.0 * k, 0.0) for k in range(6)], **squareness)
+        == "every bar lies parallel to the xy plane: nothing tells the squareness of Z to X and Z"
+        " to Y; add for example a bar in the xz plane at 45 deg and one in the yz plane at"
+        " 45 deg"
     )
 
 
@@ -168,11 +208,18 @@ UPRIGHT = [(0.0, 30.0 * k) for k in range(6)]
         [(45.0, 30.0 * k) for k in range(6)],
     ],
 )
-def test_the_bars_that_are_proposed_cure(tmp_path: Path, given: list[tuple[float, float]], calibration: str) -> None:
+def test_the_bars_that_are_proposed_cure(
+    tmp_path: Path, given: list[tuple[float, float]], calibration: str
+) -> None:
     sections: dict[str, object] = {"calibration": []} if calibration == "none" else {}
     before = check(with_bars(tmp_path, given, **sections)).verdict
     left = 0 if calibration == "given" else 1
-    proposed = before.reasons[-1].split("; add for example a bar ")[1].replace(" and one ", ", one ").split(", one ")
+    proposed = (
+        before.reasons[-1]
+        .split("; add for example a bar ")[1]
+        .replace(" and one ", ", one ")
+        .split(", one ")
+    )
     assert len(proposed) == before.deficiency - left
     after = check(with_bars(tmp_path, given + [BARS[one] for one in proposed], **sections)).verdict
     assert after.deficiency == left and not any("nothing tells" in one for one in after.reasons)
@@ -185,7 +232,14 @@ def test_the_bars_that_are_proposed_cure(tmp_path: Path, given: list[tuple[float
 @pytest.mark.parametrize("calibrated", [True, False])
 @pytest.mark.parametrize(
     "given",
-    ["one height", "two heights", "one plane", "half a plane and upright", "height and upright", "three places"],
+    [
+        "one height",
+        "two heights",
+        "one plane",
+        "half a plane and upright",
+        "height and upright",
+        "three places",
+    ],
 )
 def test_the_places_that_are_proposed_cure(tmp_path: Path, given: str, calibrated: bool) -> None:
     around = [30 * k for k in range(12)]
@@ -203,17 +257,25 @@ def test_the_places_that_are_proposed_cure(tmp_path: Path, given: str, calibrate
         content["calibration"] = []
 
     def verdict_of(places: list[tuple[int, int]]) -> Verdict:
-        content["artefacts"]["gauge"]["directions"] = [[f"{a} deg", f"{up} deg"] for a, up in places]
+        content["artefacts"]["gauge"]["directions"] = [
+            [f"{a} deg", f"{up} deg"] for a, up in places
+        ]
         (tmp_path / "gauge.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
         return check(load(tmp_path / "gauge.yaml")[0]).verdict
 
     told, _, cure = verdict_of(places).reasons[-1].partition("; read the ball for example ")
-    assert ("too few" in told) == (given in {"two heights", "height and upright", "three places"}), told
+    assert ("too few" in told) == (
+        given in {"two heights", "height and upright", "three places"}
+    ), told
     more = []
     for part in cure.removesuffix(" deg as well").split(" and at several"):
         numbers = [int(number) for number in re.findall("[0-9]+", part)]
         ring = "all round" in part
-        more += [(a + 1, up) if ring else (up, a) for up in numbers for a in (around if ring else (16, 46, 74))]
+        more += [
+            (a + 1, up) if ring else (up, a)
+            for up in numbers
+            for a in (around if ring else (16, 46, 74))
+        ]
     assert more and verdict_of(places + more).deficiency == (not calibrated)
 
 
@@ -225,7 +287,10 @@ def test_nothing_is_said_where_plates_tell_what_bars_do_not(tmp_path: Path) -> N
             "plate": {"kind": "grid", "balls": [3, 3], "size": ["400 mm", "400 mm"]},
         },
         "positions": [
-            *({"name": f"bar {k}", "artefact": "bar", "pose": {"origin": 3 * ["0 m"]}} for k in range(2)),
+            *(
+                {"name": f"bar {k}", "artefact": "bar", "pose": {"origin": 3 * ["0 m"]}}
+                for k in range(2)
+            ),
             *(
                 {
                     "name": f"{plane} plane",
@@ -238,7 +303,12 @@ def test_nothing_is_said_where_plates_tell_what_bars_do_not(tmp_path: Path) -> N
             ),
         ],
         "calibration": [
-            {"kind": "distances", "artefact": "bar", "pairs": "all", "standard_uncertainty": "1 um"},
+            {
+                "kind": "distances",
+                "artefact": "bar",
+                "pairs": "all",
+                "standard_uncertainty": "1 um",
+            },
             {"kind": "coordinates", "artefact": "plate", "standard_uncertainty": "1 um"},
         ],
     }
@@ -255,8 +325,13 @@ def test_the_overall_scale_with_an_unknown_length_is_what_the_plan_leaves_open()
     found = predict(unknown)
     (direction,) = found.verdict.null
     assert [part.name for part in direction.functions] == ["scale x", "scale y", "scale z"]
-    np.testing.assert_allclose([part.peak for part in direction.functions], direction.functions[0].peak, rtol=1e-9)
+    np.testing.assert_allclose(
+        [part.peak for part in direction.functions], direction.functions[0].peak, rtol=1e-9
+    )
     (radius,) = direction.lengths
     assert radius.name == "gauge: radius"
     assert radius.change / 0.3 == pytest.approx(direction.functions[0].peak, rel=1e-9)
-    assert found.quantities["U3 ratios"].undetermined == 3 and found.quantities["U3 angles"].undetermined == 0
+    assert (
+        found.quantities["U3 ratios"].undetermined == 3
+        and found.quantities["U3 angles"].undetermined == 0
+    )

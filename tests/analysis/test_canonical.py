@@ -1,4 +1,6 @@
-"""Directions are described by the space that they span, not by the basis that rounding gives of it."""
+"""Directions are described by the space that they span, not by the basis that rounding gives of
+it.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,9 @@ def test_any_basis_of_what_is_open_gives_the_same_words(file: str, variant: str,
     shared += NOISE * noise.standard_normal(shared.shape)
     balls = at.ball_null @ mix
     balls += NOISE * np.abs(balls).max(initial=0.0) * noise.standard_normal(balls.shape)
-    directions = np.concatenate([found.directions[:, : found.rank], shared * found.scale[:, None]], axis=1)
+    directions = np.concatenate(
+        [found.directions[:, : found.rank], shared * found.scale[:, None]], axis=1
+    )
     other = replace(at, spectrum=replace(found, directions=directions))
     vars(other)["balls"] = replace(at.balls, null=balls)
     told = [str(one) for one in null_directions(at)]
@@ -65,7 +69,9 @@ def test_any_basis_of_what_is_open_gives_the_same_words(file: str, variant: str,
 
 @given(seed=st.integers(0, 2**32 - 1), target=st.sampled_from([2e-8, 4e-8]))
 @settings(max_examples=4, deadline=None)
-def test_any_basis_of_equally_weak_directions_gives_the_same_words(seed: int, target: float) -> None:
+def test_any_basis_of_equally_weak_directions_gives_the_same_words(
+    seed: int, target: float
+) -> None:
     at = judged("npl/6.1.1.yaml", "A")
     found = at.spectrum
     # Neighbours in threes are made equal, and then mixed.

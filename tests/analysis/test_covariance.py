@@ -1,4 +1,6 @@
-"""Covariances of what a fit gives: against dense algebra, finite differences, and the scatter of many fits."""
+"""Covariances of what a fit gives: against dense algebra, finite differences, and the scatter of
+many fits.
+"""
 
 from __future__ import annotations
 
@@ -40,16 +42,26 @@ BAR = "  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n"
 
 
 def small(text: str) -> str:
-    for old, new in (("balls: [5, 5]", "balls: [3, 3]"), ("n_coefficients: 5", "n_coefficients: 3")):
+    for old, new in (
+        ("balls: [5, 5]", "balls: [3, 3]"),
+        ("n_coefficients: 5", "n_coefficients: 3"),
+    ):
         text = text.replace(old, new)
     text = text.replace("cal_coefficients: 5", "cal_coefficients: 3")
     return text.replace("  probe: down\n", "  probe: down\n" + TASKS)
 
 
 def offsets_and_lengths(folder: Path) -> Design:
-    """Unknown and uncertain offsets, a sphere, a certified bar, one whose length is not known, and two tasks."""
-    text = with_bar(small(SPHERE)).replace("artefacts:\n", "artefacts:\n" + BAR.replace("bar:", "other:"))
-    place = "{name: other, artefact: other, pose: {origin: [300 mm, 500 mm, 400 mm]}, probes: [left, back]}"
+    """Unknown and uncertain offsets, a sphere, a certified bar, one whose length is not known, and
+    two tasks.
+    """
+    text = with_bar(small(SPHERE)).replace(
+        "artefacts:\n", "artefacts:\n" + BAR.replace("bar:", "other:")
+    )
+    place = (
+        "{name: other, artefact: other, pose: {origin: [300 mm, 500 mm, 400 mm]}, probes: [left,"
+        " back]}"
+    )
     text = text.replace("positions:\n", f"positions:\n  - {place}\n")
     return design_of(folder, text)
 
@@ -61,7 +73,9 @@ def design_of(folder: Path, text: str, variant: str | None = None) -> Design:
 
 
 def assert_same(found: Real, expected: Real, tolerance: float) -> None:
-    """Two covariances, each entry to a part of the standard uncertainties; NaN at the same places."""
+    """Two covariances, each entry to a part of the standard uncertainties; NaN at the same
+    places.
+    """
     np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
     size = np.sqrt(np.nan_to_num(np.diag(expected)))
     off = np.nan_to_num(np.abs(found - expected))
@@ -119,21 +133,35 @@ def test_covariances_are_those_of_the_dense_reference(
     assert_same(corrected.covariance, of_points, 1e-6)
     for k, block in enumerate(corrected.blocks):
         assert_same(block, of_points[3 * k : 3 * k + 3, 3 * k : 3 * k + 3], 1e-6)
-    np.testing.assert_allclose(corrected.standard_uncertainties.ravel() ** 2, np.diag(of_points), rtol=1e-6)
+    np.testing.assert_allclose(
+        corrected.standard_uncertainties.ravel() ** 2, np.diag(of_points), rtol=1e-6
+    )
 
 
 def by_differences(at: Linearisation) -> tuple[Real, Real]:
-    """Derivatives of functions (m, s + balls) and of all residuals by all parameters, by central differences."""
+    """Derivatives of functions (m, s + balls) and of all residuals by all parameters, by central
+    differences.
+    """
     design, layout = at.design, at.layout
     _, x = exact_readings(
-        replace(design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))), at.state
+        replace(
+            design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))
+        ),
+        at.state,
     )
     count, d = len(layout), design.dimension
 
     def at_step(step: Real) -> State:
         balls = np.zeros(design.balls.shape)
         balls[design.plate_balls] = step[count:].reshape(-1, d)
-        columns = (layout.pose_columns, step[:count], balls, layout.model, layout.offset_columns, layout.lengths)
+        columns = (
+            layout.pose_columns,
+            step[:count],
+            balls,
+            layout.model,
+            layout.offset_columns,
+            layout.lengths,
+        )
         return moved(design, at.state, *columns)
 
     def values(step: Real) -> Real:
@@ -145,7 +173,8 @@ def by_differences(at: Linearisation) -> tuple[Real, Real]:
     sizes = np.append(np.minimum(layout.scale, 1.0), np.ones(d * len(design.plate_balls))) * 1e-4
     steps = list(zip(np.diag(sizes), sizes, strict=True))
     of_values, of_residuals = (
-        np.stack([(function(s) - function(-s)) / (2 * h) for s, h in steps], axis=1) for function in (values, residuals)
+        np.stack([(function(s) - function(-s)) / (2 * h) for s, h in steps], axis=1)
+        for function in (values, residuals)
     )
     return of_values, of_residuals
 
@@ -173,13 +202,17 @@ def test_offsets_and_unknown_lengths_are_as_by_differences(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("variant", "deficiency"), [("any angles", 0), ("half a turn", 2)])
-def test_two_dimensions_are_as_by_differences(tmp_path: Path, variant: str, deficiency: int) -> None:
+def test_two_dimensions_are_as_by_differences(
+    tmp_path: Path, variant: str, deficiency: int
+) -> None:
     text = Path("designs/hocken_borchardt/angles.yaml").read_text("utf-8")
     assert_as_by_differences(design_of(tmp_path, text, variant), deficiency)
 
 
 def assert_scatter(design: Design, asked: tuple[str, ...], trials: int) -> None:
-    """Fits with noisy readings and certificates scatter about the truth as the covariance of one of them says."""
+    """Fits with noisy readings and certificates scatter about the truth as the covariance of one of
+    them says.
+    """
     generator, limit = np.random.default_rng(2), 5.0
     nominal, probes = nominal_state(design), np.full(2, design.point_probe)
     truth = replace(nominal, a=2e-6 * generator.standard_normal(len(nominal.a)))
@@ -208,24 +241,33 @@ def assert_scatter(design: Design, asked: tuple[str, ...], trials: int) -> None:
         sample, spread = errors.T @ errors / trials, np.sqrt(np.diag(covariance))
         standard_error = np.sqrt((np.outer(spread**2, spread**2) + covariance**2) / trials)
         assert (np.abs(sample - covariance) < limit * standard_error).all()
-        # Together: squares of whitened errors follow a chi-squared distribution; what follows from others is left out.
+        # Together: squares of whitened errors follow a chi-squared distribution; what follows from
+        # others is left out.
         size, vectors = np.linalg.eigh(covariance / np.outer(spread, spread))
         kept = size > 1e-9
         whitened = (errors / spread) @ vectors[:, kept] / np.sqrt(size[kept])
         count = int(kept.sum())
-        assert np.mean((whitened**2).sum(axis=1)) == pytest.approx(count, abs=limit * np.sqrt(2.0 * count / trials))
+        assert np.mean((whitened**2).sum(axis=1)) == pytest.approx(
+            count, abs=limit * np.sqrt(2.0 * count / trials)
+        )
 
 
 def test_many_fits_in_two_dimensions_scatter_as_the_covariance_says(tmp_path: Path) -> None:
     text = Path("designs/hocken_borchardt/angles.yaml").read_text("utf-8")
     points = "evaluation: {points: [[100 mm, 200 mm], [800 mm, 700 mm]]}\n"
-    assert_scatter(design_of(tmp_path, text + points, "any angles"), ("machine", "rotation", "r4c4: x", "r2c3: y"), 300)
+    assert_scatter(
+        design_of(tmp_path, text + points, "any angles"),
+        ("machine", "rotation", "r4c4: x", "r2c3: y"),
+        300,
+    )
 
 
 @pytest.mark.long
 def test_many_fits_with_offsets_and_lengths_scatter_as_the_covariance_says(tmp_path: Path) -> None:
     design = offsets_and_lengths(tmp_path)
-    assert_scatter(design, ("machine", "offset", "length", "task", "plate/r3c3: x", "plate/r3c3: z"), 300)
+    assert_scatter(
+        design, ("machine", "offset", "length", "task", "plate/r3c3: x", "plate/r3c3: z"), 300
+    )
 
 
 @pytest.fixture(scope="module")
@@ -264,7 +306,9 @@ def test_corrected_points_have_the_errors_of_the_estimated_machine(fitted: Fit) 
     probes = np.full(5, fitted.design.point_probe)
     offsets = fitted.design.probes[probes]
     np.testing.assert_allclose(
-        found.points, points + fitted.design.model.error(points, fitted.solution.state.a, offsets), rtol=1e-15
+        found.points,
+        points + fitted.design.model.error(points, fitted.solution.state.a, offsets),
+        rtol=1e-15,
     )
     assert found.standard_uncertainties.max() <= fitted.quantities["U4"].maximum * (1.0 + 1e-9)
     names = [fitted.design.probe_names[k] for k in probes]
@@ -284,13 +328,19 @@ def test_corrected_points_have_the_errors_of_the_estimated_machine(fitted: Fit) 
         (lambda fit: fit.correlation("r9c9: x"), 'no estimate "r9c9: x"'),
         (lambda fit: fit.correct([0.1, 0.2, 0.3]), r"points of shape \(3,\); expected \(n, 3\)"),
         (lambda fit: fit.correct([[0.1, 0.2]]), r"points of shape \(1, 2\)"),
-        (lambda fit: fit.correct([[0.1, 0.2, 0.3]], "dwon"), 'no probe "dwon"; did you mean "down"'),
+        (
+            lambda fit: fit.correct([[0.1, 0.2, 0.3]], "dwon"),
+            'no probe "dwon"; did you mean "down"',
+        ),
         (lambda fit: fit.correct([[0.1, 0.2, 0.3]], ["down", "left"]), "2 probes for 1 points"),
         (
             lambda fit: fit.correct([[0.1, 0.2, 0.3], [0.1, 200.0, 300.0]]),
             r"y = 200 m of points\[1\] is far outside the volume; give points in metres",
         ),
-        (lambda fit: fit.correct([[-1.001, 0.2, 0.3]]), r"x = -1.001 m of points\[0\] is far outside the volume"),
+        (
+            lambda fit: fit.correct([[-1.001, 0.2, 0.3]]),
+            r"x = -1.001 m of points\[0\] is far outside the volume",
+        ),
     ],
 )
 def test_messages(fitted: Fit, call: Callable[[Fit], object], told: str) -> None:

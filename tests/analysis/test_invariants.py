@@ -1,4 +1,6 @@
-"""What must hold of uncertainties whatever the design: frames, order, scale, more readings, and repeated estimates."""
+"""What must hold of uncertainties whatever the design: frames, order, scale, more readings, and
+repeated estimates.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def small_design(seed: int = 0, calibration: str = "sides") -> Design:
     return replace(design, points=np.random.default_rng(seed).random((12, 3)))
 
 
-def judged(design: Design, sigma: float = 1.0) -> tuple[dict[str, Quantity], Linearisation, SharedLayout]:
+def judged(
+    design: Design, sigma: float = 1.0
+) -> tuple[dict[str, Quantity], Linearisation, SharedLayout]:
     at = linearise(design)
     return uncertainties(at, sigma), at, at.layout
 
@@ -94,7 +98,9 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
             origins=design.origins[position_order],
             held=design.held[position_order],
             position_names=tuple(design.position_names[i] for i in position_order),
-            readings=replace(readings, ball=new_ball[readings.ball], position=new_position[readings.position]),
+            readings=replace(
+                readings, ball=new_ball[readings.ball], position=new_position[readings.position]
+            ),
             distances=replace(
                 design.distances,
                 first=new_ball[design.distances.second],
@@ -115,7 +121,9 @@ def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
         design,
         repeatability=factor * design.repeatability,
         distances=replace(design.distances, uncertainty=factor * design.distances.uncertainty),
-        coordinates=replace(design.coordinates, uncertainty=factor * design.coordinates.uncertainty),
+        coordinates=replace(
+            design.coordinates, uncertainty=factor * design.coordinates.uncertainty
+        ),
     )
     by_statement, _, _ = judged(scaled)
     by_estimate, _, _ = judged(design, factor)
@@ -150,12 +158,17 @@ def test_an_added_reading_never_raises_a_variance(seed: int, calibration: str) -
 
 @pytest.mark.parametrize("calibration", ["sides", "coordinates"])
 def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration: str) -> None:
-    """Sixty complete non-linear estimates of a machine with errors; chi-squared of all parameters together."""
+    """Sixty complete non-linear estimates of a machine with errors; chi-squared of all parameters
+    together.
+    """
     design = small_design(2, calibration)
     generator = np.random.default_rng(11)
     drawn = nominal_state(design)
     truth = State(
-        drawn.balls, drawn.rotations, drawn.origins, 1e-5 * generator.standard_normal(len(design.model.parameters))
+        drawn.balls,
+        drawn.rotations,
+        drawn.origins,
+        1e-5 * generator.standard_normal(len(design.model.parameters)),
     )
     _, spread, layout = judged(design)
     trials = 60
@@ -170,12 +183,14 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         model.append(solution.state.a - truth.a)
         freedom = observed.observations - observed.parameter_count
         ratio.append(solution.factor.sum_of_squares / freedom)
-    # Mean square over all trials, relative to the variance; its spread for normal variables is sqrt(2 / trials).
+    # Mean square over all trials, relative to the variance; its spread for normal variables is
+    # sqrt(2 / trials).
     of_model = spread.of_shared(np.eye(len(layout))[layout.model])
     for found, stated in ((np.array(model), of_model), (np.array(balls), spread.of_balls())):
         squared = (found**2).mean(axis=0) / stated**2
         assert np.all(np.abs(squared - 1) < 5 * np.sqrt(2 / trials))
-        # Parameters are correlated, so that their mean cannot be expected to be closer than a single one's error.
+        # Parameters are correlated, so that their mean cannot be expected to be closer than a
+        # single one's error.
         assert abs(squared.mean() - 1) < 3 * np.sqrt(2 / trials)
         bias = found.mean(axis=0) / stated * np.sqrt(trials)
         assert np.abs(bias).max() < 5
@@ -211,9 +226,16 @@ def test_share_of_distances_within_the_target() -> None:
         pair = replace(design, points=design.points[[i, j]])
         length = float(np.linalg.norm(design.points[i] - design.points[j]))
         values.append((uncertainties(replace(at, design=pair))["U6"].maximum, length))
-    cases = ((2e-7, 0.0, 1.0, 1.0), (1e-7, 2e-7, 1.0, 1.0), (1e-7, 2e-7, 1.7, 1.0), (3e-7, 4e-7, 1.2, 2.0))
+    cases = (
+        (2e-7, 0.0, 1.0, 1.0),
+        (1e-7, 2e-7, 1.0, 1.0),
+        (1e-7, 2e-7, 1.7, 1.0),
+        (3e-7, 4e-7, 1.2, 2.0),
+    )
     for constant, slope, sigma, k in cases:
         target = Target(LengthFunction(constant, slope), k)
         found = uncertainties(at, sigma, target)["U6"].within_target
-        assert found == np.mean([k * sigma * u <= constant + slope * length for u, length in values])
+        assert found == np.mean(
+            [k * sigma * u <= constant + slope * length for u, length in values]
+        )
         assert found is not None and 0 < found < 1

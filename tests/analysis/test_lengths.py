@@ -48,9 +48,13 @@ def experiment_of(folder: Path, text: str = TEXT) -> Experiment:
 @pytest.fixture
 def experiment(tmp_path: Path) -> Experiment:
     """The points of a grid are listed in the file."""
-    points = [[500.0 * i, 1000.0 * j, 500.0 * k] for i in range(3) for j in range(2) for k in range(3)]
+    points = [
+        [500.0 * i, 1000.0 * j, 500.0 * k] for i in range(3) for j in range(2) for k in range(3)
+    ]
     listed = ", ".join(f"[{x} mm, {y} mm, {z} mm]" for x, y, z in points)
-    text = TEXT.replace("{random: 200, seed: 1}", f"[{listed}]").replace("0.5 um + L/1000000", "0.1 um + L/10000000")
+    text = TEXT.replace("{random: 200, seed: 1}", f"[{listed}]").replace(
+        "0.5 um + L/1000000", "0.1 um + L/10000000"
+    )
     return experiment_of(tmp_path, text)
 
 
@@ -61,7 +65,9 @@ def settings(**changes: object) -> Settings:
 def test_the_whole_is_what_run_tells_of_the_same_points(experiment: Experiment) -> None:
     expected = predict(experiment).quantities["U6"]
     found = length_map(experiment, settings()).whole
-    np.testing.assert_array_equal(grid_points(lay_out(experiment), GRID), experiment.evaluation.points)
+    np.testing.assert_array_equal(
+        grid_points(lay_out(experiment), GRID), experiment.evaluation.points
+    )
     assert found.count[0] == expected.count == 153
     assert found.maximum[0] == pytest.approx(expected.maximum, rel=1e-12)
     assert found.average[0] == pytest.approx(expected.average, rel=1e-12)
@@ -71,7 +77,9 @@ def test_the_whole_is_what_run_tells_of_the_same_points(experiment: Experiment) 
 def all_pairs(experiment: Experiment, **changes: object) -> np.ndarray:
     """First and second point, length, uncertainty of every pair, sorted."""
     _, tiles = length_pairs(experiment, settings(**changes))
-    rows = [np.column_stack([t.first, t.second, t.lengths, t.uncertainties, t.is_open]) for t in tiles]
+    rows = [
+        np.column_stack([t.first, t.second, t.lengths, t.uncertainties, t.is_open]) for t in tiles
+    ]
     found = np.concatenate(rows)
     return found[np.lexsort([found[:, 1], found[:, 0]])]
 
@@ -91,7 +99,9 @@ def test_every_length_against_a_dense_computation(experiment: Experiment) -> Non
 def test_the_scatter_of_readings_is_that_along_the_length(tmp_path: Path) -> None:
     text = TEXT.replace("repeatability: 0.2 um", "repeatability: [0.2 um, 0.3 um, 0.6 um]")
     experiment = experiment_of(tmp_path, text)
-    with_it, without = (all_pairs(experiment, with_repeatability=one)[:, 3] for one in (True, False))
+    with_it, without = (
+        all_pairs(experiment, with_repeatability=one)[:, 3] for one in (True, False)
+    )
     points = grid_points(lay_out(experiment), GRID)
     for row, (i, j) in enumerate(combinations(range(18), 2)):
         direction = (points[j] - points[i]) / np.linalg.norm(points[j] - points[i])
@@ -106,7 +116,12 @@ def check_group(groups: Groups, k: int, u: np.ndarray, ratio: np.ndarray, covera
     assert groups.within[k] == (ratio[known] <= 1).sum()
     assert groups.within_expanded[k] == (coverage * ratio[known] <= 1).sum()
     if known.any():
-        figures = (groups.average[k], groups.maximum[k], groups.average_ratio[k], groups.maximum_ratio[k])
+        figures = (
+            groups.average[k],
+            groups.maximum[k],
+            groups.average_ratio[k],
+            groups.maximum_ratio[k],
+        )
         expected = (u[known].mean(), u[known].max(), ratio[known].mean(), ratio[known].max())
         np.testing.assert_allclose(figures, expected, rtol=1e-12)
     else:
@@ -158,26 +173,46 @@ def test_classes() -> None:
     assert class_edges(1.7320508)[[1, -1]].tolist() == [0.1, 1.8]
     assert class_edges(2.0)[[1, -1]].tolist() == [0.1, 2.0]
     assert class_edges(7.3)[[1, -1]].tolist() == [0.5, 7.5]
-    apart = np.array([[0.0, 0.2, 0.0], [0.4, 0.0, -0.4], [0.5, 0.5, 0.0], [-0.2, 0.2, 0.2], [0.1, 0.2, 0.2]])
+    apart = np.array(
+        [[0.0, 0.2, 0.0], [0.4, 0.0, -0.4], [0.5, 0.5, 0.0], [-0.2, 0.2, 0.2], [0.1, 0.2, 0.2]]
+    )
     names = [direction_names(3)[k] for k in direction_classes(apart)]
-    assert names == ["along y", "face diagonals xz", "face diagonals xy", "body diagonals", "other directions"]
-    names = [direction_names(2)[k] for k in direction_classes(np.array([[0.1, 0], [0.1, -0.1], [0.1, 0.2]]))]
+    assert names == [
+        "along y",
+        "face diagonals xz",
+        "face diagonals xy",
+        "body diagonals",
+        "other directions",
+    ]
+    names = [
+        direction_names(2)[k]
+        for k in direction_classes(np.array([[0.1, 0], [0.1, -0.1], [0.1, 0.2]]))
+    ]
     assert names == ["along x", "diagonals", "other directions"]
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     experiment_of(tmp_path)
-    file, points, pairs = (str(tmp_path / name) for name in ("design.yaml", "points.csv", "pairs.csv"))
+    file, points, pairs = (
+        str(tmp_path / name) for name in ("design.yaml", "points.csv", "pairs.csv")
+    )
     limits = ["--target", "0.1 um + L/10000000", "--grid", "3,2,3", "--coverage-factor", "1.5"]
     assert main(["lengths", file, *limits, "--csv", points, "--pairs", pairs]) == 0
     out, err = capsys.readouterr()
     assert err == "" and "153 lengths between 18 points of a grid, with the probe down" in out
-    assert "met by the standard uncertainty u of" in out and "by the expanded uncertainty 1.5 u of" in out
+    assert (
+        "met by the standard uncertainty u of" in out
+        and "by the expanded uncertainty 1.5 u of" in out
+    )
     found = length_map(load(file)[0], settings(coverage_factor=1.5))
     with open(points, encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    np.testing.assert_allclose([float(row["u_average_um"]) for row in rows], 1e6 * found.by_point.average, rtol=1e-9)
-    np.testing.assert_allclose([float(row["share_within"]) for row in rows], found.by_point.share(), rtol=1e-9)
+    np.testing.assert_allclose(
+        [float(row["u_average_um"]) for row in rows], 1e6 * found.by_point.average, rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        [float(row["share_within"]) for row in rows], found.by_point.share(), rtol=1e-9
+    )
     with open(pairs, encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 153
@@ -190,17 +225,23 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert data["all"]["maximum"] == found.whole.maximum[0]
 
 
-def test_a_deficient_design_is_told_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_deficient_design_is_told_and_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     experiment_of(tmp_path, TEXT.replace("position_coefficients: 4", "position_coefficients: 6"))
     file = str(tmp_path / "design.yaml")
     assert main(["lengths", file, "--grid", "3"]) == 1
     out = capsys.readouterr().out
     assert (
-        "rank deficiency 3; " in out and "changes none of these lengths; those of another --grid it may change" in out
+        "rank deficiency 3; " in out
+        and "changes none of these lengths; those of another --grid it may change" in out
     )
     assert main(["lengths", file, "--grid", "4"]) == 1
     out = capsys.readouterr().out
-    assert "rank deficiency " in out and "lengths are undetermined and meet no target, such as (" in out
+    assert (
+        "rank deficiency " in out
+        and "lengths are undetermined and meet no target, such as (" in out
+    )
 
 
 def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -209,9 +250,15 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     for options, told in (
         ([], "the file states no target_accuracy"),
         (["--target", "3"], '--target: "3" has no unit'),
-        (["--target", "1 um", "--grid", "3,3"], "--grid has 2 numbers, but the experiment has 3 dimensions"),
+        (
+            ["--target", "1 um", "--grid", "3,3"],
+            "--grid has 2 numbers, but the experiment has 3 dimensions",
+        ),
         (["--target", "1 um", "--grid", "20"], "a grid of 8000 points is too fine"),
-        (["--target", "1 um", "--grid", "11", "--pairs", "p.csv"], "885115 lengths are too many for --pairs"),
+        (
+            ["--target", "1 um", "--grid", "11", "--pairs", "p.csv"],
+            "885115 lengths are too many for --pairs",
+        ),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),
         (["--target", "1 um", "--csv", file], "which is read; name another"),
     ):
@@ -224,6 +271,9 @@ def test_the_picture(tmp_path: Path, grid: str) -> None:
     pytest.importorskip("matplotlib")
     experiment_of(tmp_path)
     picture = tmp_path / "lengths.svg"
-    assert main(["lengths", str(tmp_path / "design.yaml"), "--grid", grid, "--plot", str(picture)]) == 0
+    assert (
+        main(["lengths", str(tmp_path / "design.yaml"), "--grid", grid, "--plot", str(picture)])
+        == 0
+    )
     text = picture.read_text(encoding="utf-8")
     assert "u within it for 100 % of the lengths" in text

@@ -1,4 +1,6 @@
-"""A quantity added as one entry in one file, U7, the body diagonals of the volume: every command then has it."""
+"""A quantity added as one entry in one file, U7, the body diagonals of the volume: every command
+then has it.
+"""
 
 from __future__ import annotations
 
@@ -132,14 +134,20 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict
 
 
 def diagonals() -> np.ndarray:
-    """Standard uncertainties of the four lengths between opposite corrected corners, by the dense reference."""
+    """Standard uncertainties of the four lengths between opposite corrected corners, by the dense
+    reference.
+    """
     design = lay_out(quickstart())
     problem = dense.planned(design, 5, 5)
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (design.upper - design.lower)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (
+        design.upper - design.lower
+    )
     offsets = np.tile(design.probes[design.point_probe], (8, 1))
 
     def lengths(step: dense.Values) -> dense.Values:
-        places = dense.corrected(problem, design.lower + corners, dense.unpack(problem, step)[3], offsets)
+        places = dense.corrected(
+            problem, design.lower + corners, dense.unpack(problem, step)[3], offsets
+        )
         return dense.length(places[:4] - places[:3:-1])
 
     return dense.linearised(problem).of(dense.jacobian(lengths, problem.parameters))
@@ -194,7 +202,9 @@ def test_sweeps_reports_and_the_schema_have_it(both: tuple[dict[str, Any], dict[
     assert "U7 maximum" in added["report"]
 
 
-def test_nothing_of_it_is_left_once_the_entry_is_gone(both: tuple[dict[str, Any], dict[str, Any]]) -> None:
+def test_nothing_of_it_is_left_once_the_entry_is_gone(
+    both: tuple[dict[str, Any], dict[str, Any]],
+) -> None:
     added, removed = both
     assert "U7" in json.dumps(added)
     assert "U7" not in json.dumps({name: text for name, text in removed.items() if name != "reach"})

@@ -1,4 +1,6 @@
-"""Co-ordinates in a plate's own axes: against a dense computation, by simulation, and from several frames."""
+"""Co-ordinates in a plate's own axes: against a dense computation, by simulation, and from several
+frames.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ from numpy.typing import NDArray
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")
 DISTANCES = [{"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.3 um"}]
-COORDINATES = [{"kind": "coordinates", "balls": ["r1c2", "r3c1", "r4c4"], "standard_uncertainty": "0.5 um"}]
+COORDINATES = [
+    {"kind": "coordinates", "balls": ["r1c2", "r3c1", "r4c4"], "standard_uncertainty": "0.5 um"}
+]
 
 
 def experiment(tmp_path: Path, variant: str = "three positions", **changes: object) -> Experiment:
@@ -41,13 +45,17 @@ def experiment(tmp_path: Path, variant: str = "three positions", **changes: obje
 def observed(drawn: Experiment, seed: int) -> ObservedReadings:
     design = lay_out(drawn)
     corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
-    on_truth, truth = on_true_machine(design, true_machine(drawn.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(drawn.true_machine, design.model, *corners)
+    )
     readings, x = noisy_readings(on_truth, truth, np.random.default_rng(seed))
     return ObservedReadings(replace(design, readings=readings), x, (), ())
 
 
 def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -> Array:
-    """Standard uncertainties (n, 2) by complex steps and one pseudo-inverse, written down from the definitions."""
+    """Standard uncertainties (n, 2) by complex steps and one pseudo-inverse, written down from the
+    definitions.
+    """
     state, held = found.solution.state, design.held
     n = len(design.balls)
     start = np.concatenate([state.balls.ravel(), np.zeros((~held).sum()), state.a])
@@ -62,7 +70,9 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
         c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
         turns = np.array([[c, -s], [s, c]]).transpose(2, 0, 1) @ state.rotations
         r = design.readings
-        true = (turns[r.position] @ balls[r.ball][:, :, None])[:, :, 0] + (state.origins + poses[:, :2])[r.position]
+        true = (turns[r.position] @ balls[r.ball][:, :, None])[:, :, 0] + (
+            state.origins + poses[:, :2]
+        )[r.position]
         corrected = x @ np.array([[1.0 / (1.0 + gamma), 0.0], [alpha / (1.0 + gamma), 1.0]])
         d, k = design.distances, design.coordinates
         between = balls[d.first] - balls[d.second]
@@ -80,7 +90,9 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
         along = along / np.sqrt((along**2).sum())
         if axes.axis == 1:
             along = np.array([along[1], -along[0]])
-        return np.stack([moved @ along, moved[:, 1] * along[0] - moved[:, 0] * along[1]], axis=1).ravel()
+        return np.stack(
+            [moved @ along, moved[:, 1] * along[0] - moved[:, 0] * along[1]], axis=1
+        ).ravel()
 
     steps = start + 1e-30j * np.eye(len(start))
     jacobian = np.stack([residuals(p).imag / 1e-30 for p in steps], axis=1)
@@ -89,7 +101,9 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
     size = np.sqrt((jacobian**2).sum(axis=0))
     root = (function / size) @ np.linalg.pinv(jacobian / size, rcond=1e-10)
     assert np.linalg.matrix_rank(jacobian / size, tol=1e-9) == len(start)
-    np.testing.assert_allclose(wanted(start + 0j).real.reshape(n, 2), found.plates[0].coordinates, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        wanted(start + 0j).real.reshape(n, 2), found.plates[0].coordinates, rtol=0, atol=1e-15
+    )
     return np.asarray(found.sigma * np.sqrt((root**2).sum(axis=1)).reshape(n, 2))
 
 
@@ -98,7 +112,9 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
 def test_uncertainties_are_those_of_a_dense_computation(
     tmp_path: Path, calibration: list[object], axes: dict[str, str]
 ) -> None:
-    artefacts = {"plate": {"kind": "grid", "balls": [4, 4], "size": ["360 mm", "300 mm"], "axes": axes}}
+    artefacts = {
+        "plate": {"kind": "grid", "balls": [4, 4], "size": ["360 mm", "300 mm"], "axes": axes}
+    }
     drawn = experiment(tmp_path, artefacts=artefacts, calibration=calibration)
     seen = observed(drawn, 5)
     found = fit(drawn, seen)
@@ -127,7 +143,8 @@ def test_uncertainties_are_the_scatter_of_simulated_fits(tmp_path: Path) -> None
     stated = plate_coordinates(drawn, at)[0].standard_uncertainties
     free = stated > 0
     ratio = np.std(errors, axis=0)[free] / stated[free]
-    # The standard error of such a ratio is 1 / sqrt(2 trials), 3.5 %; of the mean of those of 29 related ones, less.
+    # The standard error of such a ratio is 1 / sqrt(2 trials), 3.5 %; of the mean of those of 29
+    # related ones, less.
     assert np.abs(ratio - 1.0).max() < 4 / np.sqrt(2 * trials)
     assert abs(ratio.mean() - 1.0) < 0.03
     assert np.abs(np.mean(errors, axis=0)[free] / stated[free]).max() < 4 / np.sqrt(trials)
@@ -136,17 +153,23 @@ def test_uncertainties_are_the_scatter_of_simulated_fits(tmp_path: Path) -> None
 
 
 def test_axes_do_not_depend_on_the_frame_of_the_estimate(tmp_path: Path) -> None:
-    """Whichever position is held, and in which order balls are listed, the co-ordinates are the same."""
+    """Whichever position is held, and in which order balls are listed, the co-ordinates are the
+    same.
+    """
     drawn = experiment(tmp_path)
     turned = experiment(tmp_path, positions=yaml.safe_load(ANGLES.read_text())["positions"][2::-1])
     seen = observed(drawn, 3)
     swapped = replace(seen.design.readings, position=2 - seen.design.readings.position)
-    there = fit(turned, ObservedReadings(replace(lay_out(turned), readings=swapped), seen.x, (), ()))
+    there = fit(
+        turned, ObservedReadings(replace(lay_out(turned), readings=swapped), seen.x, (), ())
+    )
     here = fit(drawn, seen)
     assert np.abs(here.solution.state.balls - there.solution.state.balls).max() > 1e-7
     one, other = here.plates[0], there.plates[0]
     np.testing.assert_allclose(one.coordinates, other.coordinates, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(one.standard_uncertainties, other.standard_uncertainties, rtol=1e-5, atol=1e-18)
+    np.testing.assert_allclose(
+        one.standard_uncertainties, other.standard_uncertainties, rtol=1e-5, atol=1e-18
+    )
 
 
 def test_what_is_undetermined_has_no_value(tmp_path: Path) -> None:
@@ -154,8 +177,11 @@ def test_what_is_undetermined_has_no_value(tmp_path: Path) -> None:
     found = fit(drawn, observed(drawn, 1))
     assert found.converged and found.verdict.deficiency == 2 and found.verdict.as_expected
     plate = found.plates[0]
-    # The plate may stretch along x and shear: lengths along x are open, and the heights of the first row are zero.
+    # The plate may stretch along x and shear: lengths along x are open, and the heights of the
+    # first row are zero.
     assert np.isnan(plate.coordinates[:, 0]).sum() == 15 and plate.coordinates[0, 0] == 0.0
     assert np.isfinite(plate.coordinates[:4, 1]).all()
-    np.testing.assert_array_equal(np.isnan(plate.coordinates), np.isnan(plate.standard_uncertainties))
+    np.testing.assert_array_equal(
+        np.isnan(plate.coordinates), np.isnan(plate.standard_uncertainties)
+    )
     assert all(np.isnan(e.value) for e in found.estimates if e.name in ("alpha", "gamma"))

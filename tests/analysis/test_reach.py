@@ -1,4 +1,6 @@
-"""Reverse planning against closed forms, an independent root finder and plans of files written by hand."""
+"""Reverse planning against closed forms, an independent root finder and plans of files written by
+hand.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,10 @@ TEXT = (
     .replace("balls: [5, 5]", "balls: [4, 4]")
     .replace("random: 200", "random: 12")
 )
-SIDES = "pairs: corner sides            # or corner diagonals, corners, neighbours, all, or a list of pairs of balls"
+SIDES = (
+    "pairs: corner sides            # or corner diagonals, corners, neighbours, all, or a list of"
+    " pairs of balls"
+)
 CERTIFICATE = "standard_uncertainty: 0.2 um   # or one that grows with length: 0.1 um + L/1000000"
 TEXT = TEXT.replace(TEXT[TEXT.index("true_machine:") : TEXT.index("# Offsets")], "")
 UNCALIBRATED = TEXT.replace(TEXT[TEXT.index("calibration:") : TEXT.index("# Where U4")], "")
@@ -56,13 +61,21 @@ def answer(folder: Path, goal: str | Goal, name: str, text: str = TEXT) -> Answe
 
 def test_steps_are_all_numbers_of_three_digits() -> None:
     values = [at_step(step) for step in range(-950, 950)]
-    assert values == sorted(set(values)) and all(len(value.as_tuple().digits) == 3 for value in values)
+    assert values == sorted(set(values)) and all(
+        len(value.as_tuple().digits) == 3 for value in values
+    )
     assert all(step_of(at_step(step)) == step for step in range(-2000, 2000, 7))
-    assert round_down(Decimal("0.21499")) == Decimal("0.214") and round_up(Decimal("0.2141")) == Decimal("0.215")
+    assert round_down(Decimal("0.21499")) == Decimal("0.214") and round_up(
+        Decimal("0.2141")
+    ) == Decimal("0.215")
 
 
-def test_without_certificate_uncertainties_are_proportional_to_the_repeatability(tmp_path: Path) -> None:
-    """The tips of the star probe alone give the length: U is 0.2 um times what the design makes of it."""
+def test_without_certificate_uncertainties_are_proportional_to_the_repeatability(
+    tmp_path: Path,
+) -> None:
+    """The tips of the star probe alone give the length: U is 0.2 um times what the design makes of
+    it.
+    """
     now = average(tmp_path, text=UNCALIBRATED)
     found = answer(tmp_path, "U6 average 0.123 um", "repeatability", UNCALIBRATED)
     assert found.status == "found" and found.value is not None
@@ -73,7 +86,9 @@ def test_without_certificate_uncertainties_are_proportional_to_the_repeatability
 
 
 @pytest.mark.parametrize("limit", [0.05e-6, 0.021e-6])
-def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(tmp_path: Path, limit: float) -> None:
+def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(
+    tmp_path: Path, limit: float
+) -> None:
     now = average(tmp_path, text=UNCALIBRATED)
     found = answer(tmp_path, Goal("quantity", limit=limit), "repeats", UNCALIBRATED)
     assert found.value == math.ceil((now / limit) ** 2)
@@ -81,11 +96,16 @@ def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(tmp
 
 
 def test_the_certificate_is_where_an_independent_root_finder_has_it(tmp_path: Path) -> None:
-    loose, tight = (average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {u} um")) for u in ("50", "0.0001"))
+    loose, tight = (
+        average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {u} um")) for u in ("50", "0.0001")
+    )
     limit = 0.5 * (loose + tight)
 
     def excess(log_of_um: float) -> float:
-        return average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {math.exp(log_of_um):.15g} um")) - limit
+        return (
+            average(tmp_path, (CERTIFICATE, f"standard_uncertainty: {math.exp(log_of_um):.15g} um"))
+            - limit
+        )
 
     root = 1e-6 * math.exp(brentq(excess, math.log(1e-4), math.log(50.0), rtol=1e-8))
     found = answer(tmp_path, Goal("quantity", limit=limit), "certificate")
@@ -98,7 +118,9 @@ def test_where_no_certificate_does_the_limit_is_that_of_an_exact_one(tmp_path: P
     limit = average(tmp_path, (CERTIFICATE, "standard_uncertainty: 0.00001 um"))
     found = answer(tmp_path, Goal("quantity", limit=0.99 * limit), "certificate")
     assert found.status == "none" and f"average U6 {1e6 * limit:.4g}" in found.outcome
-    assert found.remarks == ("an exact one would not be better: with ten times that it is the same",)
+    assert found.remarks == (
+        "an exact one would not be better: with ten times that it is the same",
+    )
     found = answer(tmp_path, Goal("quantity", limit=1.0), "certificate")
     assert found.status == "any"
 
@@ -111,17 +133,30 @@ def test_the_size_is_the_smallest_that_does(tmp_path: Path) -> None:
     for size, does in ((edge, True), (edge - 1, False)):
         value = average(tmp_path, ("[750 mm, 750 mm]", f"[{size} mm, {size} mm]"))
         assert (value <= 1.2 * present) is does
-    assert found.remarks[0].startswith("from 752 mm x 752 mm on the file is wrong: positions[1]: reading ball")
+    assert found.remarks[0].startswith(
+        "from 752 mm x 752 mm on the file is wrong: positions[1]: reading ball"
+    )
 
 
 @pytest.mark.parametrize("drawn", [(4, 4), (4, 3), (3, 5)])
-def test_balls_are_the_fewest_of_all_grids_nearly_in_proportion(tmp_path: Path, drawn: tuple[int, int]) -> None:
-    """Against plans of every grid with no more balls that is in proportion to within a ball on one of its sides."""
+def test_balls_are_the_fewest_of_all_grids_nearly_in_proportion(
+    tmp_path: Path, drawn: tuple[int, int]
+) -> None:
+    """Against plans of every grid with no more balls that is in proportion to within a ball on one
+    of its sides.
+    """
     text = TEXT.replace("[4, 4]", f"[{drawn[0]}, {drawn[1]}]")
     ratio = drawn[0] / drawn[1]
     sides = range(2, 9)
-    near = [(n, m) for n in sides for m in sides if abs(n - m * ratio) <= 1.0 or abs(m - n / ratio) <= 1.0]
-    values = {grid: average(tmp_path, (str(list(drawn)), str(list(grid))), text=text) for grid in near}
+    near = [
+        (n, m)
+        for n in sides
+        for m in sides
+        if abs(n - m * ratio) <= 1.0 or abs(m - n / ratio) <= 1.0
+    ]
+    values = {
+        grid: average(tmp_path, (str(list(drawn)), str(list(grid))), text=text) for grid in near
+    }
     wanted = {(4, 4): (6, 5), (4, 3): (7, 6), (3, 5): (4, 5)}[drawn]
     limit = 1.0001 * values[wanted]
     found = answer(tmp_path, Goal("quantity", limit=limit), "balls", text)
@@ -142,7 +177,9 @@ def test_sides_and_axes_keep_their_ratio_and_are_rounded_to_the_safe_side(tmp_pa
     found = {one.name: one for one in reach(load(file)[0], goal, names).answers}
     words = found["repeatability"].words.split(", ")
     first, third = (float(word.removesuffix(" um")) for word in (words[0], words[2]))
-    assert words[0] == words[1] and third == float(round_down(Decimal("1.5") * Decimal(repr(first))))
+    assert words[0] == words[1] and third == float(
+        round_down(Decimal("1.5") * Decimal(repr(first)))
+    )
     changes = ("[0.2 um, 0.2 um, 0.3 um]", f"[{found['repeatability'].words}]")
     assert average(tmp_path, changes, text=text) <= goal.limit
     columns, rows = map(int, found["balls"].words.split(" x "))
@@ -153,7 +190,11 @@ def test_sides_and_axes_keep_their_ratio_and_are_rounded_to_the_safe_side(tmp_pa
 
 def test_a_deficient_design_is_to_be_repaired_first(tmp_path: Path) -> None:
     text = TEXT.replace("coefficients: 4", "coefficients: 6")
-    result = reach(load(written(tmp_path, text))[0], Goal(), ("repeatability", "certificate", "repeats", "balls"))
+    result = reach(
+        load(written(tmp_path, text))[0],
+        Goal(),
+        ("repeatability", "certificate", "repeats", "balls"),
+    )
     assert result.deficiency > 0 and result.present.undetermined > 0
     by_name = {one.name: one for one in result.answers}
     for name in ("repeatability", "certificate", "repeats"):
@@ -166,7 +207,9 @@ def test_balls_that_are_named_set_limits_to_their_number(tmp_path: Path) -> None
     text = TEXT.replace(SIDES, "pairs: [[r1c1, r4c4], [r1c4, r4c1]]")
     found = answer(tmp_path, "U6 average 0.08 um", "balls", text)
     assert found.is_met and found.value > 4  # type: ignore[operator]
-    assert 'unknown ball "r' in found.remarks[0] and found.remarks[0].startswith("the file is wrong with 2 x 2, 3 x 2")
+    assert 'unknown ball "r' in found.remarks[0] and found.remarks[0].startswith(
+        "the file is wrong with 2 x 2, 3 x 2"
+    )
 
 
 def test_shares_and_tasks(tmp_path: Path) -> None:
@@ -180,7 +223,11 @@ def test_shares_and_tasks(tmp_path: Path) -> None:
     tasks = "  tasks: [{name: edge, from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}]\n\ntarget"
     with_task = TEXT.replace(*target).replace("\ntarget", tasks)
     found = answer(tmp_path, "tasks", "repeatability", with_task)
-    told = predict(load(written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}")))[0])
+    told = predict(
+        load(
+            written(tmp_path, with_task, ("repeatability: 0.2 um", f"repeatability: {found.words}"))
+        )[0]
+    )
     assert told.tasks[0].is_within and told.tasks[0].standard_uncertainty > 0.985 * 0.15e-6
 
 
@@ -220,22 +267,40 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main(["reach", file, "--by", "repeats", "--goal", "U6 average 0.09 um"]) == 0
     out, err = capsys.readouterr()
     assert err == "" and out.splitlines()[1] == "goal: average U6 at most 0.09 um"
-    assert any(line.startswith("repeats of every reading") and "at least " in line for line in out.splitlines())
-    assert main(["reach", file, "--by", "certificate", "--goal", "U6 average 0.01 um", "--json"]) == 1
+    assert any(
+        line.startswith("repeats of every reading") and "at least " in line
+        for line in out.splitlines()
+    )
+    assert (
+        main(["reach", file, "--by", "certificate", "--goal", "U6 average 0.01 um", "--json"]) == 1
+    )
     found = json.loads(capsys.readouterr().out)
     assert found["answers"]["certificate"]["status"] == "none" and found["is_met"] is False
     assert found["answers"]["certificate"]["needed"] is None and found["goal"]["limit"] == 1e-8
-    for wrong in (["--goal", "U9"], ["--target", "3"], ["--share", "95%", "--goal", "tasks"], ["--calibration", "1"]):
+    for wrong in (
+        ["--goal", "U9"],
+        ["--target", "3"],
+        ["--share", "95%", "--goal", "tasks"],
+        ["--calibration", "1"],
+    ):
         assert main(["reach", file, "--by", "certificate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("ballplate reach: ")
 
 
-def test_more_points_than_are_gone_through_for_each_value(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8").replace("random: 200", "random: 10001")
+def test_more_points_than_are_gone_through_for_each_value(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (
+        Path("designs/quickstart.yaml")
+        .read_text(encoding="utf-8")
+        .replace("random: 200", "random: 10001")
+    )
     path = tmp_path / "many.yaml"
     path.write_text(text, encoding="utf-8")
     assert main(["reach", str(path)]) == 3
-    assert capsys.readouterr().err == (
-        f"{path}: evaluation.points: 10001 points make 50005000 distances, which reach computes for every value that "
-        "it tries, some dozens, which takes too long; give at most 10000, better some hundred\n"
+    assert (
+        capsys.readouterr().err
+        == f"{path}: evaluation.points: 10001 points make 50005000 distances, which reach computes"
+        " for every value that it tries, some dozens, which takes too long; give at most 10000,"
+        " better some hundred\n"
     )

@@ -15,7 +15,12 @@ from ballplate.results.result import Result
 
 from tests.reference.tables import read_table
 
-PLACES = {"planes": ["z"], "levels": ["100 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}, "probes": ["down"]}
+PLACES = {
+    "planes": ["z"],
+    "levels": ["100 mm"],
+    "corners": {"x": ["50 mm"], "y": ["50 mm"]},
+    "probes": ["down"],
+}
 
 
 class Cells(HTMLParser):
@@ -44,14 +49,20 @@ class Cells(HTMLParser):
 
 def from_markdown(text: str) -> list[list[str]]:
     rows = [line for line in text.splitlines() if line.startswith("|")]
-    cells = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in rows if "---" not in line]
+    cells = [
+        [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        for line in rows
+        if "---" not in line
+    ]
     return [[re.sub(r"\\(.)", r"\1", cell) for cell in row] for row in cells]
 
 
 @pytest.fixture(scope="module")
 def results() -> list[Result]:
     experiment = bp.quickstart()
-    deficient = experiment.with_({f"positions[{name}]": None for name in ("x low", "x high", "y low")})
+    deficient = experiment.with_(
+        {f"positions[{name}]": None for name in ("x low", "x high", "y low")}
+    )
     return [
         bp.run(experiment),
         bp.run(deficient),
@@ -107,9 +118,17 @@ def test_without_rows_the_result_is_told_in_words() -> None:
     found = bp.check(bp.quickstart())
     assert not found.rows()
     for text in (found.to_markdown(), found.to_latex(), found.to_html()):
-        assert "full rank" in text and "|" not in text and "tabular" not in text and "<table" not in text
+        assert (
+            "full rank" in text
+            and "|" not in text
+            and "tabular" not in text
+            and "<table" not in text
+        )
 
 
 def test_names_mean_nothing_but_themselves() -> None:
     named = bp.quickstart().with_(title="a < b & c | d")
-    assert "a &lt; b &amp; c" in bp.run(named).to_html() and r"a \< b & c \| d" in bp.run(named).to_markdown()
+    assert (
+        "a &lt; b &amp; c" in bp.run(named).to_html()
+        and r"a \< b & c \| d" in bp.run(named).to_markdown()
+    )

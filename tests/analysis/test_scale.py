@@ -1,4 +1,6 @@
-"""What carries scale: against dense generalised least squares, and against what must hold of any design."""
+"""What carries scale: against dense generalised least squares, and against what must hold of any
+design.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ from ballplate.uncertainty.scale import (
 from tests.reference import dense
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
-SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace("balls: [5, 5]", "balls: [3, 3]")
+SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace(
+    "balls: [5, 5]", "balls: [3, 3]"
+)
 SMALL = SMALL.replace("random: 200", "random: 12")
 CERTIFICATE = SMALL[SMALL.index("calibration:") : SMALL.index("# Where U4")]
 
@@ -61,7 +65,9 @@ def without_certificate(text: str = SMALL) -> str:
 
 
 def dense_lengths(experiment: Experiment, offset_uncertainty: float) -> tuple[float, np.ndarray]:
-    """Scale and U6 of all pairs by generalised least squares: errors of the offsets are those of readings, together."""
+    """Scale and U6 of all pairs by generalised least squares: errors of the offsets are those of
+    readings, together.
+    """
     design = lay_out(experiment)
     problem = dense.planned(design, 3, 3)
     zero = np.zeros(problem.parameters)
@@ -80,7 +86,9 @@ def dense_lengths(experiment: Experiment, offset_uncertainty: float) -> tuple[fl
     weight = np.linalg.inv(np.linalg.cholesky(np.eye(len(common)) + common @ common.T))
     found = dense.spread(weight @ rows)
     assert found.deficiency == 0
-    points = dense.jacobian(dense.quantities(problem)["U4"], problem.parameters).reshape(-1, 3, problem.parameters)
+    points = dense.jacobian(dense.quantities(problem)["U4"], problem.parameters).reshape(
+        -1, 3, problem.parameters
+    )
     first, second = dense.pairs_of(len(design.points))
     apart = design.points[first] - design.points[second]
     by_length = np.einsum("md,mdp->mp", apart, points[first] - points[second])
@@ -96,7 +104,9 @@ def test_offsets_with_an_uncertainty_are_what_generalised_least_squares_makes_of
     for text in (SMALL, without_certificate()):
         experiment = experiment_of(tmp_path, text)
         scale, lengths = dense_lengths(experiment, uncertainty)
-        assert scale_uncertainty(with_offsets(experiment, uncertainty)) == pytest.approx(scale, rel=1e-6)
+        assert scale_uncertainty(with_offsets(experiment, uncertainty)) == pytest.approx(
+            scale, rel=1e-6
+        )
         found = lengths_with_offsets(experiment, uncertainty)
         assert found is not None
         assert found.total / found.count == pytest.approx(lengths.mean(), rel=1e-6)
@@ -113,7 +123,10 @@ def test_scale_is_the_mean_relative_change_of_distances(tmp_path: Path) -> None:
     offsets = np.broadcast_to(design.probes[design.point_probe], points.shape)
     moved = points + design.model.error(points, step, offsets)
     pairs = list(itertools.combinations(range(len(points)), 2))
-    changes = [np.linalg.norm(moved[i] - moved[j]) / np.linalg.norm(points[i] - points[j]) - 1 for i, j in pairs]
+    changes = [
+        np.linalg.norm(moved[i] - moved[j]) / np.linalg.norm(points[i] - points[j]) - 1
+        for i, j in pairs
+    ]
     weights = [np.sum((points[i] - points[j]) ** 2) for i, j in pairs]
     assert row[layout.model] @ step == pytest.approx(np.average(changes, weights=weights), rel=1e-3)
 
@@ -132,7 +145,9 @@ def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_p
     assert found.verdict.deficiency == 0 and found.scale is not None
     assert [one.words for one in found.scale.carriers] == [EXACT_OFFSETS]
     assert found.scale.rests_on_offsets and found.scale.loosened is not None
-    assert found.scale.loosened.before == pytest.approx(found.lengths.average if found.lengths else None)
+    assert found.scale.loosened.before == pytest.approx(
+        found.lengths.average if found.lengths else None
+    )
     # Offsets off by u make a relative error of about u over their distances, here 100 mm.
     assert found.scale.loosened.average > 5 * found.scale.loosened.before
 
@@ -154,7 +169,9 @@ def test_one_probe_leaves_nothing_but_the_certificate(tmp_path: Path) -> None:
     found = check(experiment_of(tmp_path, ONE_PROBE), with_scale=True)
     assert found.verdict.deficiency == 0 and found.scale is not None
     assert [one.words for one in found.scale.carriers] == ["certificates of plate"]
-    bare = ONE_PROBE[: ONE_PROBE.index("calibration:")] + ONE_PROBE[ONE_PROBE.index("evaluation:") :]
+    bare = (
+        ONE_PROBE[: ONE_PROBE.index("calibration:")] + ONE_PROBE[ONE_PROBE.index("evaluation:") :]
+    )
     open_ = check(experiment_of(tmp_path, bare), with_scale=True)
     assert open_.verdict.deficiency and open_.scale is None
 
@@ -169,7 +186,9 @@ def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
     found = check(experiment_of(tmp_path, stated), with_scale=True).scale
     assert found is not None and not found.rests_on_offsets
     assert [one.words for one in found.carriers] == ["probe offsets with a standard uncertainty"]
-    prior = stated + "\npriors:\n  - {parameter: EXX t^1, value: 0 um, standard_uncertainty: 0.1 um}\n"
+    prior = (
+        stated + "\npriors:\n  - {parameter: EXX t^1, value: 0 um, standard_uncertainty: 0.1 um}\n"
+    )
     both = check(experiment_of(tmp_path, prior), with_scale=True).scale
     assert both is not None and both.carriers[0].words == "priors"
     assert both.uncertainty < found.uncertainty
@@ -178,7 +197,9 @@ def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
 def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) -> None:
     known = []
     for scale, is_free in (("each", True), ("none", False)):
-        experiment = experiment_of(tmp_path, ONE_PROBE.replace("{kind: metric}", f"{{kind: metric, scale: {scale}}}"))
+        experiment = experiment_of(
+            tmp_path, ONE_PROBE.replace("{kind: metric}", f"{{kind: metric, scale: {scale}}}")
+        )
         design = lay_out(experiment)
         assert can_stretch(design, nominal_state(design)) is is_free
         found = check(experiment, with_scale=True)
@@ -193,9 +214,17 @@ def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) 
     assert known[1] < 0.5 * known[0]
 
 
-def test_a_model_that_can_stretch_in_part_has_certificates_and_its_own_scales(tmp_path: Path) -> None:
-    """Splines that are level at their ends cannot stretch evenly, though their scales are uncertain all the same."""
-    (experiment,) = [one for one in load(Path("designs/gilsinn/scales-in-two-parts.yaml")) if one.name == "level ends"]
+def test_a_model_that_can_stretch_in_part_has_certificates_and_its_own_scales(
+    tmp_path: Path,
+) -> None:
+    """Splines that are level at their ends cannot stretch evenly, though their scales are uncertain
+    all the same.
+    """
+    (experiment,) = [
+        one
+        for one in load(Path("designs/gilsinn/scales-in-two-parts.yaml"))
+        if one.name == "level ends"
+    ]
     found = check(experiment, with_scale=True).scale
     assert found is not None and found.uncertainty > 1e-8
     assert found.carriers[-1].words == OWN_SCALES
@@ -203,16 +232,25 @@ def test_a_model_that_can_stretch_in_part_has_certificates_and_its_own_scales(tm
         assert one.without is not None and one.without > found.uncertainty
 
 
-def test_a_certificate_is_suggested_and_does_what_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_certificate_is_suggested_and_does_what_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The file as suggested, with a micrometre stated for the offsets, has the U6 that was told."""
     experiment_of(tmp_path, without_certificate())
     file = tmp_path / "design.yaml"
     assert main(["check", str(file), "--suggest"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("warning: the scale rests on probe offsets that are held exact") for line in lines)
-    (edit,) = [line for line in lines if line.startswith("scale, in the file: add to calibration: ")]
+    assert any(
+        line.startswith("warning: the scale rests on probe offsets that are held exact")
+        for line in lines
+    )
+    (edit,) = [
+        line for line in lines if line.startswith("scale, in the file: add to calibration: ")
+    ]
     (told,) = [line for line in lines if line.startswith("scale: calibrate the distance ")]
-    text = file.read_text(encoding="utf-8") + f"\ncalibration:\n  - {edit.split('calibration: ')[1]}\n"
+    text = (
+        file.read_text(encoding="utf-8") + f"\ncalibration:\n  - {edit.split('calibration: ')[1]}\n"
+    )
     loose = with_offsets(experiment_of(tmp_path, text), 1e-6)
     average = predict(loose).quantities["U6"].average
     assert f"average U6 {1e6 * average:.4f} um with 1 um on the probe offsets" in told

@@ -1,4 +1,6 @@
-"""Targets for standard and for expanded uncertainties, goals of `check`, and what is told of weak directions."""
+"""Targets for standard and for expanded uncertainties, goals of `check`, and what is told of weak
+directions.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,12 @@ TASKS = """\
     - {name: short, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_accuracy: 0.3 um}
     - {name: long, from: [0 mm, 0 mm, 0 mm], to: [1 m, 1 m, 1 m]}
 """
-SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace("balls: [5, 5]", "balls: [3, 3]")
-SMALL = SMALL.replace("random: 200", "random: 30").replace("  probe: down\n", f"  probe: down\n  tasks:\n{TASKS}")
+SMALL = QUICKSTART.replace("coefficients: 5", "coefficients: 3").replace(
+    "balls: [5, 5]", "balls: [3, 3]"
+)
+SMALL = SMALL.replace("random: 200", "random: 30").replace(
+    "  probe: down\n", f"  probe: down\n  tasks:\n{TASKS}"
+)
 TARGET = "target_accuracy: 0.5 um + L/1000000"
 
 
@@ -67,14 +73,22 @@ def verdicts(experiment: Experiment) -> list[object]:
 @pytest.mark.parametrize("micrometres", [0.02, 0.1, 0.14, 0.2, 0.6])
 def test_a_target_for_2_u_is_half_of_it_for_u(tmp_path: Path, micrometres: float) -> None:
     halved = SMALL.replace("0.3 um", "0.15 um")
-    of_u = verdicts(experiment_of(tmp_path, with_target(f"{micrometres} um + L/20000000", 1.0, halved)))
-    expanded = verdicts(experiment_of(tmp_path, with_target(f"{2 * micrometres} um + L/10000000", 2.0)))
+    of_u = verdicts(
+        experiment_of(tmp_path, with_target(f"{micrometres} um + L/20000000", 1.0, halved))
+    )
+    expanded = verdicts(
+        experiment_of(tmp_path, with_target(f"{2 * micrometres} um + L/10000000", 2.0))
+    )
     assert of_u == pytest.approx(expanded)
     # What the same numbers would say of u alone is another matter.
-    assert expanded != verdicts(experiment_of(tmp_path, with_target(f"{2 * micrometres} um + L/10000000")))
+    assert expanded != verdicts(
+        experiment_of(tmp_path, with_target(f"{2 * micrometres} um + L/10000000"))
+    )
 
 
-def test_every_comparison_says_which_uncertainty_it_is_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_comparison_says_which_uncertainty_it_is_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for factor, words in ((1.0, "standard uncertainty u"), (2.0, "expanded uncertainty U = 2 u")):
         file = str(written(tmp_path, with_target("0.2 um", factor)))
         for command, expected in (
@@ -87,14 +101,18 @@ def test_every_comparison_says_which_uncertainty_it_is_of(tmp_path: Path, capsys
             assert factor == 1.0 or "standard uncertainty u)" not in told
 
 
-def test_run_and_reach_tell_the_same_share(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_and_reach_tell_the_same_share(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = str(written(tmp_path, with_target("0.11 um")))
     main(["run", file])
     ran = re.search(r"\(standard uncertainty u\): (\S+ %) of U6", capsys.readouterr().out)
     main(["reach", file, "--by", "repeats"])
     reached = re.search(r"as drawn: not met; (\S+ %) of lengths", capsys.readouterr().out)
     main(["check", file])
-    checked = re.search(r"\(standard uncertainty u\): (\S+ %) of 435 lengths", capsys.readouterr().out)
+    checked = re.search(
+        r"\(standard uncertainty u\): (\S+ %) of 435 lengths", capsys.readouterr().out
+    )
     assert ran and reached and checked and ran[1] == reached[1] == checked[1]
     share = predict(experiment_of(tmp_path, with_target("0.11 um"))).quantities["U6"].within_target
     assert share is not None and 0 < share < 1 and ran[1] == percent(share)
@@ -104,8 +122,25 @@ def test_run_and_reach_tell_the_same_share(tmp_path: Path, capsys: pytest.Captur
 def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = str(written(tmp_path, with_target("0.5 um")))
     average = predict(load(file)[0]).quantities["U6"].average
-    just, not_quite = f"U6 average {1e6 * average * 1.001} um", f"U6 average {1e6 * average * 0.999} um"
-    assert main(["check", file, "--goal", just, "--goal", "lengths", "--goal", "U2 angles maximum 1 urad"]) == 0
+    just, not_quite = (
+        f"U6 average {1e6 * average * 1.001} um",
+        f"U6 average {1e6 * average * 0.999} um",
+    )
+    assert (
+        main(
+            [
+                "check",
+                file,
+                "--goal",
+                just,
+                "--goal",
+                "lengths",
+                "--goal",
+                "U2 angles maximum 1 urad",
+            ]
+        )
+        == 0
+    )
     out = capsys.readouterr().out
     assert out.count("goal met: ") == 3 and "goal not met" not in out
     assert main(["check", file, "--goal", just, "--goal", not_quite]) == 1
@@ -117,9 +152,18 @@ def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert data["lengths"]["average"] == pytest.approx(average)
     assert main(["check", file, "--goal", not_quite, "--format", "github"]) == 1
     line = capsys.readouterr().out
-    assert line.startswith("::error file=") and "title=goals of design::" in line and "goal not met" in line
+    assert (
+        line.startswith("::error file=")
+        and "title=goals of design::" in line
+        and "goal not met" in line
+    )
     number = int(re.search(r"line=(\d+)", line)[1])  # type: ignore[index]
-    assert Path(file).read_text(encoding="utf-8").splitlines()[number - 1].startswith("target_accuracy")
+    assert (
+        Path(file)
+        .read_text(encoding="utf-8")
+        .splitlines()[number - 1]
+        .startswith("target_accuracy")
+    )
     assert main(["check", file, "--goal", not_quite, "--format", "junit"]) == 1
     failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
     assert failure is not None and failure.get("type") == "goal"
@@ -162,7 +206,9 @@ def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
         file = str(written(tmp_path, with_target(f"{1.5e6 * largest:.6f} um", factor)))
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
         assert main(["lengths", file, "--grid", "2"]) == 0
-        mapped = length_map(load(file)[0], Settings((2, 2, 2), "down", load(file)[0].target_accuracy.stated))  # type: ignore[union-attr]
+        mapped = length_map(
+            load(file)[0], Settings((2, 2, 2), "down", load(file)[0].target_accuracy.stated)
+        )  # type: ignore[union-attr]
         of_corners = factor * float(mapped.whole.maximum_ratio[0]) > 1
         assert main(["lengths", file, "--grid", "2", "--fail"]) == int(of_corners)
 
@@ -174,13 +220,17 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
     design = lay_out(experiment)
     layout, state = shared_layout(design), nominal_state(design)
     root = spectrum(eliminate(design, layout, state)).root
-    rows = correction_rows(design, layout, state, design.points, np.full(len(design.points), design.point_probe))
+    rows = correction_rows(
+        design, layout, state, design.points, np.full(len(design.points), design.point_probe)
+    )
     told = []
     for column in range(root.shape[1]):
         change = rows @ root[:, column]
         # Less the rigid motion that fits best, by a dense least-squares fit.
         turns = np.stack([np.cross(axis, design.points) for axis in np.eye(3)], axis=-1)
-        motions = np.concatenate([np.tile(np.eye(3), (len(design.points), 1, 1)), turns], axis=2).reshape(-1, 6)
+        motions = np.concatenate(
+            [np.tile(np.eye(3), (len(design.points), 1, 1)), turns], axis=2
+        ).reshape(-1, 6)
         left = change.ravel() - motions @ np.linalg.lstsq(motions, change.ravel(), rcond=None)[0]
         at_points = np.sqrt(2 * (left.reshape(-1, 3) ** 2).mean(axis=1))
         size = float(np.sqrt((at_points**2).mean()))
@@ -190,7 +240,10 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
     assert sorted(found_there) == [(pytest.approx(size), count) for size, count in sorted(told)]
     lines = found.lines()
     direction = next(line for line in lines if line.startswith("weakly determined 1"))
-    assert f"root mean square over 30 points; more than 0.02 um at {found.verdict.weak[0].beyond} of them" in direction
+    assert (
+        f"root mean square over 30 points; more than 0.02 um at {found.verdict.weak[0].beyond} of"
+        " them" in direction
+    )
     assert f"all directions together: U6 {1e6 * found.lengths.average:.4f}"[:38] in "\n".join(lines)
 
 
@@ -198,7 +251,9 @@ def test_a_certificate_that_may_be_any_ends_where_no_file_may_state_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What is refused beyond is no certificate that misses the goal."""
-    text = with_target("5 um").replace("standard_uncertainty: 0.2 um   #", "standard_uncertainty: 0.1 um + L/1000000 #")
+    text = with_target("5 um").replace(
+        "standard_uncertainty: 0.2 um   #", "standard_uncertainty: 0.1 um + L/1000000 #"
+    )
     assert main(["reach", str(written(tmp_path, text)), "--by", "certificate", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)["answers"]["certificate"]
     assert answer["status"] == "any" and answer["next"] is None
@@ -206,7 +261,9 @@ def test_a_certificate_that_may_be_any_ends_where_no_file_may_state_it(
 
 
 def test_no_weak_direction_and_yet_a_target_that_is_missed(tmp_path: Path) -> None:
-    """Many moderate directions add up: nothing is weak, and `check` tells the share all the same."""
+    """Many moderate directions add up: nothing is weak, and `check` tells the share all the
+    same.
+    """
     found = predict(experiment_of(tmp_path, SMALL))
     directions = check(experiment_of(tmp_path, with_target("0.001 um"))).verdict.weak
     limit = 1e6 * max(one.standard_deviation for one in directions)

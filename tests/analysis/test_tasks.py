@@ -1,4 +1,6 @@
-"""Measuring tasks: their uncertainty is that of U6 for the same two points, with estimated probe offsets counted."""
+"""Measuring tasks: their uncertainty is that of U6 for the same two points, with estimated probe
+offsets counted.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ def with_tasks(tmp_path: Path, tasks: str = TASKS, text: str = QUICKSTART) -> Ex
 
 def test_a_task_is_as_uncertain_as_the_distance_between_the_same_points(tmp_path: Path) -> None:
     found = predict(with_tasks(tmp_path)).tasks[0]
-    points = "evaluation:\n  points: [[100 mm, 200 mm, 0 mm], [600 mm, 200 mm, 50 mm]]\n  probe: down\n"
+    points = (
+        "evaluation:\n  points: [[100 mm, 200 mm, 0 mm], [600 mm, 200 mm, 50 mm]]\n  probe: down\n"
+    )
     expected = predict(with_tasks(tmp_path, points)).quantities["U6"]
     assert expected.count == 1
     assert found.standard_uncertainty == pytest.approx(expected.maximum, rel=1e-9)
@@ -83,22 +87,35 @@ def changed(design: Design, layout: SharedLayout, state: State, step: np.ndarray
 
 
 def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> None:
-    free = QUICKSTART.replace("right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}")
-    free = free.replace("front: [0 mm, -50 mm, 0 mm]", "front: {offset: [0 mm, -50 mm, 0 mm], unknown: true}")
+    free = QUICKSTART.replace(
+        "right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}"
+    )
+    free = free.replace(
+        "front: [0 mm, -50 mm, 0 mm]", "front: {offset: [0 mm, -50 mm, 0 mm], unknown: true}"
+    )
     design = lay_out(with_tasks(tmp_path, text=free))
     layout = shared_layout(design)
-    state = replace(nominal_state(design), a=np.random.default_rng(3).normal(0, 1e-5, len(design.model.parameters)))
+    state = replace(
+        nominal_state(design),
+        a=np.random.default_rng(3).normal(0, 1e-5, len(design.model.parameters)),
+    )
     given = task_distances(design)
     rows = linear_functions(linearise(design, state), given).shared
     assert rows.shape == (3, len(layout))
-    # The fixed tip has no part in it, a tip of one end all, a tip of both only what rotations make of it.
+    # The fixed tip has no part in it, a tip of one end all, a tip of both only what rotations make
+    # of it.
     by_offset = np.abs(rows[:, layout.offsets]).max(axis=1)
     assert by_offset[0] == 0.0 and by_offset[1] > 0.9 and 0.0 < by_offset[2] < 1e-3
     generator = np.random.default_rng(4)
     for _ in range(4):
         step = 1e-5 * generator.standard_normal(len(layout))
-        lengths = [length_of(given.places.at(design, changed(design, layout, state, sign * step))) for sign in (1, -1)]
-        np.testing.assert_allclose(rows @ step, (lengths[0] - lengths[1]) / 2.0, atol=1e-14, rtol=1e-6)
+        lengths = [
+            length_of(given.places.at(design, changed(design, layout, state, sign * step)))
+            for sign in (1, -1)
+        ]
+        np.testing.assert_allclose(
+            rows @ step, (lengths[0] - lengths[1]) / 2.0, atol=1e-14, rtol=1e-6
+        )
 
 
 def test_undetermined_tasks_are_told_as_such() -> None:
@@ -106,7 +123,9 @@ def test_undetermined_tasks_are_told_as_such() -> None:
     design = small_design()
     design = replace(
         design,
-        distances=replace(design.distances, **{name: v[:0] for name, v in vars(design.distances).items()}),
+        distances=replace(
+            design.distances, **{name: v[:0] for name, v in vars(design.distances).items()}
+        ),
         probes=np.zeros_like(design.probes),
         task_names=("edge", "none"),
         task_points=np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]]]),

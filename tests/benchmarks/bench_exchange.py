@@ -1,4 +1,6 @@
-"""The cost of one step of an exchange: one position is taken out of six, and the best of a pool takes its place."""
+"""The cost of one step of an exchange: one position is taken out of six, and the best of a pool
+takes its place.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,9 @@ def pool_of(folder: Path, balls: int) -> Problem:
 
 
 def by_update(problem: Problem, left: Array, rows: Array) -> float:
-    """The criterion by an update of the covariance with the candidate's own rows (Woodbury), of full rank or not."""
+    """The criterion by an update of the covariance with the candidate's own rows (Woodbury), of
+    full rank or not.
+    """
     carried = rows @ left
     small = np.linalg.solve(np.eye(len(rows)) + carried @ rows.T, carried)
     root = np.linalg.cholesky(left - carried.T @ small)
@@ -83,7 +87,9 @@ def test_one_exchange(tmp_path: Path, balls: int) -> None:
         found = []
         for k in some:
             root = full_root(information.of({*left, int(k)}))
-            found.append(np.inf if root is None else problem.criterion.value(counted_root(problem, root)))
+            found.append(
+                np.inf if root is None else problem.criterion.value(counted_root(problem, root))
+            )
         return found
 
     rows = {int(k): rank_rows(information, int(k)) for k in some}
@@ -104,6 +110,7 @@ def test_one_exchange(tmp_path: Path, balls: int) -> None:
         updates.append(seconds(updated) * n / FEW)
     ratios = [np.median(np.array(slow) / np.array(steps)) for slow in (anews, updates, fulls)]
     print(
-        f"\n| {balls} | {n} | {information.basis.size} | {min(ranks)} to {max(ranks)} | {1e3 * np.median(steps):.0f} "
-        f"| {1e6 * np.median(steps) / n:.0f} | {ratios[0]:.1f} | {ratios[1]:.1f} | {ratios[2]:.0f} |"
+        f"\n| {balls} | {n} | {information.basis.size} | {min(ranks)} to {max(ranks)} |"
+        f" {1e3 * np.median(steps):.0f} | {1e6 * np.median(steps) / n:.0f} | {ratios[0]:.1f} |"
+        f" {ratios[1]:.1f} | {ratios[2]:.0f} |"
     )

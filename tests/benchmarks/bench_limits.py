@@ -1,12 +1,13 @@
-"""Time and memory of commands at the largest inputs that they accept: the table in docs/reference/limits.md.
+"""Time and memory of commands at the largest inputs that they accept: the table in
+docs/reference/limits.md.
 
 Run with
 
     python -m pytest tests/benchmarks/bench_limits.py
 
-or with -k and the name of a case. Each case is a command in a process of its own, whose processor time and largest
-memory the system tells when it has ended; processes that it starts are counted in the time, and the largest of them
-in the memory. All cases together take an hour or two.
+or with -k and the name of a case. Each case is a command in a process of its own, whose processor
+time and largest memory the system tells when it has ended; processes that it starts are counted in
+the time, and the largest of them in the memory. All cases together take an hour or two.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ LINES: list[str] = []
 
 @dataclass(frozen=True)
 class Case:
-    """A command at a limit: its arguments, made together with its files in a folder, and the status to be seen."""
+    """A command at a limit: its arguments, made together with its files in a folder, and the status
+    to be seen.
+    """
 
     name: str
     arguments: Callable[[Path], list[str | Path]]
@@ -67,11 +70,15 @@ def many_balls(folder: Path) -> Path:
 
 def many_poses(folder: Path) -> Path:
     places = (
-        f"  - {{name: p{k}, plane: z, level: {k} mm, corner: {{x: {k % 20 * 10} mm, y: {k // 20 % 20 * 10} mm}}, "
-        "probes: [down]}\n"
+        f"  - {{name: p{k}, plane: z, level: {k} mm, corner: {{x: {k % 20 * 10} mm, y:"
+        f" {k // 20 % 20 * 10} mm}}, probes: [down]}}\n"
         for k in range(560)
     )
-    return _changed(folder, (r"positions:\n(  - .*\n)+", f"positions:\n{''.join(places)}"), ("expected_rank.*", ""))
+    return _changed(
+        folder,
+        (r"positions:\n(  - .*\n)+", f"positions:\n{''.join(places)}"),
+        ("expected_rank.*", ""),
+    )
 
 
 def many_readings(folder: Path, repeats: int = 4000) -> Path:
@@ -93,7 +100,9 @@ def many_variants(folder: Path) -> Path:
 
 
 def large_variants(folder: Path) -> Path:
-    """Variants with 320,004 balls, balls read, distances and points each, of which six are possible."""
+    """Variants with 320,004 balls, balls read, distances and points each, of which six are
+    possible.
+    """
     return _changed(
         folder,
         (r"balls: \[5, 5\]", "balls: [200, 200]"),
@@ -108,7 +117,12 @@ def many_cells(folder: Path) -> Path:
 
     def rows() -> Iterator[Row]:
         for k in range(count**2):
-            figures = {"parameters": 100.0, "observations": 500.0, "rank_deficiency": 0.0, "as_expected": 1.0}
+            figures = {
+                "parameters": 100.0,
+                "observations": 500.0,
+                "rank_deficiency": 0.0,
+                "as_expected": 1.0,
+            }
             for symbol in ("U2", "U4", "U6"):
                 size = 1e-6 * (1.0 + k * 7919 % count**2 / count**2)
                 figures |= {f"{symbol}_maximum_m": size, f"{symbol}_average_m": 0.5 * size}
@@ -125,9 +139,13 @@ def many_cells(folder: Path) -> Path:
 
 
 def joint_lengths(folder: Path) -> Path:
-    bar = "artefacts:\n  bar: {kind: grid, balls: [11, 7], size: [500 mm, 500 mm], role: length_standard}\n"
+    bar = (
+        "artefacts:\n  bar: {kind: grid, balls: [11, 7], size: [500 mm, 500 mm], role:"
+        " length_standard}\n"
+    )
     place = (
-        r"\g<0>  - {name: bar, artefact: bar, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}\n"
+        r"\g<0>  - {name: bar, artefact: bar, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0 mm},"
+        r" probes: [down]}\n"
     )
     return _changed(
         folder,
@@ -136,8 +154,10 @@ def joint_lengths(folder: Path) -> Path:
         (r"positions:\n(  - .*\n)+", place),
         (
             "calibration:\n  - kind: distances\n",
-            "calibration:\n  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 1 um}\n"
-            "  - kind: distances\n    artefact: plate\n",
+            (
+                "calibration:\n  - {kind: distances, artefact: bar, pairs: all,"
+                " standard_uncertainty: 1 um}\n  - kind: distances\n    artefact: plate\n"
+            ),
         ),
     )
 
@@ -147,14 +167,18 @@ def pool(folder: Path) -> Path:
 
 
 def many_candidates(folder: Path) -> Path:
-    """19,800 plates flat on the table beside the other candidates, and few enough parameters for their matrices."""
+    """19,800 plates flat on the table beside the other candidates, and few enough parameters for
+    their matrices.
+    """
     levels = ", ".join(f"{50 + 500 * k / 495:.3f} mm" for k in range(495))
     return _changed(
         folder,
         (
             r"planes: \[z\]\n      levels: .*\n      corners: .*\n",
-            f"planes: [z]\n      levels: [{levels}]\n      corners: "
-            "{x: [0 mm, 150 mm, 300 mm, 450 mm, 600 mm], y: [0 mm, 100 mm, 250 mm, 400 mm]}\n",
+            (
+                f"planes: [z]\n      levels: [{levels}]\n      corners: "
+                "{x: [0 mm, 150 mm, 300 mm, 450 mm, 600 mm], y: [0 mm, 100 mm, 250 mm, 400 mm]}\n"
+            ),
         ),
         ("position_coefficients: 4", "position_coefficients: 2"),
         ("rotation_coefficients: 4", "rotation_coefficients: 2"),
@@ -181,7 +205,9 @@ def curve(folder: Path) -> Path:
 def readings_of(path: Path) -> Path:
     """A file of readings, as many as the experiment in the same folder plans."""
     found = path.parent / "readings.csv"
-    subprocess.run([*BALLPLATE, "simulate", path, "-o", found], check=True, cwd=ROOT, capture_output=True)
+    subprocess.run(
+        [*BALLPLATE, "simulate", path, "-o", found], check=True, cwd=ROOT, capture_output=True
+    )
     return found
 
 
@@ -191,13 +217,17 @@ def unknown_names(folder: Path) -> Path:
 
 
 def repeated_rows(folder: Path) -> Path:
-    """Known names, each row of which stands there two thousand times, at places where no ball is."""
+    """Known names, each row of which stands there two thousand times, at places where no ball
+    is.
+    """
     sides = [(f"{axis} {level}", probe) for axis, probe in AXES for level in ("low", "high")]
     rows = []
     for k in range(450_000):
         position, probe = sides[k // 25 % len(sides)]
         ball = f"r{k % 25 // 5 + 1}c{k % 5 + 1}"
-        rows.append(f"{position},{ball},{probe},{500 + k % 97 * 0.0013:.6f},{400 + k % 89 * 0.0017:.6f},250\n")
+        rows.append(
+            f"{position},{ball},{probe},{500 + k % 97 * 0.0013:.6f},{400 + k % 89 * 0.0017:.6f},250\n"
+        )
     return _written(folder / "readings.csv", f"position,ball,probe,x_mm,y_mm,z_mm\n{''.join(rows)}")
 
 
@@ -206,22 +236,32 @@ CASES = (
     Case("run, 3429 parameters", lambda folder: ["run", many_poses(folder)], 1),
     Case("check, 1000 variants", lambda folder: ["check", many_variants(folder)]),
     Case("check, 6 variants of 40,000 balls", lambda folder: ["check", large_variants(folder)]),
-    Case("check, 2926 lengths with balls in common", lambda folder: ["check", joint_lengths(folder)]),
+    Case(
+        "check, 2926 lengths with balls in common", lambda folder: ["check", joint_lengths(folder)]
+    ),
     Case("run, 40,000 evaluation points", lambda folder: ["run", many_points(folder)]),
     Case("run, 40,000 balls", lambda folder: ["run", many_balls(folder)]),
-    Case("reliability, 40,000 evaluation points", lambda folder: ["reliability", many_points(folder)]),
+    Case(
+        "reliability, 40,000 evaluation points", lambda folder: ["reliability", many_points(folder)]
+    ),
     Case("run --trials 1000000", lambda folder: ["run", QUICKSTART, "--trials", "1000000"]),
     Case("reliability, 1,000,000 readings", lambda folder: ["reliability", many_readings(folder)]),
     Case(
         "reach, 10,000 evaluation points",
         lambda folder: ["reach", many_points(folder, 10_000), "--by", "repeatability"],
     ),
-    Case("plan, 1000 evaluation points", lambda folder: ["plan", pool(folder), "--positions", "4", "--workers", "1"]),
+    Case(
+        "plan, 1000 evaluation points",
+        lambda folder: ["plan", pool(folder), "--positions", "4", "--workers", "1"],
+    ),
     Case(
         "plan, 20,000 candidates",
         lambda folder: ["plan", many_candidates(folder), "--positions", "4", "--workers", "1"],
     ),
-    Case("compare, 191,100 terms", lambda folder: ["compare", all_pairs(folder), "--pairs", "all", "--trials", "1"]),
+    Case(
+        "compare, 191,100 terms",
+        lambda folder: ["compare", all_pairs(folder), "--pairs", "all", "--trials", "1"],
+    ),
     Case(
         "compare, 100,000 pairs of points",
         lambda folder: ["compare", QUICKSTART, "--trials", "100", "--points", "100000"],
@@ -244,13 +284,27 @@ CASES = (
         lambda folder: ["fit", many_readings(folder), readings_of(folder / "experiment.yaml")],
         3,
     ),
-    Case("fit, 450,000 readings of unknown positions", lambda folder: ["fit", QUICKSTART, unknown_names(folder)], 3),
-    Case("fit, 450,000 readings at wrong places", lambda folder: ["fit", QUICKSTART, repeated_rows(folder)], 3),
+    Case(
+        "fit, 450,000 readings of unknown positions",
+        lambda folder: ["fit", QUICKSTART, unknown_names(folder)],
+        3,
+    ),
+    Case(
+        "fit, 450,000 readings at wrong places",
+        lambda folder: ["fit", QUICKSTART, repeated_rows(folder)],
+        3,
+    ),
     Case("map, 195,112 points", lambda folder: ["map", MACHINE, "--grid", "58,58,58"]),
     Case("spline, 20,000 points", lambda folder: ["spline", curve(folder), "--every", "50"]),
     Case("sweep --dry-run, 1,000,000 cells", lambda folder: ["sweep", cells(folder), "--dry-run"]),
-    Case("export, 1,000,000 cells", lambda folder: ["export", many_cells(folder), "-o", folder / "cells.csv"]),
-    Case("report, 1,000,000 cells", lambda folder: ["report", many_cells(folder), "-o", folder / "cells.html"]),
+    Case(
+        "export, 1,000,000 cells",
+        lambda folder: ["export", many_cells(folder), "-o", folder / "cells.csv"],
+    ),
+    Case(
+        "report, 1,000,000 cells",
+        lambda folder: ["report", many_cells(folder), "-o", folder / "cells.html"],
+    ),
 )
 
 
@@ -270,7 +324,9 @@ def test_a_command_at_its_limit(case: Case, tmp_path: Path) -> None:
     told = (tmp_path / "err").read_text(encoding="utf-8")
     assert process.returncode == case.status, told
     assert "Traceback" not in told
-    LINES.append(f"| {case.name} | {used.ru_utime + used.ru_stime:.0f} | {used.ru_maxrss / 1024:.0f} |")
+    LINES.append(
+        f"| {case.name} | {used.ru_utime + used.ru_stime:.0f} | {used.ru_maxrss / 1024:.0f} |"
+    )
 
 
 def test_lines(capsys: pytest.CaptureFixture[str]) -> None:

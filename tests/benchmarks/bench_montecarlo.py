@@ -4,9 +4,10 @@ Run with
 
     python -m pytest tests/benchmarks/bench_montecarlo.py
 
-Experiment 6.2.1 of NPL Report CISE 15/98 on grids of n x n balls, on a machine with errors of some micrometres. SciPy's
-least_squares is given the same residuals and derivatives, and its answers must agree with ours to a few millionths of
-what replicates differ by. Whole runs are timed on two processes that are there already, everything else in this one.
+Experiment 6.2.1 of NPL Report CISE 15/98 on grids of n x n balls, on a machine with errors of some
+micrometres. SciPy's least_squares is given the same residuals and derivatives, and its answers must
+agree with ours to a few millionths of what replicates differ by. Whole runs are timed on two
+processes that are there already, everything else in this one.
 """
 
 from __future__ import annotations
@@ -88,8 +89,8 @@ def test_thousand_replicates(n: int, singles: int) -> None:
     times = 1000 * min(seconds) / (both * 1000 / (batches * BATCH))
     rate = product_rate(shared)
     LINES.append(
-        f"| {n} | {len(shared.design.readings)} | {one:.3f} | {both:.3f} | {whole:.3f} | {min(seconds):.2f} | "
-        f"{times:.0f} | {100 * rate:.0f} |"
+        f"| {n} | {len(shared.design.readings)} | {one:.3f} | {both:.3f} | {whole:.3f} |"
+        f" {min(seconds):.2f} | {times:.0f} | {100 * rate:.0f} |"
     )
 
 
@@ -101,14 +102,22 @@ def by_scipy(shared: Reference, k: int) -> State:
     for group in shared.groups:
         match = {
             (int(b), int(p)): i
-            for i, (b, p) in enumerate(zip(design.readings.ball, design.readings.probe, strict=True))
+            for i, (b, p) in enumerate(
+                zip(design.readings.ball, design.readings.probe, strict=True)
+            )
             if design.readings.position[i] == group.position
         }
         # Groups of a position hold its probes one after the other.
-        earlier = [g for g in shared.groups if g.position == group.position and g.rows.start < group.rows.start]
+        earlier = [
+            g
+            for g in shared.groups
+            if g.position == group.position and g.rows.start < group.rows.start
+        ]
         own = sorted({p for _, p in match})
         turn = sum(1 for g in earlier if g.ball == group.ball)
-        rows = [match[ball, own[turn]] for ball in np.arange(len(design.balls))[group.ball].tolist()]
+        rows = [
+            match[ball, own[turn]] for ball in np.arange(len(design.balls))[group.ball].tolist()
+        ]
         x[rows] += drawn.moved[k][:, group.rows].T
     pairs = design.distances
     real = shared.truth.state.balls
@@ -153,12 +162,16 @@ def by_scipy(shared: Reference, k: int) -> State:
         return np.concatenate([rows.reshape(m * d, -1), below])
 
     tight = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    solution = least_squares(residuals, np.zeros(n * d + len(layout)), jacobian, x_scale="jac", **tight)
+    solution = least_squares(
+        residuals, np.zeros(n * d + len(layout)), jacobian, x_scale="jac", **tight
+    )
     return state_of(solution.x)
 
 
 def product_rate(shared: Reference) -> float:
-    """Rate of the products with the derivatives by the model, as a share of dgemm's on arrays of the same shapes."""
+    """Rate of the products with the derivatives by the model, as a share of dgemm's on arrays of
+    the same shapes.
+    """
     from scipy.linalg.blas import dgemm
 
     generator = np.random.default_rng(1)
@@ -203,14 +216,17 @@ def test_memory_does_not_grow_with_replicates() -> None:
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
         peaks[count] = json.loads(done.stdout)
         seconds, peak = peaks[count]["seconds"], peaks[count]["peak"]
-        LINES.append(f"{count} replicates at n = 5 in one process: {seconds:.1f} s, peak {peak:.0f} MiB")
+        LINES.append(
+            f"{count} replicates at n = 5 in one process: {seconds:.1f} s, peak {peak:.0f} MiB"
+        )
     assert peaks[100_000]["peak"] < 1.1 * peaks[1024]["peak"] + 10
 
 
 def test_table(capsys: pytest.CaptureFixture[str]) -> None:
     with capsys.disabled():
         print(
-            "\n\n| n | readings | one process, s | two, s | and statistics, s | SciPy, one, s | ratio | of dgemm, % |"
+            "\n\n| n | readings | one process, s | two, s | and statistics, s | SciPy, one, s |"
+            " ratio | of dgemm, % |"
         )
         print("\n".join(LINES))
 
@@ -218,7 +234,8 @@ def test_table(capsys: pytest.CaptureFixture[str]) -> None:
 if __name__ == "__main__":
     begun = time.perf_counter()
     run_trials(prepared(5), 1, int(sys.argv[1]))
-    # Of this program alone: the resource usage that the system counts begins with that of whoever started it.
+    # Of this program alone: the resource usage that the system counts begins with that of whoever
+    # started it.
     status = Path("/proc/self/status").read_text(encoding="utf-8")
     peak = int(status.partition("VmHWM:")[2].split()[0]) / 1024
     print(json.dumps({"seconds": time.perf_counter() - begun, "peak": peak}))

@@ -5,10 +5,11 @@ Run with
     pip install -e '.[benchmark]'
     python -m pytest tests/benchmarks/bench_rivals.py
 
-It takes about ten minutes and 8 GB of memory. The table is printed at the end. Experiment 6.2.1 of NPL Report
-CISE 15/98 is taken on grids of n x n balls with the sides between the corners calibrated. All tools get the threads
-that they take by themselves; they take turns, round by round, and a ratio is the median over rounds of the ratio
-within a round, so that a change of the machine's pace touches both alike.
+It takes about ten minutes and 8 GB of memory. The table is printed at the end. Experiment 6.2.1 of
+NPL Report CISE 15/98 is taken on grids of n x n balls with the sides between the corners
+calibrated. All tools get the threads that they take by themselves; they take turns, round by round,
+and a ratio is the median over rounds of the ratio within a round, so that a change of the machine's
+pace touches both alike.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 
 @dataclass(frozen=True)
 class Line:
-    """One line of the table: seconds in all, to construct, to factorise with covariances; or why there are none."""
+    """One line of the table: seconds in all, to construct, to factorise with covariances; or why
+    there are none.
+    """
 
     n: int
     tool: str
@@ -59,7 +62,9 @@ def ballplate(design: Design) -> tuple[Figures, int]:
 
 
 def attempt(rival: Rival, design: Design) -> tuple[Figures, int, tuple[float, float, float]]:
-    """One estimate by a rival, with seconds in all, to construct, and to factorise with covariances."""
+    """One estimate by a rival, with seconds in all, to construct, and to factorise with
+    covariances.
+    """
     gc.collect()
     start = time.perf_counter()
     problem = linear_problem(design)
@@ -89,9 +94,14 @@ def test_one_estimate(benchmark: Any, n: int) -> None:
             continue
         assert found == deficiency, rival.name
         for symbol in SYMBOLS:
-            assert result[symbol] == pytest.approx(expected[symbol], rel=AGREEMENT), (rival.name, symbol)
+            assert result[symbol] == pytest.approx(expected[symbol], rel=AGREEMENT), (
+                rival.name,
+                symbol,
+            )
         if seconds > LONGEST:
-            TABLE.append(Line(n, rival.name, reason=f"not delivered within {LONGEST:.0f} s: {seconds:.0f} s"))
+            TABLE.append(
+                Line(n, rival.name, reason=f"not delivered within {LONGEST:.0f} s: {seconds:.0f} s")
+            )
         else:
             present.append(rival)
 
@@ -114,8 +124,13 @@ def test_one_estimate(benchmark: Any, n: int) -> None:
 def test_table(capsys: pytest.CaptureFixture[str]) -> None:
     """Print what was measured; a line of Markdown each."""
     with capsys.disabled():
-        print("\n\n|  n | tool | seconds | of it construction | factorisation, covariances | ratio to ballplate |")
-        print("|---:|------|--------:|-------------------:|---------------------------:|-------------------:|")
+        print(
+            "\n\n|  n | tool | seconds | of it construction | factorisation, covariances | ratio to"
+            " ballplate |"
+        )
+        print(
+            "|---:|------|--------:|-------------------:|---------------------------:|-------------------:|"
+        )
         for line in sorted(TABLE, key=lambda entry: (entry.n, bool(entry.reason), entry.ratio)):
             start = f"| {line.n:2d} | {line.tool} |"
             if line.reason:
@@ -123,4 +138,7 @@ def test_table(capsys: pytest.CaptureFixture[str]) -> None:
             elif line.tool == "ballplate":
                 print(f"{start} {line.total:.4f} | | | 1 |")
             else:
-                print(f"{start} {line.total:.4f} | {line.construct:.4f} | {line.solve:.4f} | {line.ratio:.2f} |")
+                print(
+                    f"{start} {line.total:.4f} | {line.construct:.4f} | {line.solve:.4f} |"
+                    f" {line.ratio:.2f} |"
+                )

@@ -4,8 +4,8 @@ Run with
 
     python -m pytest tests/benchmarks/bench_scaling.py
 
-Each size is measured in a process of its own, whose peak resident memory is read off after the elimination with U1 to
-U4 and U6, and again after U5, the distances between all pairs of balls.
+Each size is measured in a process of its own, whose peak resident memory is read off after the
+elimination with U1 to U4 and U6, and again after U5, the distances between all pairs of balls.
 """
 
 from __future__ import annotations
@@ -83,16 +83,16 @@ def measured() -> dict[int, dict[str, float]]:
 def test_table(measured: dict[int, dict[str, float]], capsys: pytest.CaptureFixture[str]) -> None:
     with capsys.disabled():
         print(
-            "\n\n|   n | readings | elimination, s | U1-U4, U6, s | both, us a reading | memory, MiB "
-            "| U5 pairs | U5, s | U5 memory, MiB |"
+            "\n\n|   n | readings | elimination, s | U1-U4, U6, s | both, us a reading | memory,"
+            " MiB | U5 pairs | U5, s | U5 memory, MiB |"
         )
         print("|----:|---------:|---------------:|------:|---:|---:|---------:|------:|------:|")
         for n, figure in measured.items():
             each = 1e6 * (figure["elimination"] + figure["uncertainties"]) / figure["readings"]
             print(
-                f"| {n} | {figure['readings']} | {figure['elimination']:.3f} | {figure['uncertainties']:.3f} "
-                f"| {each:.1f} | {figure['memory']:.0f} | {figure['pairs']} | {figure['U5']:.3f} "
-                f"| {figure['U5 memory']:.0f} |"
+                f"| {n} | {figure['readings']} | {figure['elimination']:.3f} |"
+                f" {figure['uncertainties']:.3f} | {each:.1f} | {figure['memory']:.0f} |"
+                f" {figure['pairs']} | {figure['U5']:.3f} | {figure['U5 memory']:.0f} |"
             )
 
 
@@ -108,7 +108,9 @@ def test_time_grows_no_faster_than_readings(measured: dict[int, dict[str, float]
         assert large[stage] / large["readings"] < 1.5 * small[stage] / small["readings"]
 
 
-def test_all_pairs_are_worked_through_in_bounded_memory(measured: dict[int, dict[str, float]]) -> None:
+def test_all_pairs_are_worked_through_in_bounded_memory(
+    measured: dict[int, dict[str, float]],
+) -> None:
     """50 million pairs would take 400 MB as one array of results."""
     assert measured[SIZES[-1]]["pairs"] == 10_000 * 9_999 // 2
     assert measured[SIZES[-1]]["U5 memory"] < 100

@@ -1,12 +1,14 @@
-"""How much of a sweep's time is spent on anything but its cells, and how long a large store takes to read.
+"""How much of a sweep's time is spent on anything but its cells, and how long a large store takes
+to read.
 
 Run with
 
     python -m pytest tests/benchmarks/bench_sweep.py
 
-Two thousand small cells go through the command as a user starts it. What a cell takes is what its worker counts from
-the cell's first line of Python to the last; the share of that in wall time times workers leaves the start of all
-processes, the traffic between them and the writing of the store as what it costs.
+Two thousand small cells go through the command as a user starts it. What a cell takes is what its
+worker counts from the cell's first line of Python to the last; the share of that in wall time times
+workers leaves the start of all processes, the traffic between them and the writing of the store as
+what it costs.
 """
 
 from __future__ import annotations
@@ -36,7 +38,9 @@ LINES: list[str] = []
 
 def written(folder: Path, count: int) -> Path:
     path = folder / "many.yaml"
-    path.write_text(SWEEP.format(base=ROOT / "designs" / "quickstart.yaml", count=count), encoding="utf-8")
+    path.write_text(
+        SWEEP.format(base=ROOT / "designs" / "quickstart.yaml", count=count), encoding="utf-8"
+    )
     return path
 
 
@@ -53,8 +57,8 @@ def test_share_of_computation(tmp_path: Path, workers: int) -> None:
     assert len(table) == 2000 and (table["status"] == "done").all()
     share = table["duration_s"].sum() / (workers * wall)
     LINES.append(
-        f"2000 cells, {workers} workers: {wall:.1f} s, {1000 * table['duration_s'].mean():.1f} ms a cell, "
-        f"{100 * share:.1f} % of the time in the cells"
+        f"2000 cells, {workers} workers: {wall:.1f} s, {1000 * table['duration_s'].mean():.1f} ms a"
+        f" cell, {100 * share:.1f} % of the time in the cells"
     )
 
 
@@ -65,7 +69,11 @@ def test_a_large_store(tmp_path: Path) -> None:
     begun = time.perf_counter()
     store = open_store(tmp_path / "large.sqlite", create=True)
     number = add_sweep(store, definition(sweep, bundle_of(sweep)), ())
-    add_rows(store, number, (type(row)(**{**row.__dict__, "number": k, "key": f"{k:040d}"}) for k in range(100_000)))
+    add_rows(
+        store,
+        number,
+        (type(row)(**{**row.__dict__, "number": k, "key": f"{k:040d}"}) for k in range(100_000)),
+    )
     store.close()
     made = time.perf_counter() - begun
     begun = time.perf_counter()
@@ -75,7 +83,10 @@ def test_a_large_store(tmp_path: Path) -> None:
     read = time.perf_counter() - begun
     assert table.shape[0] == 100_000
     size = (tmp_path / "large.sqlite").stat().st_size / 2**20
-    LINES.append(f"100,000 cells: {made:.1f} s to write at one go, {size:.0f} MiB, {read:.1f} s to open and read")
+    LINES.append(
+        f"100,000 cells: {made:.1f} s to write at one go, {size:.0f} MiB, {read:.1f} s to open and"
+        " read"
+    )
 
 
 def test_lines(capsys: pytest.CaptureFixture[str]) -> None:

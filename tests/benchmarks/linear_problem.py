@@ -18,8 +18,8 @@ Real = NDArray[np.float64]
 class LinearProblem:
     """Whitened rows of one plate: constant factors, ready made from the estimator's own blocks.
 
-    For each of m readings the derivatives `by_ball` (m, 3, 3), `by_pose` (m, 3, 6) and `by_model` (m, 3, a); for
-    each of k distances `along` (k, 3), the derivative by the first ball.
+    For each of m readings the derivatives `by_ball` (m, 3, 3), `by_pose` (m, 3, 6) and `by_model`
+    (m, 3, a); for each of k distances `along` (k, 3), the derivative by the first ball.
     """
 
     design: Design
@@ -72,10 +72,11 @@ def linear_problem(design: Design) -> LinearProblem:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a rival delivers: covariances of the shared parameters (s, s) and of the balls, and the rank.
+    """What a rival delivers: covariances of the shared parameters (s, s) and of the balls, and the
+    rank.
 
-    `balls` is (3 n, 3 n) with all pairs of balls, or (n, 3, 3) with each ball's own block where the pairs could
-    not be had.
+    `balls` is (3 n, 3 n) with all pairs of balls, or (n, 3, 3) with each ball's own block where the
+    pairs could not be had.
     """
 
     shared: Real
@@ -100,12 +101,15 @@ def figures(problem: LinearProblem, found: Estimate) -> Figures:
     result = {
         "U1": summary(np.sqrt(own)),
         "U2": summary(np.sqrt(np.diag(found.shared)[layout.poses])),
-        "U3": summary(np.sqrt(np.einsum("ij,jk,ik->i", reported, of_model, reported, optimize=True))),
+        "U3": summary(
+            np.sqrt(np.einsum("ij,jk,ik->i", reported, of_model, reported, optimize=True))
+        ),
         "U4": summary(np.sqrt(np.diag(of_points))),
     }
     if has_pairs:
         result["U5"] = summary(pair_uncertainties(design.balls, found.balls.reshape(n, 3, n, 3)))
-    # The corrected points of a machine without errors are the points, moved by the same probe offset.
+    # The corrected points of a machine without errors are the points, moved by the same probe
+    # offset.
     count = len(design.points)
     result["U6"] = summary(pair_uncertainties(design.points, of_points.reshape(count, 3, count, 3)))
     return result
@@ -117,7 +121,9 @@ def summary(values: Real) -> tuple[float, float]:
 
 
 def pair_uncertainties(places: Real, covariance: Real, tile: int = 256) -> Real:
-    """Standard uncertainties of the distances between all pairs of places (n, 3), covariance (n, 3, n, 3)."""
+    """Standard uncertainties of the distances between all pairs of places (n, 3), covariance (n, 3,
+    n, 3).
+    """
     n = len(places)
     own = np.diagonal(covariance, axis1=0, axis2=2)
     used = [axis for axis in range(3) if np.ptp(places[:, axis]) > 0]
@@ -131,7 +137,9 @@ def pair_uncertainties(places: Real, covariance: Real, tile: int = 256) -> Real:
             for i in used:
                 for j in used:
                     block = own[i, j, rows, None] + own[i, j, None, columns]
-                    block = block - covariance[rows, i, columns, j] - covariance[columns, i, rows, j].T
+                    block = (
+                        block - covariance[rows, i, columns, j] - covariance[columns, i, rows, j].T
+                    )
                     variance += block * between[:, :, i] * between[:, :, j]
             chosen = np.triu(squared > 0, 1) if start == other else squared > 0
             found.append(np.sqrt(variance[chosen] / squared[chosen]))

@@ -1,7 +1,8 @@
 """The same estimate by other means: dense NumPy, SciPy's sparse matrices, Ceres and GTSAM.
 
-Each rival has two stages, timed apart: `construct` makes its own objects from the ready-made rows, `solve`
-factorises them and returns covariances. Libraries that are not installed are a reason for skipping, not an error.
+Each rival has two stages, timed apart: `construct` makes its own objects from the ready-made rows,
+`solve` factorises them and returns covariances. Libraries that are not installed are a reason for
+skipping, not an error.
 """
 
 from __future__ import annotations
@@ -52,7 +53,9 @@ def inverse_of_information(root: Real) -> Real:
 
 
 def split(problem: LinearProblem, covariance: Real, root: Real) -> Estimate:
-    """An estimate from the covariance of balls and then shared parameters, and the shared part of its factor."""
+    """An estimate from the covariance of balls and then shared parameters, and the shared part of
+    its factor.
+    """
     at = 3 * problem.balls
     return Estimate(covariance[at:, at:], covariance[:at, :at], deficiency_of(problem, root))
 
@@ -103,7 +106,8 @@ def whole_solve(problem: LinearProblem, rows: Any) -> Estimate:
     return split(problem, covariance, scipy.linalg.cholesky(np.linalg.inv(covariance[at:, at:])))
 
 
-# SciPy: normal equations partitioned as bundle adjustment does, sparse for the balls, dense for the shared columns.
+# SciPy: normal equations partitioned as bundle adjustment does, sparse for the balls, dense for the
+# shared columns.
 
 
 def partitioned_construct(problem: LinearProblem) -> tuple[Any, Real]:
@@ -131,7 +135,9 @@ def partitioned_construct(problem: LinearProblem) -> tuple[Any, Real]:
 
 
 def add_inverse(target: Real, matrix: Any) -> None:
-    """Add the inverse of a sparse matrix that falls apart into small blocks, all blocks of a size at once."""
+    """Add the inverse of a sparse matrix that falls apart into small blocks, all blocks of a size
+    at once.
+    """
     count, label = scipy.sparse.csgraph.connected_components(matrix, directed=False)
     size = np.bincount(label, minlength=count)
     order = np.argsort(label, kind="stable")
@@ -263,7 +269,9 @@ def ceres_solve(problem: LinearProblem, given: CeresProblem) -> Estimate:
 
 @dataclass
 class GtsamProblem:
-    """A graph and the order of elimination: the balls, those with distances last, then the shared key."""
+    """A graph and the order of elimination: the balls, those with distances last, then the shared
+    key.
+    """
 
     graph: Any
     ordering: Any
@@ -279,11 +287,16 @@ def gtsam_construct(problem: LinearProblem) -> GtsamProblem:
     for ball in range(problem.balls):
         chosen = slice(ends[ball], ends[ball + 1])
         rows = 3 * int(ends[ball + 1] - ends[ball])
-        by_ball, by_shared = problem.by_ball[chosen].reshape(rows, 3), shared_rows[chosen].reshape(rows, -1)
+        by_ball, by_shared = (
+            problem.by_ball[chosen].reshape(rows, 3),
+            shared_rows[chosen].reshape(rows, -1),
+        )
         unit = gtsam.noiseModel.Unit.Create(rows)
         graph.add(gtsam.JacobianFactor(ball, by_ball, key, by_shared, np.ones(rows), unit))
     unit = gtsam.noiseModel.Unit.Create(1)
-    for first, second, along in zip(problem.first.tolist(), problem.second.tolist(), problem.along, strict=True):
+    for first, second, along in zip(
+        problem.first.tolist(), problem.second.tolist(), problem.along, strict=True
+    ):
         graph.add(gtsam.JacobianFactor(first, along[None], second, -along[None], np.ones(1), unit))
     kept = sorted({*problem.first.tolist(), *problem.second.tolist()})
     order = [*np.setdiff1d(np.arange(problem.balls), kept).tolist(), *kept, key]

@@ -1,4 +1,6 @@
-"""A certified problem as an experiment file and its readings; numbers are text as in the problem's own file."""
+"""A certified problem as an experiment file and its readings; numbers are text as in the problem's
+own file.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ def ball_name(number: int | str) -> str:
 def experiment_text(problem: Problem) -> str:
     """An experiment file of the problem's design."""
     lower, upper = problem["volume"]["lower"], problem["volume"]["upper"]
-    volume = ", ".join(f"{axis}: [{a} m, {b} m]" for axis, a, b in zip("xyz", lower, upper, strict=False))
+    volume = ", ".join(
+        f"{axis}: [{a} m, {b} m]" for axis, a, b in zip("xyz", lower, upper, strict=False)
+    )
     lines = [
         "# yaml-language-server: $schema=../schema.json",
         "#",
@@ -36,10 +40,17 @@ def experiment_text(problem: Problem) -> str:
         *(f"  {probe['name']}: {probe_text(probe)}" for probe in problem["probes"]),
         "",
         "artefacts:",
-        *(f"  {artefact['name']}: {artefact_text(problem, artefact)}" for artefact in problem["artefacts"]),
+        *(
+            f"  {artefact['name']}: {artefact_text(problem, artefact)}"
+            for artefact in problem["artefacts"]
+        ),
         "",
         "positions:",
-        *(line for k in range(len(problem["positions"])) for line in position_lines(problem, str(k))),
+        *(
+            line
+            for k in range(len(problem["positions"]))
+            for line in position_lines(problem, str(k))
+        ),
         "",
         *calibration_lines(problem),
         *prior_lines(problem),
@@ -57,21 +68,31 @@ def experiment_text(problem: Problem) -> str:
 def error_model(model: Problem) -> str:
     if model["kind"] == "metric":
         return "{kind: metric, scale: x}" if "alpha" in model["parameters"] else "{kind: metric}"
-    counts = ", ".join(f"{key}: {model[key]}" for key in ("position_coefficients", "rotation_coefficients"))
+    counts = ", ".join(
+        f"{key}: {model[key]}" for key in ("position_coefficients", "rotation_coefficients")
+    )
     return f"{{kind: kinematic, arrangement: MB2, rotations: {model['rotations']}, {counts}}}"
 
 
 def probe_text(probe: Problem) -> str:
     if not probe["free"]:
         return metres(probe["offset"])
-    return f"{{offset: {metres(probe['offset'])}, standard_uncertainty: {probe['standard_uncertainty']} m}}"
+    return (
+        f"{{offset: {metres(probe['offset'])}, standard_uncertainty:"
+        f" {probe['standard_uncertainty']} m}}"
+    )
 
 
 def artefact_text(problem: Problem, artefact: Problem) -> str:
     if artefact["role"] == "gauge":
         directions = ", ".join(f"[{a} deg, {b} deg]" for a, b in artefact["directions_degrees"])
-        return f"{{kind: bryan_gauge, radius: {problem['lengths'][0]['nominal']} m, directions: [{directions}]}}"
-    balls = (f'\n      "{ball_name(k)}": {metres(ball)}' for k, ball in enumerate(artefact["balls"]))
+        return (
+            f"{{kind: bryan_gauge, radius: {problem['lengths'][0]['nominal']} m, directions:"
+            f" [{directions}]}}"
+        )
+    balls = (
+        f'\n      "{ball_name(k)}": {metres(ball)}' for k, ball in enumerate(artefact["balls"])
+    )
     return "\n    kind: balls\n    coordinates:" + "".join(balls)
 
 
@@ -79,10 +100,16 @@ def position_lines(problem: Problem, number: str) -> list[str]:
     position = problem["positions"][int(number)]
     role = problem["artefacts"][int(position["artefact"])]["role"]
     angles = position["rotation_degrees"]
-    rotation = f"{angles[0]} deg" if len(angles) == 1 else "[" + ", ".join(f"{angle} deg" for angle in angles) + "]"
+    rotation = (
+        f"{angles[0]} deg"
+        if len(angles) == 1
+        else "[" + ", ".join(f"{angle} deg" for angle in angles) + "]"
+    )
     turned = "" if role == "gauge" else f", rotation: {rotation}"
     own = [reading for reading in problem["readings"] if reading["position"] == number]
-    probes = list(dict.fromkeys(problem["probes"][int(reading["probe"])]["name"] for reading in own))
+    probes = list(
+        dict.fromkeys(problem["probes"][int(reading["probe"])]["name"] for reading in own)
+    )
     lines = [
         f"  - name: {position['name']}",
         f"    pose: {{origin: {metres(position['origin'])}{turned}}}",
@@ -113,8 +140,14 @@ def calibration_lines(problem: Problem) -> list[str]:
         if item["standard_uncertainty"] is not None:
             gauge = problem["artefacts"][0]["role"] == "gauge"
             distance = f"[{{balls: [1, 2], distance: {item['value']} m}}]"
-            what = f"radius, value: {item['value']} m" if gauge else f"distances, pairs: all, values: {distance}"
-            lines.append(f"  - {{kind: {what}, standard_uncertainty: {item['standard_uncertainty']} m}}")
+            what = (
+                f"radius, value: {item['value']} m"
+                if gauge
+                else f"distances, pairs: all, values: {distance}"
+            )
+            lines.append(
+                f"  - {{kind: {what}, standard_uncertainty: {item['standard_uncertainty']} m}}"
+            )
     return ["calibration:", *lines, ""] if lines else []
 
 
@@ -153,7 +186,10 @@ def certificate_text(problem: Problem) -> str:
 def files(problem: Problem) -> dict[str, str]:
     """Names and contents of the files that hold the problem for ballplate."""
     name = problem["name"]
-    found = {f"{name}.yaml": experiment_text(problem), f"{name}-certificate.csv": certificate_text(problem)}
+    found = {
+        f"{name}.yaml": experiment_text(problem),
+        f"{name}-certificate.csv": certificate_text(problem),
+    }
     if "estimate" in problem["certified"]:
         found[f"{name}.csv"] = readings_text(problem)
     return {key: text for key, text in found.items() if text}

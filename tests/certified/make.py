@@ -1,8 +1,9 @@
 """Writes the certified problems: `python -m tests.certified.make [NAME …]`, into designs/certified.
 
-Readings are built so that their answer is known beforehand: noise, projected on what no change of parameters can
-follow, is added to the readings of a chosen state, which is then the least-squares estimate. They are rounded to
-femtometres, and the estimate of the rounded readings is computed in 120 digits.
+Readings are built so that their answer is known beforehand: noise, projected on what no change of
+parameters can follow, is added to the readings of a chosen state, which is then the least-squares
+estimate. They are rounded to femtometres, and the estimate of the rounded readings is computed in
+120 digits.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from .experiment_text import files
 from .problems import PROBLEMS, Problem
 
 FOLDER = Path("designs", "certified")
-# Digits after the point of readings and certified values in metres, and digits of what is certified.
+# Digits after the point of readings and certified values in metres, and digits of what is
+# certified.
 DECIMALS = 15
 CERTIFIED_DIGITS = 25
 # What readings may still change by, in metres, when their noise is made orthogonal once more.
@@ -31,7 +33,9 @@ MARK = "number "
 
 
 def decimals(value: Any) -> Any:
-    """The same with every number but truth values as a decimal of many digits, as it is written in a file."""
+    """The same with every number but truth values as a decimal of many digits, as it is written in
+    a file.
+    """
     return json.loads(json.dumps(value), parse_float=exact.number, parse_int=exact.number)
 
 
@@ -50,7 +54,9 @@ def drawn_state(problem: Problem, seed: int) -> exact.State:
 
 
 def built(problem: Problem, seed: int) -> tuple[Problem, exact.State]:
-    """The problem with readings and certified values to which a drawn state is the estimate, and that state."""
+    """The problem with readings and certified values to which a drawn state is the estimate, and
+    that state.
+    """
     state = drawn_state(problem, seed)
     random = Random(seed + 1)
     noise: list[Any] | None = None
@@ -69,21 +75,32 @@ def built(problem: Problem, seed: int) -> tuple[Problem, exact.State]:
         for value, derivative in zip(noise, linear.derivatives, strict=True):
             for key, slope in derivative.items():
                 gradient[key] += slope * value
-        step = {key: sum((row[o] * gradient[o] for o in row), mpf(0)) for key, row in inverse.items()}
+        step = {
+            key: sum((row[o] * gradient[o] for o in row), mpf(0)) for key, row in inverse.items()
+        }
         noise = [
             value - sum((slope * step[key] for key, slope in derivative.items()), mpf(0))
             for value, derivative in zip(noise, linear.derivatives, strict=True)
         ]
         p, x = with_residuals(p, state, target, noise)
         # The derivatives are those at readings that the noise has moved.
-        if max(abs(a - b) for new, old in zip(x, before, strict=True) for a, b in zip(new, old, strict=True)) < SETTLED:
+        if (
+            max(
+                abs(a - b)
+                for new, old in zip(x, before, strict=True)
+                for a, b in zip(new, old, strict=True)
+            )
+            < SETTLED
+        ):
             break
     rounded = [[mpf(nstr_fixed(c)) for c in values] for values in x]
     for key in ("distances", "coordinates", "lengths", "priors"):
         p = {**p, key: [{**item, "value": mpf(nstr_fixed(item["value"]))} for item in p[key]]}
     # A probe is drawn with the offset that its certificate states, and a gauge with its radius.
     stated = [[mpf(nstr_fixed(c)) for c in probe["stated"]] for probe in p["probes"]]
-    probes = [{**probe, "stated": c, "offset": c} for probe, c in zip(p["probes"], stated, strict=True)]
+    probes = [
+        {**probe, "stated": c, "offset": c} for probe, c in zip(p["probes"], stated, strict=True)
+    ]
     if any(artefact["role"] == "gauge" for artefact in p["artefacts"]):
         p = {**p, "lengths": [{**item, "nominal": item["value"]} for item in p["lengths"]]}
     return exact.with_readings({**p, "probes": probes}, rounded), state
@@ -97,12 +114,17 @@ def of_plate(problem: Problem, reading: Problem) -> bool:
 def with_residuals(
     problem: Problem, state: exact.State, target: list[Any], noise: list[Any]
 ) -> tuple[Problem, list[Any]]:
-    """The problem with certified values, and the readings, whose whitened residuals at `state` are `noise`."""
+    """The problem with certified values, and the readings, whose whitened residuals at `state` are
+    `noise`.
+    """
     left = iter(noise)
     moved = [list(place) for place in target]
     for k, reading in enumerate(problem["readings"]):
         if of_plate(problem, reading):
-            moved[k] = [c + u * next(left) for c, u in zip(moved[k], reading["standard_uncertainty"], strict=True)]
+            moved[k] = [
+                c + u * next(left)
+                for c, u in zip(moved[k], reading["standard_uncertainty"], strict=True)
+            ]
     p = dict(problem)
     p["distances"] = []
     for item in problem["distances"]:
@@ -125,15 +147,24 @@ def with_residuals(
         by = item["standard_uncertainty"] * next(left)
         moved[first] = [c + by * a / length for c, a in zip(start, apart, strict=True)]
     p["lengths"] = [
-        {**item, "value": state.lengths[k] - item["standard_uncertainty"] * next(left)}
-        if item["standard_uncertainty"] is not None
-        else item
+        (
+            {**item, "value": state.lengths[k] - item["standard_uncertainty"] * next(left)}
+            if item["standard_uncertainty"] is not None
+            else item
+        )
         for k, item in enumerate(problem["lengths"])
     ]
     p["probes"] = [
-        {**probe, "stated": [c - probe["standard_uncertainty"] * next(left) for c in state.offsets[k]]}
-        if probe["free"]
-        else probe
+        (
+            {
+                **probe,
+                "stated": [
+                    c - probe["standard_uncertainty"] * next(left) for c in state.offsets[k]
+                ],
+            }
+            if probe["free"]
+            else probe
+        )
         for k, probe in enumerate(problem["probes"])
     ]
     p["priors"] = []
@@ -154,7 +185,9 @@ def nstr_fixed(value: Any) -> str:
 def certified(problem: Problem, state: exact.State | None) -> Problem:
     """What is certified: the design as drawn and, if it has readings, the estimate."""
     drawn = exact.as_drawn(problem)
-    rows = exact.linearised(problem, drawn.state, exact.rows(problem, exact.error_free(problem, drawn.state)))
+    rows = exact.linearised(
+        problem, drawn.state, exact.rows(problem, exact.error_free(problem, drawn.state))
+    )
     found: Problem = {
         "as_drawn": {
             "equations": mpf(len(rows.residuals)),
@@ -165,23 +198,34 @@ def certified(problem: Problem, state: exact.State | None) -> Problem:
     }
     if state is None:
         return found
-    # What nothing determines as drawn, errors and noise seem to determine a little, which is no answer to certify.
+    # What nothing determines as drawn, errors and noise seem to determine a little, which is no
+    # answer to certify.
     assert not drawn.null
     solution = exact.estimate(problem, state)
     assert not solution.null and solution.steps[-1] < mpf(10) ** exact.SMALL_STEP, solution.steps
     model = problem["error_model"]
     found["estimate"] = {
         "sum_of_squares": solution.sum_of_squares,
-        "machine": dict(zip(exact.machine_names(model), exact.quoted(model, solution.state.machine), strict=True)),
+        "machine": dict(
+            zip(
+                exact.machine_names(model), exact.quoted(model, solution.state.machine), strict=True
+            )
+        ),
         "balls": [
-            balls for balls, a in zip(solution.state.balls, problem["artefacts"], strict=True) if a["role"] == "plate"
+            balls
+            for balls, a in zip(solution.state.balls, problem["artefacts"], strict=True)
+            if a["role"] == "plate"
         ],
         "origins": [
             origin
             for origin, position in zip(solution.state.origins, problem["positions"], strict=True)
             if position["free"]
         ],
-        "offsets": [o for o, probe in zip(solution.state.offsets, problem["probes"], strict=True) if probe["free"]],
+        "offsets": [
+            o
+            for o, probe in zip(solution.state.offsets, problem["probes"], strict=True)
+            if probe["free"]
+        ],
         "lengths": solution.state.lengths,
         "uncertainties": exact.uncertainties(problem, solution),
         "built_within": max(solution.steps),
@@ -217,7 +261,9 @@ def dumped(problem: Problem) -> str:
 
 
 def made(given: Problem, seed: int) -> Problem:
-    """A problem as it is written: with readings unless it is planned only, and with its certified answers."""
+    """A problem as it is written: with readings unless it is planned only, and with its certified
+    answers.
+    """
     with mp.workdps(exact.DIGITS):
         problem = decimals(given)
         planned_only = problem.pop("planned_only", False)

@@ -1,9 +1,9 @@
 """Least squares in many digits: the answers that certified problems are given.
 
-Nothing of the project is used here, and no structure of the equations: the residuals are written down as the format
-of certified problems defines them, derivatives are central differences with a step of 1e-40, and the normal
-equations are solved with 120 digits, where squaring the condition does no harm. A problem is what `json` reads from its
-file with every number as a decimal.
+Nothing of the project is used here, and no structure of the equations: the residuals are written
+down as the format of certified problems defines them, derivatives are central differences with a
+step of 1e-40, and the normal equations are solved with 120 digits, where squaring the condition
+does no harm. A problem is what `json` reads from its file with every number as a decimal.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ DIGITS = 120
 STEP_EXPONENT = -40
 # The steps shrink by some six orders of magnitude each time.
 SMALL_STEP = -30
-# A slope below this fraction of its row's largest, and a pivot below this one of its column's square, are what
-# differences leave of zero.
+# A slope below this fraction of its row's largest, and a pivot below this one of its column's
+# square, are what differences leave of zero.
 NO_PIVOT = -60
 
 Number = Any
@@ -38,7 +38,9 @@ def number(text: str) -> Number:
 
 @dataclass(frozen=True)
 class State:
-    """All parameters: machine, balls by artefact, origins and rotations of positions, offsets, lengths of standards."""
+    """All parameters: machine, balls by artefact, origins and rotations of positions, offsets,
+    lengths of standards.
+    """
 
     machine: Vector
     balls: list[list[Vector]]
@@ -58,7 +60,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Solution:
-    """The state, the sum of squares, parameters in order, what is open, and a generalised inverse."""
+    """The state, the sum of squares, parameters in order, what is open, and a generalised
+    inverse.
+    """
 
     state: State
     sum_of_squares: Number
@@ -70,7 +74,9 @@ class Solution:
 
 @dataclass(frozen=True)
 class Function:
-    """An error function: its name, the axis that moves, what it displaces along or turns about, its coefficients."""
+    """An error function: its name, the axis that moves, what it displaces along or turns about, its
+    coefficients.
+    """
 
     name: str
     axis: int
@@ -101,26 +107,36 @@ def functions_of(position: int, rotation_: int) -> tuple[Function, ...]:
         for axis in range(3):
             for component in range(3):
                 name = f"E{letters[component]}{TRANSLATIONS[axis]}"
-                found.append(Function(name, axis, component, letters == ROTATIONS, count, name in ZERO_AT_ONE))
+                found.append(
+                    Function(
+                        name, axis, component, letters == ROTATIONS, count, name in ZERO_AT_ONE
+                    )
+                )
     return tuple(found)
 
 
 def machine_names(model: dict[str, Any]) -> list[str]:
-    """Names of the quoted parameters: coefficients of t, t^2, ... of each function, or those of the metric."""
+    """Names of the quoted parameters: coefficients of t, t^2, ... of each function, or those of the
+    metric.
+    """
     if model["kind"] == "metric":
         return list(model["parameters"])
     return [f"{f.name} t^{k + 1}" for f in functions(model) for k in range(f.quoted)]
 
 
 def free_machine(model: dict[str, Any]) -> int:
-    """Number of free parameters: a function that is zero at 1 has no linear coefficient of its own."""
+    """Number of free parameters: a function that is zero at 1 has no linear coefficient of its
+    own.
+    """
     if model["kind"] == "metric":
         return len(model["parameters"])
     return sum(f.free for f in functions(model))
 
 
 def quoted(model: dict[str, Any], a: Vector) -> Vector:
-    """The quoted parameters of free ones: the linear coefficient makes the function vanish at 1 where it has to."""
+    """The quoted parameters of free ones: the linear coefficient makes the function vanish at 1
+    where it has to.
+    """
     if model["kind"] == "metric":
         return list(a)
     found: Vector = []
@@ -170,7 +186,9 @@ def error(problem: dict[str, Any], x: Vector, a: Vector, p: Vector) -> Vector:
 
 
 def metric_error(problem: dict[str, Any], x: Vector, a: Vector, p: Vector) -> Vector:
-    """Straight axes: readings less than true lengths by the scale errors, angles that are not right."""
+    """Straight axes: readings less than true lengths by the scale errors, angles that are not
+    right.
+    """
     names = problem["error_model"]["parameters"]
     value = dict(zip(names, a, strict=True))
     if problem["dimension"] == 2:
@@ -180,7 +198,8 @@ def metric_error(problem: dict[str, Any], x: Vector, a: Vector, p: Vector) -> Ve
     lower = problem["volume"]["lower"]
     c, b, a_ = (value[name] for name in ("C0Y", "B0Z", "A0Z"))
     second = [-sin(c), cos(c), mpf(0)]
-    # Unit vector with the stated angles to the first two: its products with them are sin b and -sin a.
+    # Unit vector with the stated angles to the first two: its products with them are sin b and -sin
+    # a.
     across = (-sin(a_) - sin(b) * second[0]) / second[1]
     third = [sin(b), across, sqrt(1 - sin(b) ** 2 - across**2)]
     axes = ([mpf(1), mpf(0), mpf(0)], second, third)
@@ -222,7 +241,9 @@ def rotation(turns: list[tuple[Number, Number]]) -> list[Vector]:
 
 
 def turned(rotation: list[Vector], vector: Vector) -> list[Vector]:
-    """A rotation followed by a turn about `vector` by its length (Rodrigues), or by an angle in the plane."""
+    """A rotation followed by a turn about `vector` by its length (Rodrigues), or by an angle in the
+    plane.
+    """
     if len(vector) == 1:
         turn = about_fixed_axes(vector)
     else:
@@ -252,14 +273,20 @@ def nominal_state(problem: dict[str, Any]) -> State:
 
 
 def place(problem: dict[str, Any], state: State, position: int, ball: int) -> Vector:
-    """Where a ball is in the machine, x = R y + o; of a standard of length l, y is l along its direction, or 0."""
+    """Where a ball is in the machine, x = R y + o; of a standard of length l, y is l along its
+    direction, or 0.
+    """
     number_of = int(problem["positions"][position]["artefact"])
     artefact = problem["artefacts"][number_of]
     if artefact["role"] == "plate":
         own = state.balls[number_of][ball]
     elif artefact["role"] == "gauge":
         azimuth, elevation = (angle / 180 for angle in artefact["directions_degrees"][ball])
-        unit = [cospi(elevation) * cospi(azimuth), cospi(elevation) * sinpi(azimuth), sinpi(elevation)]
+        unit = [
+            cospi(elevation) * cospi(azimuth),
+            cospi(elevation) * sinpi(azimuth),
+            sinpi(elevation),
+        ]
         own = [state.lengths[0] * c for c in unit]
     else:
         own = [state.lengths[0] * ball, mpf(0), mpf(0)]
@@ -286,7 +313,11 @@ def parameters(problem: dict[str, Any]) -> list[Key]:
     found: list[Key] = [("machine", k) for k in range(free_machine(problem["error_model"]))]
     for n, artefact in enumerate(problem["artefacts"]):
         if artefact["role"] == "plate":
-            found += [("ball", n, j, i) for j, ball in enumerate(artefact["balls"]) for i in range(len(ball))]
+            found += [
+                ("ball", n, j, i)
+                for j, ball in enumerate(artefact["balls"])
+                for i in range(len(ball))
+            ]
     for k, position in enumerate(problem["positions"]):
         found += [("pose", k, c) for c in position["free"]]
     for k, probe in enumerate(problem["probes"]):
@@ -340,8 +371,13 @@ def rows(problem: dict[str, Any], x: list[Vector]) -> list[Row]:
     last: dict[int, tuple[State, Vector]] = {}
 
     def corrected(state: State, i: int) -> Vector:
-        # Most parameters change neither the machine nor the probes, and these lists then are the same.
-        if i in last and last[i][0].machine is state.machine and last[i][0].offsets is state.offsets:
+        # Most parameters change neither the machine nor the probes, and these lists then are the
+        # same.
+        if (
+            i in last
+            and last[i][0].machine is state.machine
+            and last[i][0].offsets is state.offsets
+        ):
             return last[i][1]
         e = error(problem, x[i], state.machine, state.offsets[int(problem["readings"][i]["probe"])])
         last[i] = state, [x[i][k] + e[k] for k in range(d)]
@@ -353,17 +389,26 @@ def rows(problem: dict[str, Any], x: list[Vector]) -> list[Row]:
         if problem["artefacts"][artefact]["role"] != "plate":
             continue
         involved = [*machine, *(("ball", artefact, ball, k) for k in range(d))]
-        involved += [("pose", position, c) for c in range(6)] + [("offset", probe, k) for k in range(d)]
+        involved += [("pose", position, c) for c in range(6)] + [
+            ("offset", probe, k) for k in range(d)
+        ]
 
-        def of_reading(state: State, i: int = i, position: int = position, ball: int = ball) -> Vector:
+        def of_reading(
+            state: State, i: int = i, position: int = position, ball: int = ball
+        ) -> Vector:
             at, measured = place(problem, state, position, ball), corrected(state, i)
-            return [(measured[k] - at[k]) / u for k, u in enumerate(problem["readings"][i]["standard_uncertainty"])]
+            return [
+                (measured[k] - at[k]) / u
+                for k, u in enumerate(problem["readings"][i]["standard_uncertainty"])
+            ]
 
         add(involved, of_reading)
     for item in problem["distances"]:
         n, (i, j) = int(item["artefact"]), (int(ball) for ball in item["balls"])
 
-        def of_distance(state: State, item: Any = item, n: int = n, i: int = i, j: int = j) -> Vector:
+        def of_distance(
+            state: State, item: Any = item, n: int = n, i: int = i, j: int = j
+        ) -> Vector:
             apart = [u - v for u, v in zip(state.balls[n][i], state.balls[n][j], strict=True)]
             return [(norm(apart) - item["value"]) / item["standard_uncertainty"]]
 
@@ -372,7 +417,9 @@ def rows(problem: dict[str, Any], x: list[Vector]) -> list[Row]:
         key = ("ball", int(item["artefact"]), int(item["ball"]), int(item["axis"]))
 
         def of_coordinate(state: State, item: Any = item, key: Key = key) -> Vector:
-            return [(state.balls[key[1]][key[2]][key[3]] - item["value"]) / item["standard_uncertainty"]]
+            return [
+                (state.balls[key[1]][key[2]][key[3]] - item["value"]) / item["standard_uncertainty"]
+            ]
 
         add([key], of_coordinate)
     for item in problem["measured_lengths"]:
@@ -403,7 +450,9 @@ def rows(problem: dict[str, Any], x: list[Vector]) -> list[Row]:
             for i in range(d):
 
                 def of_offset(state: State, k: int = k, i: int = i, probe: Any = probe) -> Vector:
-                    return [(state.offsets[k][i] - probe["stated"][i]) / probe["standard_uncertainty"]]
+                    return [
+                        (state.offsets[k][i] - probe["stated"][i]) / probe["standard_uncertainty"]
+                    ]
 
                 add([("offset", k, i)], of_offset)
     for item in problem["priors"]:
@@ -452,7 +501,9 @@ def without_rounding(slopes: dict[Key, Number]) -> dict[Key, Number]:
 
 
 def solve(problem: dict[str, Any], state: State, x: list[Vector], most: int) -> Solution:
-    """Gauss-Newton from `state` until a step is below 1e-30, at most `most` times; none gives the factor there."""
+    """Gauss-Newton from `state` until a step is below 1e-30, at most `most` times; none gives the
+    factor there.
+    """
     every = rows(problem, x)
     keys = parameters(problem)
     steps: list[Number] = []
@@ -465,7 +516,10 @@ def solve(problem: dict[str, Any], state: State, x: list[Vector], most: int) -> 
         for residual, derivative in zip(linear.residuals, linear.derivatives, strict=True):
             for key, slope in derivative.items():
                 gradient[key] += slope * residual
-        change = {key: -sum((row[other] * gradient[other] for other in row), mpf(0)) for key, row in inverse.items()}
+        change = {
+            key: -sum((row[other] * gradient[other] for other in row), mpf(0))
+            for key, row in inverse.items()
+        }
         steps.append(max(abs(value) for value in change.values()))
         state = changed(problem, state, change)
     total = sum((residual**2 for residual in linear.residuals), mpf(0))
@@ -475,7 +529,9 @@ def solve(problem: dict[str, Any], state: State, x: list[Vector], most: int) -> 
 def inverted(
     keys: list[Key], derivatives: list[dict[Key, Number]]
 ) -> tuple[dict[Key, dict[Key, Number]], list[dict[Key, Number]]]:
-    """A generalised inverse of the normal matrix, and its null vectors, by elimination of the largest pivots."""
+    """A generalised inverse of the normal matrix, and its null vectors, by elimination of the
+    largest pivots.
+    """
     place_of = {key: i for i, key in enumerate(keys)}
     n = len(keys)
     normal = [[mpf(0)] * n for _ in range(n)]
@@ -515,12 +571,16 @@ def inverted(
         vector = {keys[free]: mpf(1)}
         vector.update({keys[i]: -work[i][free] for i in used})
         null.append(vector)
-    inverse = {keys[i]: {keys[j]: work[i][n + j] for j in used} if i not in left else {} for i in range(n)}
+    inverse = {
+        keys[i]: {keys[j]: work[i][n + j] for j in used} if i not in left else {} for i in range(n)
+    }
     return inverse, null
 
 
 def spread(solution: Solution, rows_: list[dict[Key, Number]]) -> list[Number | None]:
-    """Standard uncertainties of linear functions for sigma = 1; None where a null vector changes one."""
+    """Standard uncertainties of linear functions for sigma = 1; None where a null vector changes
+    one.
+    """
     found: list[Number | None] = []
     for row in rows_:
         size = norm(list(row.values()))
@@ -535,7 +595,9 @@ def spread(solution: Solution, rows_: list[dict[Key, Number]]) -> list[Number | 
         for key, c in row.items():
             if c:
                 own = solution.inverse[key]
-                total += c * sum((own.get(other, mpf(0)) * e for other, e in row.items() if e), mpf(0))
+                total += c * sum(
+                    (own.get(other, mpf(0)) * e for other, e in row.items() if e), mpf(0)
+                )
         found.append(sqrt(total))
     return found
 
@@ -554,7 +616,9 @@ def uncertainties(problem: dict[str, Any], solution: Solution) -> dict[str, dict
     """U1 to U6, for the stated uncertainties."""
     model, state, d = problem["error_model"], solution.state, int(problem["dimension"])
     machine = [key for key in solution.keys if key[0] == "machine"]
-    functions_of: dict[str, list[dict[Key, Number]]] = {symbol: [] for symbol in ("U1", "U2", "U3", "U4", "U5", "U6")}
+    functions_of: dict[str, list[dict[Key, Number]]] = {
+        symbol: [] for symbol in ("U1", "U2", "U3", "U4", "U5", "U6")
+    }
     functions_of["U1"] = [{key: mpf(1)} for key in solution.keys if key[0] == "ball"]
     functions_of["U2"] = [{key: mpf(1)} for key in solution.keys if key[0] == "pose"]
     units = [[mpf(i == k) for i in range(len(machine))] for k in range(len(machine))]
@@ -586,13 +650,17 @@ def uncertainties(problem: dict[str, Any], solution: Solution) -> dict[str, dict
                 for key, slope in point[k].items():
                     row[key] = row.get(key, mpf(0)) + sign * apart[k] / length * slope
         functions_of["U6"].append(row)
-    return {symbol: summary(spread(solution, found)) for symbol, found in functions_of.items() if found}
+    return {
+        symbol: summary(spread(solution, found)) for symbol, found in functions_of.items() if found
+    }
 
 
 def by_parameters(
     problem: dict[str, Any], solution: Solution, x: Vector, p: Vector, step: Number
 ) -> list[dict[Key, Number]]:
-    """Derivatives of the correction at a point, by machine parameters and by the offset of the points' probe."""
+    """Derivatives of the correction at a point, by machine parameters and by the offset of the
+    points' probe.
+    """
     d, probe = int(problem["dimension"]), int(problem["point_probe"])
     found: list[dict[Key, Number]] = [{} for _ in range(d)]
     for key in solution.keys:
@@ -622,12 +690,16 @@ def estimate(problem: dict[str, Any], start: State) -> Solution:
 
 
 def with_readings(problem: dict[str, Any], x: list[Vector]) -> dict[str, Any]:
-    told = [{**reading, "x": values} for reading, values in zip(problem["readings"], x, strict=True)]
+    told = [
+        {**reading, "x": values} for reading, values in zip(problem["readings"], x, strict=True)
+    ]
     return {**problem, "readings": told}
 
 
 def without_error(problem: dict[str, Any], state: State, target: list[Vector]) -> list[Vector]:
-    """Scale readings x with x + e(x, a, p) = target: an iteration that gains five digits each time."""
+    """Scale readings x with x + e(x, a, p) = target: an iteration that gains five digits each
+    time.
+    """
     found = []
     for reading, place_ in zip(problem["readings"], target, strict=True):
         p = state.offsets[int(reading["probe"])]

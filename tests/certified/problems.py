@@ -23,7 +23,9 @@ TIPS = {"x": ("right", "left"), "y": ("back", "front"), "z": ("down",)}
 MICROMETRE = 1e-6
 
 
-def problem(name: str, title: str, why: str, volume: list[list[float]], model: Problem, probes: Problem) -> Problem:
+def problem(
+    name: str, title: str, why: str, volume: list[list[float]], model: Problem, probes: Problem
+) -> Problem:
     """A problem without artefacts, positions and readings."""
     return {
         "name": name,
@@ -33,7 +35,13 @@ def problem(name: str, title: str, why: str, volume: list[list[float]], model: P
         "volume": {"lower": volume[0], "upper": volume[1]},
         "error_model": model,
         "probes": [
-            {"name": key, "offset": offset, "free": False, "standard_uncertainty": None, "stated": offset}
+            {
+                "name": key,
+                "offset": offset,
+                "free": False,
+                "standard_uncertainty": None,
+                "stated": offset,
+            }
             for key, offset in probes.items()
         ],
         "artefacts": [],
@@ -66,7 +74,9 @@ def grid(columns: int, rows: int, width: float, height: float) -> list[list[floa
 
 
 def turned_in_plane(plane: str, turns: int) -> tuple[list[list[int]], list[int]]:
-    """Matrix of a plate across an axis after quarter turns, and angles in degrees about fixed x, then y, then z."""
+    """Matrix of a plate across an axis after quarter turns, and angles in degrees about fixed x,
+    then y, then z.
+    """
     first, second = ALONG[plane]
     frame = [[0] * 3 for _ in range(3)]
     axes = [(first, 1), (second, 1), (first, -1), (second, -1)]
@@ -81,7 +91,9 @@ def turned_in_plane(plane: str, turns: int) -> tuple[list[list[int]], list[int]]
 
 def quarter_rotation(angles: tuple[int, ...]) -> list[list[int]]:
     """Rz Ry Rx of multiples of 90 degrees, exactly."""
-    (ca, sa), (cb, sb), (cc, sc) = (((1, 0), (0, 1), (-1, 0), (0, -1))[angle // 90] for angle in angles)
+    (ca, sa), (cb, sb), (cc, sc) = (
+        ((1, 0), (0, 1), (-1, 0), (0, -1))[angle // 90] for angle in angles
+    )
     return [
         [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
         [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
@@ -93,11 +105,15 @@ def add_plate_position(
     given: Problem, name: str, plane: str, level: float, corner: tuple[float, float], turns: int, tips: tuple[str, ...],
     uncertainty: list[float], balls: list[int] | None = None, artefact: int = 0, free: bool = True,
 ) -> None:  # fmt: skip
-    """Stand a plate across an axis with the lower corner of its bounding rectangle at `corner`, and read it."""
+    """Stand a plate across an axis with the lower corner of its bounding rectangle at `corner`, and
+    read it.
+    """
     matrix, angles = turned_in_plane(plane, turns)
     first, second = ALONG[plane]
     every = given["artefacts"][artefact]["balls"]
-    placed = [[sum(m * c for m, c in zip(row, ball, strict=True)) for row in matrix] for ball in every]
+    placed = [
+        [sum(m * c for m, c in zip(row, ball, strict=True)) for row in matrix] for ball in every
+    ]
     origin = [0.0] * 3
     for axis, at in ((first, corner[0]), (second, corner[1])):
         origin[axis] = round(at - min(ball[axis] for ball in placed), 9)
@@ -110,10 +126,21 @@ def add_plate_position(
 
 
 def add_position(
-    given: Problem, name: str, artefact: int, origin: list[float], angles: list[float], free: list[int]
+    given: Problem,
+    name: str,
+    artefact: int,
+    origin: list[float],
+    angles: list[float],
+    free: list[int],
 ) -> None:
     given["positions"].append(
-        {"name": name, "artefact": artefact, "origin": origin, "rotation_degrees": angles, "free": free}
+        {
+            "name": name,
+            "artefact": artefact,
+            "origin": origin,
+            "rotation_degrees": angles,
+            "free": free,
+        }
     )
 
 
@@ -121,7 +148,12 @@ def read(given: Problem, ball: int, probe: int, uncertainty: list[float]) -> int
     """Read a ball in the last position; the number of the reading."""
     position = len(given["positions"]) - 1
     given["readings"].append(
-        {"position": position, "ball": ball, "probe": probe, "standard_uncertainty": list(uncertainty)}
+        {
+            "position": position,
+            "ball": ball,
+            "probe": probe,
+            "standard_uncertainty": list(uncertainty),
+        }
     )
     return len(given["readings"]) - 1
 
@@ -130,16 +162,25 @@ def add_plate(given: Problem, name: str, balls: list[list[float]], role: str = "
     given["artefacts"].append({"name": name, "role": role, "balls": balls})
 
 
-def add_distances(given: Problem, pairs: list[tuple[int, int]], uncertainty: float, artefact: int = 0) -> None:
+def add_distances(
+    given: Problem, pairs: list[tuple[int, int]], uncertainty: float, artefact: int = 0
+) -> None:
     balls = given["artefacts"][artefact]["balls"]
     for i, j in pairs:
         length = sum((u - v) ** 2 for u, v in zip(balls[i], balls[j], strict=True)) ** 0.5
         given["distances"].append(
-            {"artefact": artefact, "balls": [i, j], "value": round(length, 9), "standard_uncertainty": uncertainty}
+            {
+                "artefact": artefact,
+                "balls": [i, j],
+                "value": round(length, 9),
+                "standard_uncertainty": uncertainty,
+            }
         )
 
 
-def add_coordinates(given: Problem, balls: list[int], uncertainty: float, artefact: int = 0) -> None:
+def add_coordinates(
+    given: Problem, balls: list[int], uncertainty: float, artefact: int = 0
+) -> None:
     for ball, axis in product(balls, range(given["dimension"])):
         given["coordinates"].append(
             {
@@ -155,7 +196,10 @@ def add_coordinates(given: Problem, balls: list[int], uncertainty: float, artefa
 def add_points(given: Problem, shares: list[tuple[float, ...]]) -> None:
     lower, upper = given["volume"]["lower"], given["volume"]["upper"]
     given["points"] = [
-        [round(low + share * (high - low), 9) for share, low, high in zip(point, lower, upper, strict=True)]
+        [
+            round(low + share * (high - low), 9)
+            for share, low, high in zip(point, lower, upper, strict=True)
+        ]
         for point in shares
     ]
 
@@ -179,14 +223,17 @@ SIDES_OF_THREE = [(0, 2), (2, 8), (8, 6), (6, 0)]
 def six_positions(given: Problem, uncertainty: list[float], hold_first: bool = True) -> None:
     for k, (name, plane, level, corner, turns) in enumerate(SIX):
         free = not hold_first or k > 0
-        add_plate_position(given, name, plane, level, corner, turns, TIPS[plane], uncertainty, free=free)
+        add_plate_position(
+            given, name, plane, level, corner, turns, TIPS[plane], uncertainty, free=free
+        )
 
 
 def three_planes() -> Problem:
     given = problem(
         "three-planes",
         "A plate of 3 x 3 balls in six positions",
-        "The ordinary case: four certified sides, a star probe, polynomials with three coefficients.",
+        "The ordinary case: four certified sides, a star probe, polynomials with three"
+        " coefficients.",
         CUBE,
         kinematic(3, 3),
         STAR,
@@ -202,7 +249,8 @@ def certified_coordinates() -> Problem:
     given = problem(
         "certified-coordinates",
         "A plate with certified co-ordinates, all poses free",
-        "The certificate supplies the frame; readings of three different uncertainties, by axis and by position.",
+        "The certificate supplies the frame; readings of three different uncertainties, by axis and"
+        " by position.",
         [[-0.5, 0, -0.8], [0.5, 1.2, 0]],
         kinematic(4, 2),
         STAR,
@@ -228,7 +276,8 @@ def full_rotations() -> Problem:
     given = problem(
         "full-rotations",
         "A machine with large errors, rotations multiplied out",
-        "Errors of tenths of millimetres and milliradians: linearised rotations would be off by micrometres.",
+        "Errors of tenths of millimetres and milliradians: linearised rotations would be off by"
+        " micrometres.",
         CUBE,
         kinematic(3, 2, "full"),
         STAR,
@@ -245,7 +294,8 @@ def unknown_offsets() -> Problem:
     given = problem(
         "unknown-offsets",
         "Probe offsets among the parameters",
-        "Offsets with a standard uncertainty of 10 um but for the first; they trade against poses and errors.",
+        "Offsets with a standard uncertainty of 10 um but for the first; they trade against poses"
+        " and errors.",
         CUBE,
         kinematic(3, 3),
         STAR,
@@ -282,7 +332,8 @@ def weak() -> Problem:
     given = problem(
         "weak",
         "A nearly symmetrical design",
-        "The deficient design with one position turned by 0.2 degrees: lengths to 32 um from readings to 0.2 um.",
+        "The deficient design with one position turned by 0.2 degrees: lengths to 32 um from"
+        " readings to 0.2 um.",
         CUBE,
         kinematic(3, 3),
         STAR,
@@ -297,7 +348,12 @@ def weak() -> Problem:
 
 def symmetrical(given: Problem) -> None:
     for k, (name, plane, level, turns) in enumerate(
-        (("z low", "z", 0.1, 0), ("z high", "z", 0.9, 0), ("x middle", "x", 0.5, 3), ("y middle", "y", 0.5, 1))
+        (
+            ("z low", "z", 0.1, 0),
+            ("z high", "z", 0.9, 0),
+            ("x middle", "x", 0.5, 3),
+            ("y middle", "y", 0.5, 1),
+        )
     ):
         add_plate_position(
             given, name, plane, level, (0.125, 0.125), turns, TIPS[plane], [2e-7] * 3, free=k > 0
@@ -313,7 +369,9 @@ def deficient() -> Problem:
         planned_only=True,
     )
     given["positions"][3]["rotation_degrees"][2] -= 0.2
-    given["positions"][3]["rotation_degrees"][2] = round(given["positions"][3]["rotation_degrees"][2])
+    given["positions"][3]["rotation_degrees"][2] = round(
+        given["positions"][3]["rotation_degrees"][2]
+    )
     return given
 
 
@@ -321,7 +379,8 @@ def few_positions() -> Problem:
     given = problem(
         "one-position",
         "Certified co-ordinates and a single position",
-        "The plate is known and most of the machine is not: few uncertainties exist, and those are exact.",
+        "The plate is known and most of the machine is not: few uncertainties exist, and those are"
+        " exact.",
         CUBE,
         kinematic(2, 2),
         STAR,
@@ -354,7 +413,8 @@ def ball_bar() -> Problem:
     given = problem(
         "ball-bar",
         "Scales and squareness from a ball bar",
-        "Lengths between corrected points; the certificate's error is one parameter, wherever the bar is read.",
+        "Lengths between corrected points; the certificate's error is one parameter, wherever the"
+        " bar is read.",
         MACHINE_OF_BARS,
         METRIC,
         {"cone": [0, 0, -0.06]},
@@ -372,7 +432,13 @@ def ball_bar() -> Problem:
 
 def add_length(given: Problem, name: str, nominal: float, uncertainty: float | None) -> None:
     given["lengths"].append(
-        {"name": name, "nominal": nominal, "value": nominal, "standard_uncertainty": uncertainty, "free": True}
+        {
+            "name": name,
+            "nominal": nominal,
+            "value": nominal,
+            "standard_uncertainty": uncertainty,
+            "free": True,
+        }
     )
 
 
@@ -393,15 +459,22 @@ def bars_in_a_plane() -> Problem:
     flat = [k for k, (_, _, angles) in enumerate(BARS) if angles[1] == 0]
     given["positions"] = [given["positions"][k] for k in flat]
     given["readings"] = [
-        {**given["readings"][2 * k + end], "position": place} for place, k in enumerate(flat) for end in (0, 1)
+        {**given["readings"][2 * k + end], "position": place}
+        for place, k in enumerate(flat)
+        for end in (0, 1)
     ]
     given["measured_lengths"] = [
-        {**given["measured_lengths"][k], "first": 2 * place, "second": 2 * place + 1} for place, k in enumerate(flat)
+        {**given["measured_lengths"][k], "first": 2 * place, "second": 2 * place + 1}
+        for place, k in enumerate(flat)
     ]
     return given
 
 
-DIRECTIONS = [[azimuth, elevation] for elevation in (5, 35, 65) for azimuth in (0, 45, 90, 135, 180, 225, 270, 315)]
+DIRECTIONS = [
+    [azimuth, elevation]
+    for elevation in (5, 35, 65)
+    for azimuth in (0, 45, 90, 135, 180, 225, 270, 315)
+]
 
 
 def bryan_gauge() -> Problem:
@@ -439,12 +512,22 @@ def two_dimensions() -> Problem:
     given = problem(
         "two-dimensions",
         "A plate in two positions a quarter turn apart",
-        "The reversal of NBSIR 79-1752 as a least-squares problem: squareness and difference of scales.",
+        "The reversal of NBSIR 79-1752 as a least-squares problem: squareness and difference of"
+        " scales.",
         [[-0.05, -0.4], [0.4, 0.4]],
         {"kind": "metric", "parameters": ["alpha", "gamma"]},
         {"probe": [0, 0]},
     )
-    balls = [[0, 0], [0.32, 0], [0.08, 0.07], [0.004, 0.3], [0.3, 0.35], [0.18, 0.18], [0.31, 0.25], [0.03, 0.1]]
+    balls = [
+        [0, 0],
+        [0.32, 0],
+        [0.08, 0.07],
+        [0.004, 0.3],
+        [0.3, 0.35],
+        [0.18, 0.18],
+        [0.31, 0.25],
+        [0.03, 0.1],
+    ]
     add_plate(given, "plate", balls)
     add_position(given, "turned", 0, [0, 0], [-90], [])
     for ball in range(len(balls)):

@@ -18,7 +18,14 @@ from tests.certified.problems import PROBLEMS
 
 FOLDER = Path(__file__).parents[2] / "designs" / "certified"
 # Those that take a second or less, and the rest, a minute or more each.
-QUICK = ("two-dimensions", "bryan-gauge", "ball-bar", "bars-in-a-plane", "bryan-gauge-unknown-radius", "one-position")
+QUICK = (
+    "two-dimensions",
+    "bryan-gauge",
+    "ball-bar",
+    "bars-in-a-plane",
+    "bryan-gauge-unknown-radius",
+    "one-position",
+)
 NAMES = [make()["name"] for make in PROBLEMS]
 
 
@@ -47,7 +54,9 @@ def test_every_problem_is_there_and_its_files_agree() -> None:
 
 
 def test_built_and_computed_answers_agree() -> None:
-    """The state that readings were built from, and the estimate in many digits, differ by rounding to femtometres."""
+    """The state that readings were built from, and the estimate in many digits, differ by rounding
+    to femtometres.
+    """
     for name in NAMES:
         problem = json.loads(Path(FOLDER, f"{name}.json").read_text(encoding="utf-8"))
         if "estimate" in problem["certified"]:
@@ -74,7 +83,9 @@ def test_uncertainties_have_nine_digits(ours: list[Score]) -> None:
 
 
 def test_estimates_have_four_digits_of_their_uncertainty(ours: list[Score]) -> None:
-    estimates = [score for score in ours if score.part == "estimate" and not score.quantity.startswith("U")]
+    estimates = [
+        score for score in ours if score.part == "estimate" and not score.quantity.startswith("U")
+    ]
     assert len(estimates) > 20
     assert [score for score in estimates if score.digits < 4.0] == []
 
@@ -112,15 +123,24 @@ def test_scores_of_another_program(tmp_path: Path, capsys: pytest.CaptureFixture
     ("text", "told"),
     [("{", "is not JSON"), ("[]", "expected"), ('{"problems": 3}', "expected")],
 )
-def test_results_that_are_none(text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_that_are_none(
+    text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     results = tmp_path / "results.json"
     results.write_text(text)
-    assert main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
+    assert (
+        main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
+    )
     assert told in capsys.readouterr().err
 
 
-def test_unknown_problem_and_empty_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["reproduce", "certified", "--designs", str(FOLDER), "--experiment", "two-dimension"]) == 3
+def test_unknown_problem_and_empty_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(["reproduce", "certified", "--designs", str(FOLDER), "--experiment", "two-dimension"])
+        == 3
+    )
     assert '"two-dimensions"' in capsys.readouterr().err
     assert main(["reproduce", "certified", "--designs", str(tmp_path)]) == 3
     assert "no certified problems here" in capsys.readouterr().err
@@ -131,7 +151,10 @@ def test_unknown_problem_and_empty_folder(tmp_path: Path, capsys: pytest.Capture
     ("change", "note"),
     [
         ({"as_drawn": {"uncertainties": {"U5": {"count": 3}}}}, "3 values instead of 28"),
-        ({"as_drawn": {"uncertainties": {"U5": {"undetermined": None}}}}, "None undetermined instead of 0"),
+        (
+            {"as_drawn": {"uncertainties": {"U5": {"undetermined": None}}}},
+            "None undetermined instead of 0",
+        ),
         ({"as_drawn": {"rank_deficiency": "0"}}, "'0' instead of 0"),
         ({"estimate": {"machine": {"beta": 1.0}}}, "unknown beta"),
         ({"estimate": {"sum_of_squares": 1e9}}, "no digit agrees"),
@@ -142,22 +165,32 @@ def test_what_is_amiss_is_told(
 ) -> None:
     def merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
         return {
-            key: merged(value, other[key]) if isinstance(other.get(key), dict) else other.get(key, value)
+            key: (
+                merged(value, other[key])
+                if isinstance(other.get(key), dict)
+                else other.get(key, value)
+            )
             for key, value in one.items()
         } | {key: value for key, value in other.items() if key not in one}
 
     (problem,) = certified_problems(FOLDER, ["two-dimensions"])
     results = tmp_path / "results.json"
-    results.write_text(json.dumps({"problems": {"two-dimensions": merged(problem.answers, change)}}))
+    results.write_text(
+        json.dumps({"problems": {"two-dimensions": merged(problem.answers, change)}})
+    )
     chosen = ["reproduce", "certified", "--designs", str(FOLDER), "--experiment", "two-dimensions"]
     assert main([*chosen, "--results", str(results)]) == 1
     assert note in capsys.readouterr().out
 
 
-def test_a_problem_that_is_none_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_problem_that_is_none_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     results = tmp_path / "results.json"
     results.write_text('{"problems": {"three planes": {}}}')
-    assert main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
+    assert (
+        main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
+    )
     assert 'no problem "three planes"; did you mean "three-planes"?' in capsys.readouterr().err
 
 
@@ -166,8 +199,16 @@ def test_a_problem_that_is_none_is_named(tmp_path: Path, capsys: pytest.CaptureF
     [
         (["as_drawn"], 5, 'certified.as_drawn: has no mapping "uncertainties"'),
         (["estimate", "uncertainties", "U5", "count"], None, 'U5 has no whole number "count"'),
-        (["estimate", "uncertainties", "U3", "average"], "a", 'U3 has no number "average" above zero'),
-        (["estimate", "uncertainties", "U3", "maximum"], 0.0, 'U3 has no number "maximum" above zero'),
+        (
+            ["estimate", "uncertainties", "U3", "average"],
+            "a",
+            'U3 has no number "average" above zero',
+        ),
+        (
+            ["estimate", "uncertainties", "U3", "maximum"],
+            0.0,
+            'U3 has no number "maximum" above zero',
+        ),
         (["estimate", "sum_of_squares"], [], '"sum_of_squares" is no number'),
         (["estimate", "machine"], {"alpha": "1"}, '"machine" is not of numbers alone'),
         (["estimate", "balls"], [[[1.0, 10**400]]], '"balls" is not of numbers alone'),
@@ -188,12 +229,20 @@ def test_a_damaged_problem_is_told(
 
 
 def test_every_shipped_problem_is_one() -> None:
-    assert {one.name for one in certified_problems(FOLDER, [])} == {path.stem for path in FOLDER.glob("*.json")}
+    assert {one.name for one in certified_problems(FOLDER, [])} == {
+        path.stem for path in FOLDER.glob("*.json")
+    }
 
 
-def test_a_result_beyond_all_numbers_has_no_digit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_result_beyond_all_numbers_has_no_digit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (problem,) = certified_problems(FOLDER, ["two-dimensions"])
     found = json.loads(json.dumps(problem.answers))
     found["estimate"]["sum_of_squares"] = 10**400
-    (score,) = [one for one in scores("two-dimensions", problem.answers, found) if one.quantity == "sum of squares"]
+    (score,) = [
+        one
+        for one in scores("two-dimensions", problem.answers, found)
+        if one.quantity == "sum of squares"
+    ]
     assert score.digits == 0.0 and score.note == "no digit agrees"

@@ -1,4 +1,6 @@
-"""Files of readings that cannot be used: what is said, of which line, and that nothing is fitted."""
+"""Files of readings that cannot be used: what is said, of which line, and that nothing is
+fitted.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Lines:
     return path.read_text(encoding="utf-8").splitlines()
 
 
-def refusals(lines: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], design: str = QUICKSTART) -> Lines:
+def refusals(
+    lines: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], design: str = QUICKSTART
+) -> Lines:
     path = tmp_path / "r.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     capsys.readouterr()
@@ -50,7 +54,9 @@ def test_swapped_balls(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixtur
     ]
 
 
-def test_all_mistakes_are_named_at_once(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_mistakes_are_named_at_once(
+    good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     lines = exchanged(exchanged(good, 5, 9), 60, 71)
     lines = with_cell(lines, 20, 0 + 1, lambda _: "r1c1")
     lines = with_cell(lines, 90, 2, lambda probe: "left" if probe == "right" else "right")
@@ -58,53 +64,81 @@ def test_all_mistakes_are_named_at_once(good: Lines, tmp_path: Path, capsys: pyt
     found = refusals(lines, tmp_path, capsys)
     assert [line.split(":")[0] for line in found] == ["5", "20", "60", "90", "130"]
     assert "swap the names of the balls in lines 5 and 9" in found[0]
-    assert "ball r1c1 in position z low stands where ball r4c4 should be; correct its name" in found[1]
+    assert (
+        "ball r1c1 in position z low stands where ball r4c4 should be; correct its name" in found[1]
+    )
     assert "swap the names of the balls in lines 60 and 71" in found[2]
     assert "fits the probe left, not right; correct the name of the probe" in found[3]
     assert "is 10 mm from where it should be" in found[4] and "y +10 mm" in found[4]
 
 
 @pytest.mark.parametrize("amount", [5.0, 20.0, 300.0])
-def test_one_wrong_reading(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], amount: float) -> None:
+def test_one_wrong_reading(
+    good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], amount: float
+) -> None:
     (line,) = refusals(with_cell(good, 40, 5, lambda z: str(float(z) + amount)), tmp_path, capsys)
-    assert line.startswith("40:1: ball r3c4 in position z high is ") and "correct or remove it" in line
+    assert (
+        line.startswith("40:1: ball r3c4 in position z high is ") and "correct or remove it" in line
+    )
 
 
-@pytest.mark.parametrize(("quarters", "words"), [(3, "by 90 degrees"), (2, "by 180 degrees"), (1, "by 270 degrees")])
+@pytest.mark.parametrize(
+    ("quarters", "words"), [(3, "by 90 degrees"), (2, "by 180 degrees"), (1, "by 270 degrees")]
+)
 def test_a_position_read_in_a_turned_order(
     good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], quarters: int, words: str
 ) -> None:
     names = np.array([[f"r{row}c{column}" for column in range(1, 6)] for row in range(1, 6)])
     turned = dict(zip(names.ravel(), np.rot90(names, quarters).ravel(), strict=True))
     lines = [
-        with_cell([line], 1, 1, lambda ball: turned[ball])[0] if line.startswith("x high") else line for line in good
+        with_cell([line], 1, 1, lambda ball: turned[ball])[0] if line.startswith("x high") else line
+        for line in good
     ]
     (line,) = refusals(lines, tmp_path, capsys)
-    assert f": position x high: the readings fit the plate turned {words}; correct the names" in line
+    assert (
+        f": position x high: the readings fit the plate turned {words}; correct the names" in line
+    )
 
 
-def test_a_position_read_in_mirrored_order(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_position_read_in_mirrored_order(
+    good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Rows and columns confused: the plate as seen from below."""
     lines = [
-        with_cell([line], 1, 1, lambda ball: f"r{ball[3]}c{ball[1]}")[0] if line.startswith("y low") else line
+        (
+            with_cell([line], 1, 1, lambda ball: f"r{ball[3]}c{ball[1]}")[0]
+            if line.startswith("y low")
+            else line
+        )
         for line in good
     ]
     (line,) = refusals(lines, tmp_path, capsys)
     assert ": position y low: the readings fit the plate turned over; correct the names" in line
 
 
-def test_readings_that_are_all_the_same(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_readings_that_are_all_the_same(
+    good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     lines = [good[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in good[1:])]
     found = refusals(lines, tmp_path, capsys)
-    assert len(found) == 6 and all(": only " in line and "of 25 readings fit" in line for line in found[:2])
+    assert len(found) == 6 and all(
+        ": only " in line and "of 25 readings fit" in line for line in found[:2]
+    )
 
 
-def test_names_in_no_order_at_all(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_in_no_order_at_all(
+    good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     order = np.random.default_rng(3).permutation(25)
     names = [good[i].split(",")[1] for i in range(1, 26)]
-    lines = [good[0], *(with_cell([good[i + 1]], 1, 1, lambda _, i=i: names[order[i]])[0] for i in range(25))]
+    lines = [
+        good[0],
+        *(with_cell([good[i + 1]], 1, 1, lambda _, i=i: names[order[i]])[0] for i in range(25)),
+    ]
     (line,) = refusals([*lines, *good[26:]], tmp_path, capsys)
-    assert line.startswith("2:1: position z low: only ") and "correct the names of the balls" in line
+    assert (
+        line.startswith("2:1: position z low: only ") and "correct the names of the balls" in line
+    )
 
 
 TWO_POSITIONS = """\
@@ -125,34 +159,48 @@ def test_two_readings_that_disagree(tmp_path: Path, capsys: pytest.CaptureFixtur
     design.write_text(TWO_POSITIONS, encoding="utf-8")
     assert main(["simulate", str(design), "-o", str(tmp_path / "two.csv")]) == 0
     lines = (tmp_path / "two.csv").read_text(encoding="utf-8").splitlines()
-    (line,) = refusals(with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design))
+    (line,) = refusals(
+        with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design)
+    )
     assert line.startswith("9:1: ball 3 in position turned is ")
     # With a drawing that is as far off nothing tells which of the two is right.
     rough = TWO_POSITIONS.replace("40 mm, 290 mm", "40 mm, 306 mm").replace("20 mm]", "10 mm]")
     design.write_text(rough, encoding="utf-8")
-    (line,) = refusals(with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design))
-    assert line.startswith("4:1: ball 3 in position first stands ") and "in position turned, line 9; correct or" in line
+    (line,) = refusals(
+        with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design)
+    )
+    assert (
+        line.startswith("4:1: ball 3 in position first stands ")
+        and "in position turned, line 9; correct or" in line
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_rough_drawings_and_bad_machines_give_no_alarm(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], seed: int
 ) -> None:
-    """Balls up to a tenth of their distance from where they are drawn, a machine a hundred times worse than usual."""
+    """Balls up to a tenth of their distance from where they are drawn, a machine a hundred times
+    worse than usual.
+    """
     generator = np.random.default_rng(seed)
     places = np.array([(187.5 * i, 187.5 * j) for j in range(5) for i in range(5)])
     drawn = places + generator.uniform(-18.75, 18.75, places.shape)
     text = Path(QUICKSTART).read_text(encoding="utf-8")
-    text = text.replace("position: 2 um", "position: 200 um").replace("rotation: 4 urad", "rotation: 400 urad")
+    text = text.replace("position: 2 um", "position: 200 um").replace(
+        "rotation: 4 urad", "rotation: 400 urad"
+    )
     text = text.partition("calibration:")[0] + "seed: 5\n"
 
     def listed(balls: np.ndarray) -> str:
-        return "{kind: balls, coordinates: [" + ", ".join(f"[{x} mm, {y} mm]" for x, y in balls) + "]}"
+        return (
+            "{kind: balls, coordinates: [" + ", ".join(f"[{x} mm, {y} mm]" for x, y in balls) + "]}"
+        )
 
     grid = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
     assert grid in text
     text = text.replace(
-        "volume: [1 m, 1 m, 1 m]", "volume: {x: [-100 mm, 1.1 m], y: [-100 mm, 1.1 m], z: [-100 mm, 1.1 m]}"
+        "volume: [1 m, 1 m, 1 m]",
+        "volume: {x: [-100 mm, 1.1 m], y: [-100 mm, 1.1 m], z: [-100 mm, 1.1 m]}",
     )
     design, readings = tmp_path / "rough.yaml", tmp_path / "r.csv"
     design.write_text(text.replace(grid, listed(places)), encoding="utf-8")
@@ -170,11 +218,20 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (lambda lines: [], ["1:1: the file is empty; its first line should be position,ball,probe,x_mm,y_mm,z_mm"]),
-        (lambda lines: lines[:1], ["1:1: no rows below the names of the columns; add at least one"]),
+        (
+            lambda lines: [],
+            ["1:1: the file is empty; its first line should be position,ball,probe,x_mm,y_mm,z_mm"],
+        ),
+        (
+            lambda lines: lines[:1],
+            ["1:1: no rows below the names of the columns; add at least one"],
+        ),
         (
             lambda lines: [line.replace(",", ";") for line in lines],
-            ["1:1: the columns are not separated by commas; write position,ball,probe,x_mm,y_mm,z_mm"],
+            [
+                "1:1: the columns are not separated by commas; write"
+                " position,ball,probe,x_mm,y_mm,z_mm"
+            ],
         ),
         (
             lambda lines: [line.rpartition(",")[0] for line in lines],
@@ -186,7 +243,10 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
         ),
         (
             lambda lines: with_cell(lines, 3, 3, lambda x: "187,5"),
-            ["3:1: 7 columns instead of 6; if a comma is meant as the decimal point, write a point, as in 187.5"],
+            [
+                "3:1: 7 columns instead of 6; if a comma is meant as the decimal point, write a"
+                " point, as in 187.5"
+            ],
         ),
         (
             lambda lines: with_cell(lines, 3, 3, lambda x: '"187,5"'),
@@ -196,7 +256,10 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
             lambda lines: with_cell(lines, 3, 3, lambda x: "nan"),
             ['3:17: "nan" is not a number; write for example "500.0003"'],
         ),
-        (lambda lines: with_cell(lines, 3, 3, lambda x: ""), ["3:17: no x; write a number, or remove the line"]),
+        (
+            lambda lines: with_cell(lines, 3, 3, lambda x: ""),
+            ["3:17: no x; write a number, or remove the line"],
+        ),
         (
             lambda lines: [*lines[:2], lines[2].replace(",", ";"), *lines[3:]],
             ["3:1: 1 columns instead of 6; separate them by commas"],
@@ -213,7 +276,9 @@ def test_tables_that_are_none(
     assert refusals(change(good), tmp_path, capsys) == expected
 
 
-def test_a_line_copied_is_refused(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_copied_is_refused(
+    good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert refusals([*good, good[3]], tmp_path, capsys) == [
         '252:1: ball "r1c3" is repeated in position "z low" with probe "down" (first in line 4); '
         "remove the line, or state repeats: 2 for that position in the experiment"

@@ -29,10 +29,18 @@ def json_of(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0
 def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", BARS, GAUGE]) == 0
     out = capsys.readouterr().out
-    assert "reason: every bar lies parallel to the xy plane: nothing tells the scale of Z nor its squareness" in out
-    assert "reason: no length is known (gauge: radius): the overall scale of the machine stays open" in out
+    assert (
+        "reason: every bar lies parallel to the xy plane: nothing tells the scale of Z nor its"
+        " squareness" in out
+    )
+    assert (
+        "reason: no length is known (gauge: radius): the overall scale of the machine stays open"
+        in out
+    )
     assert "gauge: radius (0.3 um): change together without changing any observation" in out
-    (flat,) = [one for one in json_of(capsys, "check", BARS) if one["experiment"] == "bar-bell[flat]"]
+    (flat,) = [
+        one for one in json_of(capsys, "check", BARS) if one["experiment"] == "bar-bell[flat]"
+    ]
     assert flat["reasons"][0].startswith("every bar lies parallel to the xy plane")
 
 
@@ -52,19 +60,32 @@ def test_the_two_fits_of_bars_are_one(capsys: pytest.CaptureFixture[str]) -> Non
         error, sign = excess.get(name, (name, 1))
         estimate = full["estimates"][error]
         assert full["adjustments"][name]["value"] == sign * estimate["value"]
-        assert full["adjustments"][name]["standard_uncertainty"] == pytest.approx(estimate["standard_uncertainty"])
+        assert full["adjustments"][name]["standard_uncertainty"] == pytest.approx(
+            estimate["standard_uncertainty"]
+        )
 
 
 def test_what_to_do_is_told_with_its_direction(capsys: pytest.CaptureFixture[str]) -> None:
-    """True errors: X reads 20 ppm too little, Y leans to -X by 60 urad, Z to -X by 40 and to -Y by 80."""
+    """True errors: X reads 20 ppm too little, Y leans to -X by 60 urad, Z to -X by 40 and to -Y by
+    80.
+    """
     assert main(["fit", *KNOWN, "--estimator", "length-equations"]) == 0
     out = capsys.readouterr().out
-    for words in ("let X read 2", "let Y read 2", "um per m less", "towards +X", "towards +Y", "pivots: pivot (500.0"):
+    for words in (
+        "let X read 2",
+        "let Y read 2",
+        "um per m less",
+        "towards +X",
+        "towards +Y",
+        "pivots: pivot (500.0",
+    ):
         assert words in out
     assert "towards -" not in out and max(map(len, out.splitlines())) <= 140
     assert main(["fit", *KNOWN]) == 0
     out = capsys.readouterr().out
-    assert "let X read 2" in out and "pivot" in out and "radius" in out.split("largest residuals")[1]
+    assert (
+        "let X read 2" in out and "pivot" in out and "radius" in out.split("largest residuals")[1]
+    )
 
 
 def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFixture[str]) -> None:
@@ -78,7 +99,9 @@ def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize("estimator", ["full", "length-equations", "sphere-then-metric"])
-def test_an_unknown_radius_leaves_ratios_of_scales(estimator: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_radius_leaves_ratios_of_scales(
+    estimator: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     found = json_of(capsys, "fit", *UNKNOWN, "--estimator", estimator)
     assert found["rank_deficiency"] == 1
     assert [name for name, one in found["adjustments"].items() if one["value"] is None] == [
@@ -102,7 +125,14 @@ def test_what_is_open_has_no_value_in_length_equations(capsys: pytest.CaptureFix
 
 OPEN = [(BARS, name) for name in ("length unknown", "flat", "one axis", "axes only")]
 OPEN += [(GAUGE, name) for name in ("radius unknown", "one height", "one plane", "two heights")]
-TRUE = {"scale x": 20, "scale y": -30, "scale z": 15, "angle xy": 60, "angle xz": 40, "angle yz": 80}
+TRUE = {
+    "scale x": 20,
+    "scale y": -30,
+    "scale z": 15,
+    "angle xy": 60,
+    "angle xz": 40,
+    "angle yz": 80,
+}
 TRUE |= {"scale y - scale x": -50, "scale z - scale x": -5}
 TWO_HEIGHTS = """
   two heights:
@@ -115,7 +145,9 @@ TWO_HEIGHTS = """
 def test_readings_tell_nothing_of_what_the_design_leaves_open(
     path: str, variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Noise and errors make bars and places of a gauge differ a little from the directions of the design."""
+    """Noise and errors make bars and places of a gauge differ a little from the directions of the
+    design.
+    """
     text = Path(path).read_text(encoding="utf-8") + (TWO_HEIGHTS if path == GAUGE else "")
     (tmp_path / "e.yaml").write_text(text, encoding="utf-8")
     arguments = [str(tmp_path / "e.yaml"), "--variant", variant]
@@ -124,8 +156,12 @@ def test_readings_tell_nothing_of_what_the_design_leaves_open(
     (design,) = [one for one in load(tmp_path / "e.yaml") if one.name == variant]
     capsys.readouterr()
     full = json_of(capsys, "fit", arguments[0], readings, *arguments[1:], "--sigma", "given")
-    equations = json_of(capsys, "fit", arguments[0], readings, *arguments[1:], "--estimator", "length-equations")
-    assert full["rank_deficiency"] == equations["rank_deficiency"] == design.expected_rank_deficiency
+    equations = json_of(
+        capsys, "fit", arguments[0], readings, *arguments[1:], "--estimator", "length-equations"
+    )
+    assert (
+        full["rank_deficiency"] == equations["rank_deficiency"] == design.expected_rank_deficiency
+    )
     for name, one in full["adjustments"].items():
         other = equations["adjustments"][name]["value"]
         assert (one["value"] is None) == (other is None)
@@ -134,7 +170,9 @@ def test_readings_tell_nothing_of_what_the_design_leaves_open(
             assert abs(one["value"] - 1e-6 * TRUE[name]) < 4.0 * one["standard_uncertainty"]
 
 
-def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rank_that_is_not_expected_is_a_complaint(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = (
         Path(GAUGE)
         .read_text(encoding="utf-8")
@@ -143,25 +181,39 @@ def test_a_rank_that_is_not_expected_is_a_complaint(tmp_path: Path, capsys: pyte
     )
     text = text.replace("calibration:", "calibration: []")
     (tmp_path / "g.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "silent.yaml").write_text(text.replace("expected_rank_deficiency: 0", ""), encoding="utf-8")
-    for name, told in (("g", " where the file expects full rank"), ("silent", ", and the file does not say expected_")):
+    (tmp_path / "silent.yaml").write_text(
+        text.replace("expected_rank_deficiency: 0", ""), encoding="utf-8"
+    )
+    for name, told in (
+        ("g", " where the file expects full rank"),
+        ("silent", ", and the file does not say expected_"),
+    ):
         for estimator in ("full", "length-equations"):
-            assert main(["fit", str(tmp_path / f"{name}.yaml"), KNOWN[1], "--estimator", estimator]) == 1
+            assert (
+                main(["fit", str(tmp_path / f"{name}.yaml"), KNOWN[1], "--estimator", estimator])
+                == 1
+            )
             assert f"rank deficiency 1{told}" in capsys.readouterr().err
 
 
 def test_exchanged_arguments_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fit", KNOWN[1], GAUGE]) == 2
-    assert f"the experiment file comes first, then the readings: fit {GAUGE} {KNOWN[1]}" in capsys.readouterr().err
+    assert (
+        f"the experiment file comes first, then the readings: fit {GAUGE} {KNOWN[1]}"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("command", [["fit", *KNOWN, "--estimator", "kruth"], ["compare", GAUGE]])
-def test_estimators_of_distances_refuse_gauges(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_estimators_of_distances_refuse_gauges(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(command) == 3
     out, err = capsys.readouterr()
     assert (
         not out
-        and "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator" in err
+        and "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator"
+        in err
     )
     assert main(["fit", *BAR_READINGS[:3], "length unknown", "--estimator", "distances"]) == 3
     assert "cannot follow an unknown length (bar: length)" in capsys.readouterr().err
@@ -169,12 +221,18 @@ def test_estimators_of_distances_refuse_gauges(command: list[str], capsys: pytes
 
 def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -> None:
     few = ("--variant", "radius known", "--trials", "5", "--estimator")
-    joint, two = (json_of(capsys, "compare", GAUGE, *few, name) for name in ("length-equations", "sphere-then-metric"))
+    joint, two = (
+        json_of(capsys, "compare", GAUGE, *few, name)
+        for name in ("length-equations", "sphere-then-metric")
+    )
     assert joint["lengths"] == two["lengths"] == 60 and not joint["not_converged"]
     assert max(joint["maximum"]["values"]) < 1e-8
     # Of B0Z = -40 and A0Z = 80 urad more than half is lost, over distances of some 0.5 m.
     assert 3e-6 < min(two["rms"]["values"]) < max(two["rms"]["values"]) < 2e-5
-    assert main(["compare", GAUGE, "--variant", "radius unknown", "--estimator", "length-equations"]) == 3
+    assert (
+        main(["compare", GAUGE, "--variant", "radius unknown", "--estimator", "length-equations"])
+        == 3
+    )
     assert "the design leaves errors open" in capsys.readouterr().err
     assert main(["compare", "designs/quickstart.yaml", "--estimator", "length-equations"]) == 3
     assert "has no ball bar or Bryan gauge" in capsys.readouterr().err
@@ -182,10 +240,14 @@ def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -
     assert "estimator distances (12 lengths of standards) against" in capsys.readouterr().out
 
 
-def test_length_equations_refuse_plates_alone_and_planes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_length_equations_refuse_plates_alone_and_planes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     readings = str(tmp_path / "r.csv")
     assert main(["simulate", "designs/quickstart.yaml", "-o", readings]) == 0
-    assert main(["fit", "designs/quickstart.yaml", readings, "--estimator", "length-equations"]) == 3
+    assert (
+        main(["fit", "designs/quickstart.yaml", readings, "--estimator", "length-equations"]) == 3
+    )
     assert "has no ball bar or Bryan gauge whose lengths are read" in capsys.readouterr().err
     assert main(["fit", *BAR_READINGS, "--estimator", "reversal"]) == 3
     assert "the reversal is about two dimensions, not three" in capsys.readouterr().err
@@ -194,7 +256,9 @@ def test_length_equations_refuse_plates_alone_and_planes(tmp_path: Path, capsys:
     assert "has two dimensions" in capsys.readouterr().err
 
 
-def test_length_equations_tell_what_they_pass_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_length_equations_tell_what_they_pass_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = Path(GAUGE).read_text(encoding="utf-8").split("variants:")[0]
     text = text.replace("{kind: metric}", "{kind: metric, scale: none}").split("true_machine:")
     text = text[0] + "probes:" + text[1].partition("probes:")[2]
@@ -203,16 +267,33 @@ def test_length_equations_tell_what_they_pass_over(tmp_path: Path, capsys: pytes
     arguments = ["fit", str(tmp_path / "g.yaml"), KNOWN[1], "--estimator", "length-equations"]
     assert main(arguments) == 0
     err = capsys.readouterr().err
-    assert "takes no notice of priors" in err and "whatever the file's error model" in err and "plates" not in err
+    assert (
+        "takes no notice of priors" in err
+        and "whatever the file's error model" in err
+        and "plates" not in err
+    )
 
 
-def test_a_bar_that_is_a_plate_is_no_length_standard(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = Path(BARS).read_text(encoding="utf-8").split("variants:")[0].replace(", role: length_standard", "")
+def test_a_bar_that_is_a_plate_is_no_length_standard(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (
+        Path(BARS)
+        .read_text(encoding="utf-8")
+        .split("variants:")[0]
+        .replace(", role: length_standard", "")
+    )
     (tmp_path / "b.yaml").write_text(text, encoding="utf-8")
-    assert main(["fit", str(tmp_path / "b.yaml"), BAR_READINGS[1], "--estimator", "length-equations"]) == 3
+    assert (
+        main(["fit", str(tmp_path / "b.yaml"), BAR_READINGS[1], "--estimator", "length-equations"])
+        == 3
+    )
     err = capsys.readouterr().err
     line = text[: text.index("bar: {kind")].count("\n") + 1
-    assert f"b.yaml:{line}:" in err and "artefacts.bar: is a plate, but length-equations needs length standards" in err
+    assert (
+        f"b.yaml:{line}:" in err
+        and "artefacts.bar: is a plate, but length-equations needs length standards" in err
+    )
 
 
 def test_a_wrong_reading_of_a_gauge_stands_first_among_residuals(
@@ -245,19 +326,27 @@ def test_the_radius_in_scale_readings_is_told_where_the_scale_is_open(
     start = np.array([*points.mean(axis=0), 0.3])
     radius = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15).x[3]
     found = json_of(capsys, *arguments)
-    # Squares are minimised here, distances there: a difference of the misfit's square over the radius.
+    # Squares are minimised here, distances there: a difference of the misfit's square over the
+    # radius.
     assert found["spheres"]["pivot"] == pytest.approx(radius, abs=2e-8)
     assert found["lengths"] == {"gauge: radius": None}
     main(arguments)
-    assert f"readings: pivot {1e3 * found['spheres']['pivot']:.5f} mm, in scale readings" in capsys.readouterr().out
+    assert (
+        f"readings: pivot {1e3 * found['spheres']['pivot']:.5f} mm, in scale readings"
+        in capsys.readouterr().out
+    )
 
 
-def test_simulate_run_trials_and_fit_go_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_run_trials_and_fit_go_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     readings = str(tmp_path / "r.csv")
     assert main(["simulate", GAUGE, "--variant", "two pivots", "-o", readings]) == 0
     assert main(["fit", GAUGE, readings, "--variant", "two pivots", "--sigma", "given"]) == 0
     capsys.readouterr()
-    found = json_of(capsys, "run", GAUGE, "--variant", "two pivots", "--trials", "256", "--workers", "1")
+    found = json_of(
+        capsys, "run", GAUGE, "--variant", "two pivots", "--trials", "256", "--workers", "1"
+    )
     assert found["quantities"]["U2 lengths"]["count"] == 6
     trials = found["monte_carlo"]["quantities"]
     for symbol in ("U2", "U3", "U4", "U6"):
@@ -266,7 +355,9 @@ def test_simulate_run_trials_and_fit_go_together(tmp_path: Path, capsys: pytest.
 
 
 def test_trials_of_an_unknown_radius_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", GAUGE, "--variant", "radius unknown", "--trials", "10", "--workers", "1"]) == 0
+    assert (
+        main(["run", GAUGE, "--variant", "radius unknown", "--trials", "10", "--workers", "1"]) == 0
+    )
     assert "the design is rank deficient by 1" in capsys.readouterr().out
 
 
@@ -291,7 +382,9 @@ def test_fingerprints_tell_gauges_apart(tmp_path: Path, old: str, new: str) -> N
     assert one != other
 
 
-def test_all_mistakes_of_a_gauge_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_mistakes_of_a_gauge_are_told_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "bad.yaml"
     path.write_text(
         """\
@@ -331,28 +424,64 @@ priors:
     told = [line for line in told if "is never placed" not in line]
     assert [line.split(" (")[0] for line in told] == [
         '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"',
-        "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random; write {random: 60, lowest: "
-        "20 deg}",
-        "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its role",
-        '8:57: artefacts.both.directions: "azimuths" has no meaning with random directions; remove it',
+        (
+            "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random;"
+            " write {random: 60, lowest: 20 deg}"
+        ),
+        (
+            "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its"
+            " role"
+        ),
+        (
+            '8:57: artefacts.both.directions: "azimuths" has no meaning with random directions;'
+            " remove it"
+        ),
         "9:73: artefacts.one.directions[1]: has 1 entry; 2 are needed",
-        '10:57: artefacts.same.directions: balls "1" and "2" are at the same place; correct one of them',
-        "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give one of that range",
+        (
+            '10:57: artefacts.same.directions: balls "1" and "2" are at the same place; correct one'
+            " of them"
+        ),
+        (
+            "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give one"
+            " of that range"
+        ),
         "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible",
-        "14:57: artefacts.zone.directions: the least elevation must be below the largest; exchange or correct them",
-        '18:5: positions[0]: reading ball "2" with probe "magnet" puts the scales at y = 900 mm, 100 mm above the '
-        "measuring volume, and 1 more reading; move the artefact, or read it otherwise",
-        '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind: radius',
-        '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is none; use kind: distances',
-        "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing; correct the one or the "
-        "other",
-        '25:5: calibration[4]: the radius of "over" stands in calibration[3] already; remove one of the two',
+        (
+            "14:57: artefacts.zone.directions: the least elevation must be below the largest;"
+            " exchange or correct them"
+        ),
+        (
+            '18:5: positions[0]: reading ball "2" with probe "magnet" puts the scales at y = 900'
+            " mm, 100 mm above the measuring volume, and 1 more reading; move the artefact, or read"
+            " it otherwise"
+        ),
+        (
+            '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind:'
+            " radius"
+        ),
+        (
+            '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is none; use'
+            " kind: distances"
+        ),
+        (
+            "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing;"
+            " correct the one or the other"
+        ),
+        (
+            '25:5: calibration[4]: the radius of "over" stands in calibration[3] already; remove'
+            " one of the two"
+        ),
         '26:5: calibration[5].standard_uncertainty: missing; add "standard_uncertainty"',
-        '28:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a: origin z"?',
+        (
+            '28:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a:'
+            ' origin z"?'
+        ),
     ]
 
 
-def test_a_pivot_may_be_known_beforehand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pivot_may_be_known_beforehand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = Path(GAUGE).read_text(encoding="utf-8").split("variants:")[0]
     known = 'priors: [{parameter: "pivot: origin z", standard_uncertainty: 0.1 um}]\n'
     (tmp_path / "g.yaml").write_text(text + known, encoding="utf-8")

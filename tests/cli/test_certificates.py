@@ -1,4 +1,6 @@
-"""Certificate values beside simulated readings: sigma is 1 then, and a file of them is read as strictly as others."""
+"""Certificate values beside simulated readings: sigma is 1 then, and a file of them is read as
+strictly as others.
+"""
 
 from __future__ import annotations
 
@@ -66,16 +68,32 @@ def sum_of_squares(design: Design, readings: Path) -> float:
 
 
 def test_sigma_is_one_with_the_certificate_that_belongs_to_the_readings(tmp_path: Path) -> None:
-    """S^2 is chi-squared then. With the file's own values, from which a real plate cannot differ freely, it is less."""
-    file, readings, certificate = write(tmp_path, EVERYTHING), tmp_path / "r.csv", tmp_path / "c.csv"
+    """S^2 is chi-squared then. With the file's own values, from which a real plate cannot differ
+    freely, it is less.
+    """
+    file, readings, certificate = (
+        write(tmp_path, EVERYTHING),
+        tmp_path / "r.csv",
+        tmp_path / "c.csv",
+    )
     experiment = load(Path(file))[0]
     design = lay_out(experiment)
     freedom, count = design.observations - design.parameter_count, 14
     with_its_own, with_the_files = [], []
     for seed in range(count):
-        arguments = ["simulate", file, "-o", str(readings), "--certificate", str(certificate), "--force"]
+        arguments = [
+            "simulate",
+            file,
+            "-o",
+            str(readings),
+            "--certificate",
+            str(certificate),
+            "--force",
+        ]
         assert main([*arguments, "--seed", str(seed)]) == 0
-        with_its_own.append(sum_of_squares(lay_out(read_certificate(certificate, experiment)), readings))
+        with_its_own.append(
+            sum_of_squares(lay_out(read_certificate(certificate, experiment)), readings)
+        )
         with_the_files.append(sum_of_squares(design, readings))
     error = np.sqrt(2 * freedom / count)
     assert abs(np.mean(with_its_own) - freedom) < 4 * error
@@ -83,16 +101,28 @@ def test_sigma_is_one_with_the_certificate_that_belongs_to_the_readings(tmp_path
 
 
 def test_every_kind_of_value_is_drawn_about_what_is_read(tmp_path: Path) -> None:
-    """Of each value's deviations from the exact one, the root mean square is its standard uncertainty."""
+    """Of each value's deviations from the exact one, the root mean square is its standard
+    uncertainty.
+    """
     file, certificate = write(tmp_path, EVERYTHING), tmp_path / "c.csv"
     experiment = load(Path(file))[0]
     stated = certified_values(experiment)
-    arguments = ["simulate", file, "-o", str(tmp_path / "r.csv"), "--certificate", str(certificate), "--force"]
+    arguments = [
+        "simulate",
+        file,
+        "-o",
+        str(tmp_path / "r.csv"),
+        "--certificate",
+        str(certificate),
+        "--force",
+    ]
     assert main([*arguments, "--exact"]) == 0
     exact = [one.value for one in certified_values(read_certificate(certificate, experiment))]
     # The artefacts are as drawn, and the machine is not.
     others = [k for k, one in enumerate(stated) if one.item != "priors[0]"]
-    assert np.array(exact)[others] == pytest.approx(np.array([one.value for one in stated])[others], abs=1e-15)
+    assert np.array(exact)[others] == pytest.approx(
+        np.array([one.value for one in stated])[others], abs=1e-15
+    )
     deviations = []
     for seed in range(40):
         assert main([*arguments, "--seed", str(seed)]) == 0
@@ -104,7 +134,8 @@ def test_every_kind_of_value_is_drawn_about_what_is_read(tmp_path: Path) -> None
         if one.item.startswith(("probes", "priors")):
             assert abs(mean_square[k] - 1.0) < 4 * error, one
         elif one.item in ("calibration[2]", "calibration[3]"):
-            # The standard itself is off from its drawing by its uncertainty, and its new certificate once more.
+            # The standard itself is off from its drawing by its uncertainty, and its new
+            # certificate once more.
             assert abs(mean_square[k] - 2.0) < 8 * error, one
 
 
@@ -118,7 +149,20 @@ def test_readings_are_the_same_with_and_without_a_certificate(tmp_path: Path) ->
 
 def test_fit_takes_the_certificate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     readings, certificate = tmp_path / "readings.csv", tmp_path / "certificate.csv"
-    assert main(["simulate", QUICKSTART, "-o", str(readings), "--exact", "--certificate", str(certificate)]) == 0
+    assert (
+        main(
+            [
+                "simulate",
+                QUICKSTART,
+                "-o",
+                str(readings),
+                "--exact",
+                "--certificate",
+                str(certificate),
+            ]
+        )
+        == 0
+    )
     lines = certificate.read_text().splitlines()
     assert lines[0].startswith("# ") and lines[1] == "item,first,second,value"
     # Balls may stand in either order, and a longer distance makes the plate larger.
@@ -150,15 +194,34 @@ def test_both_files_are_written_or_none(tmp_path: Path, capsys: pytest.CaptureFi
     assert main([*arguments, str(tmp_path / "nowhere" / "certificate.csv"), "--force"]) == 3
     assert readings.read_text() == "old"
     assert main([*arguments, str(readings), "--force"]) == 2
-    assert "are the same file; name another" in capsys.readouterr().err and readings.read_text() == "old"
+    assert (
+        "are the same file; name another" in capsys.readouterr().err
+        and readings.read_text() == "old"
+    )
     assert main([*arguments, str(certificate), "--force"]) == 0
-    assert certificate.read_text().startswith("# certificate values of quickstart, drawn with seed 1")
+    assert certificate.read_text().startswith(
+        "# certificate values of quickstart, drawn with seed 1"
+    )
     bare = tmp_path / "bare.yaml"
     text = Path(QUICKSTART).read_text()
     start, end = text.index("calibration:"), text.index("evaluation:")
     bare.write_text(text[:start] + text[end:])
-    assert main(["simulate", str(bare), "-o", str(tmp_path / "b.csv"), "--certificate", str(tmp_path / "c.csv")]) == 3
-    assert "leave --certificate out" in capsys.readouterr().err and not (tmp_path / "b.csv").exists()
+    assert (
+        main(
+            [
+                "simulate",
+                str(bare),
+                "-o",
+                str(tmp_path / "b.csv"),
+                "--certificate",
+                str(tmp_path / "c.csv"),
+            ]
+        )
+        == 3
+    )
+    assert (
+        "leave --certificate out" in capsys.readouterr().err and not (tmp_path / "b.csv").exists()
+    )
 
 
 @pytest.mark.parametrize(
@@ -172,9 +235,23 @@ def test_both_files_are_written_or_none(tmp_path: Path, capsys: pytest.CaptureFi
         (1, "value", "value_mm", "unknown column"),
     ],
 )
-def test_a_wrong_certificate_is_told_by_line(tmp_path: Path, number: int, old: str, new: str, told: str) -> None:
+def test_a_wrong_certificate_is_told_by_line(
+    tmp_path: Path, number: int, old: str, new: str, told: str
+) -> None:
     certificate = tmp_path / "c.csv"
-    assert main(["simulate", QUICKSTART, "-o", str(tmp_path / "r.csv"), "--certificate", str(certificate)]) == 0
+    assert (
+        main(
+            [
+                "simulate",
+                QUICKSTART,
+                "-o",
+                str(tmp_path / "r.csv"),
+                "--certificate",
+                str(certificate),
+            ]
+        )
+        == 0
+    )
     lines = certificate.read_text().splitlines()
     assert old in lines[number]
     lines[number] = lines[number].replace(old, new)
@@ -187,7 +264,19 @@ def test_a_wrong_certificate_is_told_by_line(tmp_path: Path, number: int, old: s
 
 def test_values_missing_or_given_twice_are_told(tmp_path: Path) -> None:
     certificate, experiment = tmp_path / "c.csv", load(Path(QUICKSTART))[0]
-    assert main(["simulate", QUICKSTART, "-o", str(tmp_path / "r.csv"), "--certificate", str(certificate)]) == 0
+    assert (
+        main(
+            [
+                "simulate",
+                QUICKSTART,
+                "-o",
+                str(tmp_path / "r.csv"),
+                "--certificate",
+                str(certificate),
+            ]
+        )
+        == 0
+    )
     lines = certificate.read_text().splitlines()
     certificate.write_text("\n".join(lines[:-1]))
     with pytest.raises(ExperimentError, match=r"no value of calibration\[0\] r1c5, r5c5; add it"):
@@ -208,13 +297,22 @@ def test_coordinates_in_another_unit_are_far_from_the_drawing(
     assert main(["simulate", str(path), "-o", str(readings), "--certificate", str(table)]) == 0
     assert main(["fit", str(path), str(readings), "--certificate", str(table)]) == 0
     capsys.readouterr()
-    told = "the balls of these co-ordinates are 0.001 times as far apart as in the artefact's drawing"
+    told = (
+        "the balls of these co-ordinates are 0.001 times as far apart as in the artefact's drawing"
+    )
     table.write_text(re.sub(" mm| nm", " um", table.read_text(encoding="utf-8")), encoding="utf-8")
     assert main(["fit", str(path), str(readings), "--certificate", str(table)]) == 3
     assert told in capsys.readouterr().err
     # The same of a table of the experiment itself.
-    rows = [f"r{i}c{j},{0.1875 * (j - 1)},{0.1875 * (i - 1)},0" for i in range(1, 6) for j in range(1, 6)]
+    rows = [
+        f"r{i}c{j},{0.1875 * (j - 1)},{0.1875 * (i - 1)},0"
+        for i in range(1, 6)
+        for j in range(1, 6)
+    ]
     table.write_text("\n".join(["ball,x_mm,y_mm,z_mm", *rows]), encoding="utf-8")
-    path.write_text(path.read_text(encoding="utf-8").replace("0.2 um}]", "0.2 um, values: c.csv}]"), encoding="utf-8")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("0.2 um}]", "0.2 um, values: c.csv}]"),
+        encoding="utf-8",
+    )
     assert main(["check", str(path)]) == 3
     assert told in capsys.readouterr().err

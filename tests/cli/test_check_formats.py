@@ -32,12 +32,16 @@ def run(*arguments: str | Path) -> int:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """One good file, one with two wrong ranks, one that cannot be used, one that states no rank and lacks it."""
+    """One good file, one with two wrong ranks, one that cannot be used, one that states no rank and
+    lacks it.
+    """
     good = QUICKSTART.read_text(encoding="utf-8")
     (tmp_path / "good.yaml").write_text(good, encoding="utf-8")
     symmetrical = SYMMETRICAL.read_text(encoding="utf-8").replace("deficiency: 2", "deficiency: 1")
     (tmp_path / "wrong.yaml").write_text(symmetrical, encoding="utf-8")
-    (tmp_path / "broken.yaml").write_text(good.replace("0.2 um            #", "100 %             #"), encoding="utf-8")
+    (tmp_path / "broken.yaml").write_text(
+        good.replace("0.2 um            #", "100 %             #"), encoding="utf-8"
+    )
     without = re.sub(r"expected_rank_deficiency: .*\n", "", good)
     without = re.sub(r"  - {name: [xy] .*\n", "", without)
     (tmp_path / "silent.yaml").write_text(without, encoding="utf-8")
@@ -67,7 +71,9 @@ def test_json_is_a_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert capsys.readouterr().out == ""
 
 
-def test_an_unknown_variant_is_an_error_in_every_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_variant_is_an_error_in_every_format(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for name in ("text", "github", "junit", "json"):
         assert run("check", "--format", name, "--variant", "E", "wrong.yaml") == 3
         out, err = capsys.readouterr()
@@ -79,7 +85,10 @@ def test_an_unknown_variant_is_an_error_in_every_format(folder: Path, capsys: py
 
 
 def test_workflow_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("check", "--format", "github", "good.yaml", "wrong.yaml", "broken.yaml", "missing.yaml") == 3
+    assert (
+        run("check", "--format", "github", "good.yaml", "wrong.yaml", "broken.yaml", "missing.yaml")
+        == 3
+    )
     out, err = capsys.readouterr()
     assert err == ""
     lines = out.splitlines()
@@ -88,20 +97,28 @@ def test_workflow_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert all(line.startswith("as expected: ") for line in good)
     bad = [match.groups()[:4] for match in map(COMMAND.fullmatch, lines) if match is not None]
     assert [one[0] for one in bad] == ["wrong.yaml", "wrong.yaml", "broken.yaml", "missing.yaml"]
-    assert bad[2:] == [("broken.yaml", "10", "18", "experiment file"), ("missing.yaml", None, None, "experiment file")]
+    assert bad[2:] == [
+        ("broken.yaml", "10", "18", "experiment file"),
+        ("missing.yaml", None, None, "experiment file"),
+    ]
 
 
 def test_workflow_commands_mark_the_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("check", "--format", "github", "wrong.yaml", "silent.yaml") == 1
     lines = capsys.readouterr().out.splitlines()
     found = {match[4]: match for match in map(COMMAND.fullmatch, lines) if match is not None}
-    source = {name: (folder / name).read_text(encoding="utf-8").splitlines() for name in ("wrong.yaml", "silent.yaml")}
+    source = {
+        name: (folder / name).read_text(encoding="utf-8").splitlines()
+        for name in ("wrong.yaml", "silent.yaml")
+    }
     for variant in "BD":
         match = found[f"rank of wrong[{variant}]"]
         line, column = int(match[2]), int(match[3])
         assert source["wrong.yaml"][line - 1][column - 1 :] == "1"
         assert source["wrong.yaml"][line - 2].strip().startswith("calibration:")
-        assert match[5].startswith(f"wrong.yaml:{line}:{column}: wrong[{variant}]: rank deficiency 2, expected 1; ")
+        assert match[5].startswith(
+            f"wrong.yaml:{line}:{column}: wrong[{variant}]: rank deficiency 2, expected 1; "
+        )
         assert "%0Aundetermined 2: " in match[5]
     match = found["rank of silent"]
     assert source["silent.yaml"][int(match[2]) - 1] == "positions:" and match[3] == "1"
@@ -112,9 +129,27 @@ def test_files_are_named_from_the_top_of_the_repository(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("GITHUB_WORKSPACE", str(folder.parent))
-    assert run("check", "--format", "github", "broken.yaml", folder / "missing.yaml", "../../elsewhere.yaml") == 3
-    names = [match[1] for match in map(COMMAND.fullmatch, capsys.readouterr().out.splitlines()) if match is not None]
-    assert names == [f"{folder.name}/broken.yaml", f"{folder.name}/missing.yaml", "../../elsewhere.yaml"]
+    assert (
+        run(
+            "check",
+            "--format",
+            "github",
+            "broken.yaml",
+            folder / "missing.yaml",
+            "../../elsewhere.yaml",
+        )
+        == 3
+    )
+    names = [
+        match[1]
+        for match in map(COMMAND.fullmatch, capsys.readouterr().out.splitlines())
+        if match is not None
+    ]
+    assert names == [
+        f"{folder.name}/broken.yaml",
+        f"{folder.name}/missing.yaml",
+        "../../elsewhere.yaml",
+    ]
 
 
 def test_escapes_of_workflow_commands() -> None:
@@ -122,8 +157,8 @@ def test_escapes_of_workflow_commands() -> None:
     assert in_property("a:b,c%\n") == "a%3Ab%2Cc%25%0A"
     message = Message("odd, name: 5 %.yaml", 3, 4, "title", "two\nlines, 5 %")
     (line,) = annotation_lines(CheckedFile("odd, name: 5 %.yaml", (), (message,)))
-    assert line == (
-        "::error file=odd%2C name%3A 5 %25.yaml,line=3,col=4,title=experiment file::"
+    assert (
+        line == "::error file=odd%2C name%3A 5 %25.yaml,line=3,col=4,title=experiment file::"
         "odd, name: 5 %25.yaml:3:4: title: two\\x0alines, 5 %25"
     )
 
@@ -141,16 +176,34 @@ def test_junit_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, err = capsys.readouterr()
     assert err == ""
     top = ElementTree.fromstring(out)
-    assert top.tag == "testsuites" and (top.get("tests"), top.get("failures"), top.get("errors")) == ("6", "2", "1")
-    counts = [tuple(suite.get(key) for key in ("name", "tests", "failures", "errors")) for suite in top]
+    assert top.tag == "testsuites" and (
+        top.get("tests"),
+        top.get("failures"),
+        top.get("errors"),
+    ) == ("6", "2", "1")
+    counts = [
+        tuple(suite.get(key) for key in ("name", "tests", "failures", "errors")) for suite in top
+    ]
     assert counts == [
         ("good.yaml", "1", "0", "0"), ("wrong.yaml", "4", "2", "0"), ("broken.yaml", "1", "0", "1")
     ]  # fmt: skip
     cases = {case.get("name"): case for case in top.iter("testcase")}
-    assert list(cases) == ["good", "wrong[A]", "wrong[B]", "wrong[C]", "wrong[D]", "experiment file"]
-    assert [name for name, case in cases.items() if case.find("failure") is not None] == ["wrong[B]", "wrong[D]"]
+    assert list(cases) == [
+        "good",
+        "wrong[A]",
+        "wrong[B]",
+        "wrong[C]",
+        "wrong[D]",
+        "experiment file",
+    ]
+    assert [name for name, case in cases.items() if case.find("failure") is not None] == [
+        "wrong[B]",
+        "wrong[D]",
+    ]
     failure = cases["wrong[B]"].find("failure")
-    assert failure is not None and failure.get("message", "").startswith("rank deficiency 2, expected 1")
+    assert failure is not None and failure.get("message", "").startswith(
+        "rank deficiency 2, expected 1"
+    )
     assert "undetermined 2: E" in (failure.text or "")
     error = cases["experiment file"].find("error")
     assert error is not None and "machine.repeatability" in (error.text or "")
@@ -184,16 +237,21 @@ def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ballplate.planning.repair.search.repairs", repairs_of)
 
 
-def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]) -> None:
+def test_suggestions_in_every_format(
+    folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]
+) -> None:
     chosen = ["--variant", "A", "--variant", "B", "wrong.yaml"]
     assert run("check", *chosen) == 1
     plain = capsys.readouterr().out
     assert run("check", "--suggest", *chosen) == 1
     lines = capsys.readouterr().out.splitlines()
     repairs_told = [line for line in lines if line.startswith("repair ")]
-    of_scale = [line for line in lines if line.startswith(("scale: calibrate", "scale, in the file"))]
+    of_scale = [
+        line for line in lines if line.startswith(("scale: calibrate", "scale, in the file"))
+    ]
     assert len(of_scale) == 2 and lines.index(of_scale[0]) < lines.index(repairs_told[0])
-    # What is told without suggestions stays as it is, and nothing is suggested where nothing is open.
+    # What is told without suggestions stays as it is, and nothing is suggested where nothing is
+    # open.
     assert [line for line in lines if line not in [*repairs_told, *of_scale]] == plain.splitlines()
     assert repairs_told[0].startswith("repair 1: turn position ") and "full rank" in repairs_told[0]
     assert sum("in the file: " not in line for line in repairs_told) == 3
@@ -214,7 +272,9 @@ def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pyt
 
     assert run("check", "--format", "github", "--suggest", *chosen) == 1
     as_expected, *certificate, error = capsys.readouterr().out.splitlines()
-    assert "warning: the scale rests on probe offsets" in as_expected and "repair" not in as_expected
+    assert (
+        "warning: the scale rests on probe offsets" in as_expected and "repair" not in as_expected
+    )
     assert [line.split(": ", 3)[3] for line in certificate] == of_scale
     assert "%0Arepair 1: turn position " in error
     assert run("check", "--format", "junit", "--suggest", *chosen) == 1
@@ -223,7 +283,10 @@ def test_suggestions_in_every_format(folder: Path, found_once: None, capsys: pyt
 
     # A deficiency that is expected is no error, and repaired all the same.
     (folder / "wrong.yaml").write_text(
-        (folder / "wrong.yaml").read_text(encoding="utf-8").replace("deficiency: 1", "deficiency: 2"), encoding="utf-8"
+        (folder / "wrong.yaml")
+        .read_text(encoding="utf-8")
+        .replace("deficiency: 1", "deficiency: 2"),
+        encoding="utf-8",
     )
     assert run("check", "--format", "github", "--suggest", "--variant", "B", "wrong.yaml") == 0
     lines = capsys.readouterr().out.splitlines()
@@ -249,7 +312,12 @@ def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
     return subprocess.run(
         ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script],
         cwd=folder,
-        env={**os.environ, "PATH": f"{tools}:{os.environ['PATH']}", "GITHUB_WORKSPACE": str(folder), **variables},
+        env={
+            **os.environ,
+            "PATH": f"{tools}:{os.environ['PATH']}",
+            "GITHUB_WORKSPACE": str(folder),
+            **variables,
+        },
         capture_output=True,
         text=True,
     )
@@ -292,13 +360,18 @@ def test_the_action_checks(tmp_path: Path) -> None:
     goals = "U6 average 1 um\nU6 average 1 pm\n"
     found = shell(check["run"], tmp_path, FILES="designs/one.yaml", GOALS=goals, FAIL_WEAK="true")
     assert found.returncode == 1 and "goal met: average U6 at most 1 um" in found.stdout
-    assert found.stdout.startswith("::error file=designs/one.yaml") and "goal not met: average U6" in found.stdout
+    assert (
+        found.stdout.startswith("::error file=designs/one.yaml")
+        and "goal not met: average U6" in found.stdout
+    )
     (tmp_path / "designs/one.yaml").write_text("title: nothing else\n", encoding="utf-8")
     found = shell(check["run"], tmp_path, FILES="designs/o*.yaml\ndesigns/more/of them.yaml\n")
     assert found.returncode == 3
     lines = found.stdout.splitlines()
     assert lines[-1].startswith("as expected: designs/more/of them.yaml")
-    assert len(lines) > 1 and all(line.startswith("::error file=designs/one.yaml,line=1,") for line in lines[:-1])
+    assert len(lines) > 1 and all(
+        line.startswith("::error file=designs/one.yaml,line=1,") for line in lines[:-1]
+    )
     # A pattern that nothing matches is no success, and what an input contains is never run.
     found = shell(check["run"], tmp_path, FILES="nothing/*.yaml\n$(touch intruder)")
     assert found.returncode == 3 and "nothing/*.yaml" in found.stdout
@@ -306,7 +379,9 @@ def test_the_action_checks(tmp_path: Path) -> None:
 
 
 def test_the_action_installs(tmp_path: Path) -> None:
-    """Nothing is fetched here: the command is run with a Python that only writes down what it is told."""
+    """Nothing is fetched here: the command is run with a Python that only writes down what it is
+    told.
+    """
     action = described("action.yml")
     _, install, _ = action["runs"]["steps"]
     assert install["env"] == {"INSTALL": "${{ inputs.install }}"}
@@ -314,8 +389,13 @@ def test_the_action_installs(tmp_path: Path) -> None:
     recorder.parent.mkdir()
     recorder.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n', encoding="utf-8")
     recorder.chmod(0o755)
-    for chosen, expected in ((action["inputs"]["install"]["default"], "/actions/ballplate"), ("ballplate==0.1", None)):
-        found = shell(install["run"], tmp_path, INSTALL=chosen, GITHUB_ACTION_PATH="/actions/ballplate")
+    for chosen, expected in (
+        (action["inputs"]["install"]["default"], "/actions/ballplate"),
+        ("ballplate==0.1", None),
+    ):
+        found = shell(
+            install["run"], tmp_path, INSTALL=chosen, GITHUB_ACTION_PATH="/actions/ballplate"
+        )
         assert found.stdout.splitlines() == ["-m", "pip", "install", "--quiet", expected or chosen]
 
 
@@ -324,7 +404,11 @@ def test_the_hook(tmp_path: Path) -> None:
     assert (hook["id"], hook["language"], hook["types"]) == ("ballplate-check", "python", ["yaml"])
     a_repository(tmp_path)
     every = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.yaml"))
-    chosen = [name for name in every if re.search(hook["files"], name) and not re.search(hook["exclude"], name)]
+    chosen = [
+        name
+        for name in every
+        if re.search(hook["files"], name) and not re.search(hook["exclude"], name)
+    ]
     assert chosen == ["designs/more/of them.yaml", "designs/one.yaml"]
     script = f'{hook["entry"]} "$@"'
     quoted = f"set -- {' '.join(json.dumps(name) for name in chosen)}; {script}"

@@ -33,7 +33,11 @@ def test_check_as_expected(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_check_not_as_expected(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    text = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").replace("deficiency: 2", "deficiency: 0")
+    text = (
+        Path("designs/npl/6.1.1.yaml")
+        .read_text(encoding="utf-8")
+        .replace("deficiency: 2", "deficiency: 0")
+    )
     (tmp_path / "plate.yaml").write_text(text, encoding="utf-8")
     assert run("check", tmp_path / "plate.yaml", "--variant", "B") == 1
     out, _ = capsys.readouterr()
@@ -53,7 +57,12 @@ def test_run_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", "--json", QUICKSTART) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["experiment"] == "quickstart"
-    assert (found["parameters"], found["observations"], found["rank_deficiency"], found["sigma"]) == (174, 754, 0, 1)
+    assert (
+        found["parameters"],
+        found["observations"],
+        found["rank_deficiency"],
+        found["sigma"],
+    ) == (174, 754, 0, 1)
     for symbol in SYMBOLS:
         quantity = found["quantities"][symbol]
         assert 0 < quantity["average"] <= quantity["maximum"]
@@ -69,8 +78,14 @@ def test_run_of_a_deficient_design_tells_what_is_left(capsys: pytest.CaptureFixt
     # Section 6.2.1: the plate is still accurately calibrated, the machine is not.
     assert quantities["U5"]["undetermined"] == 0
     assert 1e-7 < quantities["U5"]["average"] < 2e-7
-    assert quantities["U6"]["average"] is None and quantities["U6"]["undetermined"] == quantities["U6"]["count"]
-    assert quantities["U3 angles"]["undetermined"] == 0 and quantities["U3 lengths"]["undetermined"] > 0
+    assert (
+        quantities["U6"]["average"] is None
+        and quantities["U6"]["undetermined"] == quantities["U6"]["count"]
+    )
+    assert (
+        quantities["U3 angles"]["undetermined"] == 0
+        and quantities["U3 lengths"]["undetermined"] > 0
+    )
 
 
 def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,10 +96,14 @@ def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert not any("um, urad" in line for line in lines)
     points = lay_out(load(QUICKSTART)[0]).points
     places = dict(re.findall(r"(point [0-9]+) at \(([0-9., ]+)\) mm", "\n".join(lines)))
-    named = re.findall(r"point [0-9]+", "\n".join(line for line in lines if line[:2] in ("U4", "U6")))
+    named = re.findall(
+        r"point [0-9]+", "\n".join(line for line in lines if line[:2] in ("U4", "U6"))
+    )
     assert len(named) == 3 and set(places) == set(named)
     for name, place in places.items():
-        assert [float(one) for one in place.split(", ")] == (1e3 * points[int(name[6:]) - 1]).round(1).tolist()
+        assert [float(one) for one in place.split(", ")] == (1e3 * points[int(name[6:]) - 1]).round(
+            1
+        ).tolist()
     assert max(map(len, lines)) <= 120
 
 
@@ -110,7 +129,8 @@ def test_simulate_and_fit(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
     truth = true_parameters(experiment.true_machine, design.model)
     names = [parameter.name for parameter in design.model.parameters]
     errors = [
-        (found["estimates"][name]["value"] - value) / found["estimates"][name]["standard_uncertainty"]
+        (found["estimates"][name]["value"] - value)
+        / found["estimates"][name]["standard_uncertainty"]
         for name, value in zip(names, truth, strict=True)
     ]
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
@@ -132,7 +152,9 @@ def test_exact_readings_fit_exactly(capsys: pytest.CaptureFixture[str], tmp_path
         assert found["estimates"][name]["value"] == pytest.approx(value, abs=2e-12)
 
 
-def test_fit_names_missing_and_unplanned_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_fit_names_missing_and_unplanned_readings(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     readings = tmp_path / "readings.csv"
     run("simulate", QUICKSTART, "-o", readings)
     header, first, second, *rest = readings.read_text(encoding="utf-8").splitlines()
@@ -150,7 +172,8 @@ def test_fit_names_missing_and_unplanned_readings(capsys: pytest.CaptureFixture[
 def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     readings = tmp_path / "readings.csv"
     readings.write_text(
-        "position,ball,probe,x_mm,y_mm,z_mm\nz lo,r1c1,down,1,2,3\nz low,r9c9,downn,1,2,x\n", encoding="utf-8"
+        "position,ball,probe,x_mm,y_mm,z_mm\nz lo,r1c1,down,1,2,3\nz low,r9c9,downn,1,2,x\n",
+        encoding="utf-8",
     )
     assert run("fit", QUICKSTART, readings) == 3
     out, err = capsys.readouterr()
@@ -162,7 +185,9 @@ def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Pat
 
 def test_fit_needs_every_ball(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     readings = tmp_path / "readings.csv"
-    readings.write_text("position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,1,2,3\n", encoding="utf-8")
+    readings.write_text(
+        "position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,1,2,3\n", encoding="utf-8"
+    )
     assert run("fit", QUICKSTART, readings) == 3
     assert 'no reading of the balls "r1c2", "r1c3"' in capsys.readouterr().err
 
@@ -173,14 +198,18 @@ def quickstart_readings(folder: Path, *options: str) -> tuple[Path, list[str]]:
     return path, path.read_text(encoding="utf-8").splitlines()
 
 
-def test_fit_of_readings_in_another_unit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_fit_of_readings_in_another_unit(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     readings, lines = quickstart_readings(tmp_path)
     readings.write_text("\n".join([lines[0].replace("_mm", "_m"), *lines[1:]]), encoding="utf-8")
     assert run("fit", QUICKSTART, readings) == 3
     assert "far outside the volume; check the unit" in capsys.readouterr().err
 
 
-def test_a_wrong_reading_is_warned_of_and_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_wrong_reading_is_warned_of_and_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     readings, lines = quickstart_readings(tmp_path)
     cells = lines[40].split(",")
     cells[4] = str(float(cells[4]) + 0.005)
@@ -200,9 +229,13 @@ def test_nothing_is_made_of_a_failed_estimate(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Readings as wrong as these are refused before.
-    monkeypatch.setattr("ballplate.simulator.readings.reading_files.refuse_misreadings", lambda *_: None)
+    monkeypatch.setattr(
+        "ballplate.simulator.readings.reading_files.refuse_misreadings", lambda *_: None
+    )
     readings, lines = quickstart_readings(tmp_path)
-    readings.write_text("\n".join([lines[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in lines[1:])]), "utf-8")
+    readings.write_text(
+        "\n".join([lines[0], *(f"{line.rsplit(',', 3)[0]},0,0,0" for line in lines[1:])]), "utf-8"
+    )
     capsys.readouterr()
     assert run("fit", "--json", QUICKSTART, readings) == 1
     out, err = capsys.readouterr()
@@ -245,10 +278,15 @@ def test_a_full_disk_is_told() -> None:
             text=True,
         )
     assert found.returncode == 3
-    assert found.stderr.startswith("standard output: cannot be written") and "Traceback" not in found.stderr
+    assert (
+        found.stderr.startswith("standard output: cannot be written")
+        and "Traceback" not in found.stderr
+    )
 
 
-def test_bad_files_give_messages_and_nothing_else(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_bad_files_give_messages_and_nothing_else(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     text = Path(QUICKSTART).read_text(encoding="utf-8")
     broken = tmp_path / "broken.yaml"
     broken.write_text(
@@ -267,12 +305,15 @@ def test_bad_files_give_messages_and_nothing_else(capsys: pytest.CaptureFixture[
         assert all(line.startswith(str(tmp_path)) for line in err.splitlines())
 
 
-def test_true_machine_that_the_model_cannot_be(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_true_machine_that_the_model_cannot_be(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     head, tail = Path(QUICKSTART).read_text(encoding="utf-8").split("true_machine:")
     tail = tail.partition("\n\n")[2]
     broken = tmp_path / "broken.yaml"
     broken.write_text(
-        f"{head}true_machine:\n  kind: coefficients\n  values:\n    EXX t^9: 3 um\n    EAX t^1: 3 um\n\n{tail}",
+        f"{head}true_machine:\n  kind: coefficients\n  values:\n    EXX t^9: 3 um\n    EAX t^1: 3"
+        f" um\n\n{tail}",
         encoding="utf-8",
     )
     assert run("check", broken) == 3
@@ -282,7 +323,9 @@ def test_true_machine_that_the_model_cannot_be(capsys: pytest.CaptureFixture[str
     assert "an angle is expected" in lines[1]
 
 
-def test_a_file_with_variants_needs_a_choice_to_fit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_file_with_variants_needs_a_choice_to_fit(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     assert run("simulate", "designs/npl/6.1.1.yaml", "-o", tmp_path / "r.csv") == 3
     assert "choose one with --variant: A, B, C, D" in capsys.readouterr().err
     assert run("check", "designs/npl/6.1.1.yaml", "--variant", "E") == 3
@@ -305,7 +348,10 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert f"next: ballplate map {path}" in capsys.readouterr().err
     assert run("map", path) == 0
     listed = " ".join(capsys.readouterr().out.split())
-    assert "EYX δy(x) straightness of X in Y 2.000 um polynomial at y = 300 mm, z = 400 mm, end points" in listed
+    assert (
+        "EYX δy(x) straightness of X in Y 2.000 um polynomial at y = 300 mm, z = 400 mm, end points"
+        in listed
+    )
     text = path.read_text(encoding="utf-8")
     schema = json.loads(Path("designs/machine-schema.json").read_text(encoding="utf-8"))
     for part in (schema, *schema["$defs"].values()):
@@ -317,8 +363,12 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     begins = next(k for k, line in enumerate(lines) if "  #   # line" in line)
     table = [line.removeprefix("  #   ") for line in lines[begins:] if line.startswith("  #   ")]
     (tmp_path / "ezx.csv").write_text("\n".join([*table, "800,0,1"]), encoding="utf-8")
-    text = text.replace("# EZX: {", "EZX: {").replace("# EXY: {", "EXY: {").replace("# droop", "droop")
-    path.write_text(text.replace("arrangement: MB2", "arrangement: {probe_side: [x, z], workpiece_side: [y]}"))
+    text = (
+        text.replace("# EZX: {", "EZX: {").replace("# EXY: {", "EXY: {").replace("# droop", "droop")
+    )
+    path.write_text(
+        text.replace("arrangement: MB2", "arrangement: {probe_side: [x, z], workpiece_side: [y]}")
+    )
     assert run("map", path) == 3
     (message,) = capsys.readouterr().err.strip().split("\n")
     assert "only the arm of MH1, MH2 droops" in message
@@ -329,9 +379,15 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [("experiment", "schema.json"), ("sweep", "sweep-schema.json"), ("machine", "machine-schema.json")],
+    [
+        ("experiment", "schema.json"),
+        ("sweep", "sweep-schema.json"),
+        ("machine", "machine-schema.json"),
+    ],
 )
-def test_schema_is_the_shipped_one(kind: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_schema_is_the_shipped_one(
+    kind: str, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run("schema", kind) == 0
     found = json.loads(capsys.readouterr().out)
     assert found == json.loads(Path("designs", name).read_text(encoding="utf-8"))
@@ -347,7 +403,9 @@ def test_shipped_files_name_their_schema() -> None:
         assert (path.parent / named).resolve() == Path("designs", expected).resolve(), path
 
 
-@pytest.mark.parametrize("arguments", [[], ["chekc"], ["check"], ["run", "--what"], ["simulate", QUICKSTART]])
+@pytest.mark.parametrize(
+    "arguments", [[], ["chekc"], ["check"], ["run", "--what"], ["simulate", QUICKSTART]]
+)
 def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)
@@ -357,7 +415,11 @@ def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[s
 
 
 def test_all_shipped_designs_are_as_expected() -> None:
-    paths = sorted(path for path in Path("designs").rglob("*.yaml") if path.parent.name not in ("sweeps", "machines"))
+    paths = sorted(
+        path
+        for path in Path("designs").rglob("*.yaml")
+        if path.parent.name not in ("sweeps", "machines")
+    )
     assert len(paths) >= 11
     assert run("check", *paths) == 0
 
@@ -366,7 +428,13 @@ def test_closed_pipe_is_no_error() -> None:
     """As in `ballplate check ... | head -1`."""
     code = "import sys; from ballplate.cli import main; sys.exit(main(sys.argv[1:]))"
     process = subprocess.Popen(
-        [sys.executable, "-c", code, "check", *sorted(map(str, Path("designs/npl").glob("*.yaml")))],
+        [
+            sys.executable,
+            "-c",
+            code,
+            "check",
+            *sorted(map(str, Path("designs/npl").glob("*.yaml"))),
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": os.getcwd()},
@@ -382,10 +450,14 @@ def test_closed_pipe_is_no_error() -> None:
 def test_checking_loads_nothing_slow() -> None:
     """A check must start fast: no pandas, plotting or SciPy."""
     code = (
-        "import sys; from ballplate.cli import main; main(['check', 'designs/quickstart.yaml']);"
-        "print([m for m in ('pandas', 'scipy', 'joblib', 'matplotlib') if m in sys.modules], file=sys.stderr)"
+        "import sys; from ballplate.cli import main; main(['check',"
+        " 'designs/quickstart.yaml']);print([m for m in ('pandas', 'scipy', 'joblib', 'matplotlib')"
+        " if m in sys.modules], file=sys.stderr)"
     )
     found = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": os.getcwd()}
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.getcwd()},
     )
     assert found.stderr.strip() == "[]"

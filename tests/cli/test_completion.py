@@ -25,18 +25,30 @@ def printed(capsys: pytest.CaptureFixture[str], shell: str) -> str:
 def completed(script: str, folder: Path, *words: str) -> set[str]:
     """What bash offers for the last of the words."""
     (folder / "completion.bash").write_text(script, encoding="utf-8")
-    code = 'source completion.bash; COMP_WORDS=(ballplate "$@"); COMP_CWORD=$#; COMP_LINE="${COMP_WORDS[*]}"'
-    code += '; COMP_POINT=${#COMP_LINE}; _shtab_ballplate ballplate "${@: -1}" ""; printf "%s\\n" "${COMPREPLY[@]}"'
-    found = subprocess.run(["bash", "-c", code, "bash", *words], cwd=folder, capture_output=True, text=True, timeout=60)
+    code = (
+        'source completion.bash; COMP_WORDS=(ballplate "$@"); COMP_CWORD=$#;'
+        ' COMP_LINE="${COMP_WORDS[*]}"'
+    )
+    code += (
+        '; COMP_POINT=${#COMP_LINE}; _shtab_ballplate ballplate "${@: -1}" ""; printf "%s\\n"'
+        ' "${COMPREPLY[@]}"'
+    )
+    found = subprocess.run(
+        ["bash", "-c", code, "bash", *words], cwd=folder, capture_output=True, text=True, timeout=60
+    )
     return set(found.stdout.split())
 
 
 @needs_bash
-def test_commands_options_choices_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_options_choices_and_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     script = printed(capsys, "bash")
     (tmp_path / "design.yaml").touch()
     (tmp_path / "folder").mkdir()
-    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (commands,) = (
+        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
     every = set(commands.choices)
     assert every <= completed(script, tmp_path, "")
     assert completed(script, tmp_path, "re") == {name for name in every if name.startswith("re")}
@@ -49,18 +61,25 @@ def test_commands_options_choices_and_files(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize("shell", completion.SHELLS)
-def test_each_shell_has_a_script_with_all_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_shell_has_a_script_with_all_commands(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     script = printed(capsys, shell)
-    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (commands,) = (
+        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
     assert all(name in script for name in commands.choices)
 
 
-def test_what_is_missing_is_told(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_missing_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(outputs.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(SystemExit) as left:
         main(["--print-completion", "bash"])
     out, err = capsys.readouterr()
     assert left.value.code == 3 and out == ""
-    assert err == (
-        "ballplate: completion needs shtab; install it with: python -m pip install 'ballplate[completion]'\n"
+    assert (
+        err == "ballplate: completion needs shtab; install it with: python -m pip install"
+        " 'ballplate[completion]'\n"
     )

@@ -1,4 +1,6 @@
-"""What a file may say and hardly means is told on standard error, and changes neither results nor status."""
+"""What a file may say and hardly means is told on standard error, and changes neither results nor
+status.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,13 @@ QUICKSTART = Path("designs/quickstart.yaml")
 @pytest.mark.parametrize(
     ("stated", "told"),
     [
-        ("0.4 mm", "0.4 mm is far more than the readings of a co-ordinate measuring machine scatter; write 0.4 um if"),
+        (
+            "0.4 mm",
+            (
+                "0.4 mm is far more than the readings of a co-ordinate measuring machine scatter;"
+                " write 0.4 um if"
+            ),
+        ),
         ("[0.2 um, 0.2 mm, 0.2 um]", "0.2 mm is far more"),
         ("50 um", ""),
         ("0.2 um", ""),
@@ -33,15 +41,23 @@ def test_a_repeatability_of_another_unit(
     assert main(["check", str(path)]) == 0
     err = capsys.readouterr().err
     number = text.splitlines().index(line) + 1
-    assert err.startswith(f"warning: {path}:{number}:18: machine.repeatability: {told}") if told else err == ""
+    assert (
+        err.startswith(f"warning: {path}:{number}:18: machine.repeatability: {told}")
+        if told
+        else err == ""
+    )
 
 
-@pytest.mark.parametrize(("turns", "meant"), [(90, "1 for 90 deg"), (270, "3 for 270 deg"), (-90, "3 for -90 deg")])
+@pytest.mark.parametrize(
+    ("turns", "meant"), [(90, "1 for 90 deg"), (270, "3 for 270 deg"), (-90, "3 for -90 deg")]
+)
 def test_quarter_turns_in_degrees_are_refused(tmp_path: Path, turns: int, meant: str) -> None:
     path, text = tmp_path / "e.yaml", QUICKSTART.read_text()
     assert "quarter_turns: 1" in text
     path.write_text(text.replace("quarter_turns: 1", f"quarter_turns: {turns}"))
-    with pytest.raises(ExperimentError, match=rf"\.quarter_turns: {turns} is no number of turns .*; write {meant}"):
+    with pytest.raises(
+        ExperimentError, match=rf"\.quarter_turns: {turns} is no number of turns .*; write {meant}"
+    ):
         load(path)
 
 
@@ -71,11 +87,20 @@ volume: [1 m, 1 m, 1 m]
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        ("EXZ: {polynomial: [2 um, 3 um, 1 um]}", "the straight line through its end points, from 2 um to 6 um,"),
-        ("EXZ: {polynomial: [0 um, 3 um]}", "the straight line through its end points, from 0 mm to 3 um,"),
+        (
+            "EXZ: {polynomial: [2 um, 3 um, 1 um]}",
+            "the straight line through its end points, from 2 um to 6 um,",
+        ),
+        (
+            "EXZ: {polynomial: [0 um, 3 um]}",
+            "the straight line through its end points, from 0 mm to 3 um,",
+        ),
         ("EXZ: {polynomial: [0 um, -7.1 um, 7.1 um]}", ""),
         ("EXZ: {polynomial: [1 um, 3 um], straightness: least squares}", ""),
-        ("EXX: {polynomial: [5 um, 3 um]}", "5 um is taken off, as errors are zero at the reference point"),
+        (
+            "EXX: {polynomial: [5 um, 3 um]}",
+            "5 um is taken off, as errors are zero at the reference point",
+        ),
         ("EXX: {polynomial: [0 um, 3 um]}", ""),
         ("EAX: {polynomial: [2 urad, 3 urad]}", "2 urad is taken off"),
         ("EXZ: {bandwidth: 1 um}", ""),
@@ -101,13 +126,19 @@ def test_what_a_polynomial_loses_is_told(
         assert (np.abs(function.values(t)[:, 0] - as_stated).max() > 1e-9) == bool(told)
 
 
-def test_an_experiment_tells_it_of_its_true_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_experiment_tells_it_of_its_true_machine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     machine = tmp_path / "m.yaml"
     machine.write_text(MACHINE.format(error="EXZ: {polynomial: [2 um, 3 um, 1 um]}", more=""))
     text = QUICKSTART.read_text()
     start = text.index("true_machine:")
-    end = next(i for i in range(start + 1, len(text)) if text[i] == "\n" and text[i + 1] not in " #\n")
+    end = next(
+        i for i in range(start + 1, len(text)) if text[i] == "\n" and text[i + 1] not in " #\n"
+    )
     path = tmp_path / "e.yaml"
     path.write_text(text[:start] + "true_machine: {kind: machine, file: m.yaml}" + text[end:])
     assert main(["check", str(path)]) == 0
-    assert capsys.readouterr().err.startswith(f"warning: {machine}:5:21: errors.EXZ.polynomial: the straight line")
+    assert capsys.readouterr().err.startswith(
+        f"warning: {machine}:5:21: errors.EXZ.polynomial: the straight line"
+    )

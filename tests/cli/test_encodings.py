@@ -64,8 +64,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "designs/park/machines", top, dirs_exist_ok=True)
     (top / "machine.yaml").write_text(text, encoding="utf-8")
     (top / "sizes.yaml").write_text(
-        f"title: '{TITLE}'\nbase: plate.yaml\n"
-        "axes: {µ: {paths: ['artefacts.plate.balls[0]', 'artefacts.plate.balls[1]'], values: [4, 5]}}\n",
+        f"title: '{TITLE}'\nbase: plate.yaml\naxes: {{µ: {{paths: ['artefacts.plate.balls[0]',"
+        " 'artefacts.plate.balls[1]'], values: [4, 5]}}\n",
         encoding="utf-8",
     )
     points = "\n".join(f"{10 * k},{k % 3}" for k in range(30))
@@ -97,7 +97,9 @@ def printed(command: str, encoding: str, monkeypatch: pytest.MonkeyPatch) -> tup
 
 
 @pytest.mark.parametrize("command", PEOPLE)
-def test_text_can_be_read_in_any_encoding(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_text_can_be_read_in_any_encoding(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(folder)
     whole = printed(command, "utf-8", monkeypatch)[0].decode("utf-8")
     for encoding in ("ascii", "cp437", "cp1252"):
@@ -111,12 +113,16 @@ def test_text_can_be_read_in_any_encoding(command: str, folder: Path, monkeypatc
 
 def test_the_title_is_printed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    told = [command for command in PEOPLE if TITLE.encode() in printed(command, "utf-8", monkeypatch)[0]]
+    told = [
+        command for command in PEOPLE if TITLE.encode() in printed(command, "utf-8", monkeypatch)[0]
+    ]
     assert len(told) >= 5
 
 
 @pytest.mark.parametrize("command", PROGRAMS)
-def test_data_are_utf_8_whatever_the_encoding(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_data_are_utf_8_whatever_the_encoding(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(folder)
     whole = printed(command, "utf-8", monkeypatch)[0]
     assert whole.decode("utf-8")
@@ -129,7 +135,9 @@ def test_data_are_utf_8_whatever_the_encoding(command: str, folder: Path, monkey
         assert TITLE in ElementTree.tostring(ElementTree.fromstring(whole), "unicode")
 
 
-def test_messages_can_be_read_in_any_encoding(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_can_be_read_in_any_encoding(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (folder / "µ.yaml").write_text("title: x\n", encoding="utf-8")
     for encoding, expected in (("ascii", "u.yaml:1:1: "), ("cp437", "µ.yaml:1:1: ")):
         found = subprocess.run(
@@ -143,12 +151,24 @@ def test_messages_can_be_read_in_any_encoding(folder: Path, monkeypatch: pytest.
         assert "(name -> artefact: grid" in told
 
 
-def test_files_are_utf_8_with_line_feeds(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_files_are_utf_8_with_line_feeds(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Whatever the locale: with that of C and without Python's UTF-8 mode, files would be ASCII."""
     outputs = {"simulate": ("-o", tmp_path / "µ.csv"), "lengths": ("--csv", tmp_path / "ü.csv")}
     for command, (option, path) in outputs.items():
         found = subprocess.run(
-            [sys.executable, "-X", "utf8=0", "-m", "ballplate", command, "plate.yaml", option, path],
+            [
+                sys.executable,
+                "-X",
+                "utf8=0",
+                "-m",
+                "ballplate",
+                command,
+                "plate.yaml",
+                option,
+                path,
+            ],
             cwd=folder,
             env={**os.environ, "PYTHONPATH": str(ROOT), "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"},
             capture_output=True,
@@ -159,7 +179,9 @@ def test_files_are_utf_8_with_line_feeds(folder: Path, monkeypatch: pytest.Monke
 
 
 def opened(tree: ast.AST) -> list[ast.Call]:
-    """Calls that open text files: open(), and the methods of paths, but those of the module os and of bytes."""
+    """Calls that open text files: open(), and the methods of paths, but those of the module os and
+    of bytes.
+    """
     found = []
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
@@ -168,8 +190,14 @@ def opened(tree: ast.AST) -> list[ast.Call]:
             is_opened = node.func.id == "open"
         else:
             is_os = getattr(getattr(node.func, "value", None), "id", "") == "os"
-            is_opened = getattr(node.func, "attr", "") in ("open", "read_text", "write_text") and not is_os
-        modes = [one.value for one in node.args if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+            is_opened = (
+                getattr(node.func, "attr", "") in ("open", "read_text", "write_text") and not is_os
+            )
+        modes = [
+            one.value
+            for one in node.args
+            if isinstance(one, ast.Constant) and isinstance(one.value, str)
+        ]
         if is_opened and not any("b" in mode and set(mode) <= set("rwxab+") for mode in modes):
             found.append(node)
     return found
@@ -179,7 +207,9 @@ def test_every_file_is_opened_with_an_encoding() -> None:
     """That of the system, which counts where none is stated, is another one on Windows."""
     assert len(opened(ast.parse("open(a)\na.open('rb')\na.read_text()\nos.open(a, 1)\n"))) == 2
     count = 0
-    for path in (path for package in ("analysis", "simulator") for path in (ROOT / package).rglob("*.py")):
+    for path in (
+        path for package in ("analysis", "simulator") for path in (ROOT / package).rglob("*.py")
+    ):
         for call in opened(ast.parse(path.read_bytes())):
             count += 1
             assert "encoding" in [one.arg for one in call.keywords], f"{path}:{call.lineno}"

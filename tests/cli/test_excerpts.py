@@ -67,7 +67,9 @@ def test_colour_by_the_environment_alone(
 def test_no_colour_where_there_is_no_terminal() -> None:
     file = io.StringIO()
     assert not has_colour(file, {}) and not has_colour(file, {"NO_COLOR": ""})
-    assert has_colour(file, {"FORCE_COLOR": "1"}) and not has_colour(file, {"FORCE_COLOR": "1", "NO_COLOR": "1"})
+    assert has_colour(file, {"FORCE_COLOR": "1"}) and not has_colour(
+        file, {"FORCE_COLOR": "1", "NO_COLOR": "1"}
+    )
 
 
 @pytest.mark.parametrize("width", [20, 40, 80])

@@ -9,11 +9,17 @@ import pytest
 from ballplate.cli import main
 
 
-@pytest.mark.parametrize("truth", ["kind: random\n  position: 2 um\n  rotation: 4 urad\n  seed: 7", "kind: zero"])
-def test_the_rank_of_a_fit_is_that_of_the_check(tmp_path: Path, capsys: pytest.CaptureFixture[str], truth: str) -> None:
+@pytest.mark.parametrize(
+    "truth", ["kind: random\n  position: 2 um\n  rotation: 4 urad\n  seed: 7", "kind: zero"]
+)
+def test_the_rank_of_a_fit_is_that_of_the_check(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], truth: str
+) -> None:
     text = Path("designs/quickstart.yaml").read_text()
     lines = [line for line in text.splitlines() if "plane: y" not in line]
-    text = "\n".join(lines).replace("kind: random\n  position: 2 um\n  rotation: 4 urad\n  seed: 7", truth)
+    text = "\n".join(lines).replace(
+        "kind: random\n  position: 2 um\n  rotation: 4 urad\n  seed: 7", truth
+    )
     path, readings = tmp_path / "plan.yaml", tmp_path / "readings.csv"
     path.write_text(text + "\n")
     assert main(["check", str(path), "--json"]) == 1

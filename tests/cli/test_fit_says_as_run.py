@@ -16,7 +16,12 @@ from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import exact_readings, noisy_readings, on_true_machine, true_artefacts
+from ballplate.simulator.readings.generate import (
+    exact_readings,
+    noisy_readings,
+    on_true_machine,
+    true_artefacts,
+)
 from ballplate.simulator.readings.reading_files import observe
 
 from tests.reference.random_experiments import random_experiment
@@ -51,7 +56,9 @@ def fitted(experiment: Experiment, seed: int | None) -> tuple[Fit, State]:
     """The fit of simulated readings, without noise where there is no seed, and the truth."""
     design = lay_out(experiment)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(experiment.true_machine, design.model, *corners)
+    )
     if seed is None:
         readings, x = exact_readings(on_truth, truth)
     else:
@@ -72,7 +79,10 @@ def assert_says_as_run(experiment: Experiment, seed: int) -> None:
     spread = linearised_fit(found.design, found.solution)
     layout, state = found.solution.factor.layout, found.solution.state
     for stated, off in (
-        (spread.of_balls()[found.design.plate_balls], (state.balls - truth.balls)[found.design.plate_balls]),
+        (
+            spread.of_balls()[found.design.plate_balls],
+            (state.balls - truth.balls)[found.design.plate_balls],
+        ),
         (spread.of_shared(np.eye(len(layout))[layout.model]), state.a - truth.a),
     ):
         known = ~np.isnan(stated)
@@ -96,7 +106,9 @@ def test_experiments_drawn_at_random(tmp_path: Path, seed: int) -> None:
 
 @pytest.mark.long
 def test_many_experiments_drawn_at_random(tmp_path: Path) -> None:
-    """Where a direction is all but open the iteration may take longer than it has, and rank is told all the same."""
+    """Where a direction is all but open the iteration may take longer than it has, and rank is told
+    all the same.
+    """
     slow = []
     for seed in range(100, 400):
         experiment = random_experiment(seed, tmp_path)
@@ -115,11 +127,15 @@ def test_fewer_readings_than_planned_are_judged_as_they_are(tmp_path: Path) -> N
     path = tmp_path / "quickstart.yaml"
     path.write_text(Path("designs/quickstart.yaml").read_text())
     experiment = load(path)[0]
-    some = replace(experiment, positions=tuple(one for one in experiment.positions if "y" not in one.name))
+    some = replace(
+        experiment, positions=tuple(one for one in experiment.positions if "y" not in one.name)
+    )
     expected = predict(some).verdict.deficiency
     design = lay_out(experiment)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(experiment.true_machine, design.model, *corners)
+    )
     readings, x = noisy_readings(on_truth, truth, np.random.default_rng(1))
     kept = np.flatnonzero(readings.position < 4)
     found = fit(experiment, observe(design, readings.select(kept), x[kept]))

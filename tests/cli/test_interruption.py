@@ -1,4 +1,6 @@
-"""Interruptions from the keyboard (SIGINT) at awkward moments: status 130, one line, no traceback."""
+"""Interruptions from the keyboard (SIGINT) at awkward moments: status 130, one line, no
+traceback.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ from tests.sweeps.support import ROOT, hearing_interruptions, small_sweep, store
 
 @pytest.fixture(autouse=True)
 def heard() -> Iterator[None]:
-    """Interruptions are heard here too if the tests run in the background, where shells have them ignored."""
+    """Interruptions are heard here too if the tests run in the background, where shells have them
+    ignored.
+    """
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -71,7 +75,9 @@ def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch.setattr(trials, "accuracy_of", interrupted)
     quickstart = str(ROOT / "designs" / "quickstart.yaml")
     assert main(["run", quickstart, "--trials", "1000000", "--workers", "1"]) == 130
-    assert "interrupted: the figures are those of the data sets done so far" in capsys.readouterr().err
+    assert (
+        "interrupted: the figures are those of the data sets done so far" in capsys.readouterr().err
+    )
 
 
 def test_they_are_remembered() -> None:
@@ -90,7 +96,9 @@ def test_ignored_ones_stay_ignored() -> None:
         interruption.answer()
 
 
-@pytest.mark.parametrize("module", ["ballplate.cli.common", "ballplate.simulator.inputs.messages", "numpy", "joblib"])
+@pytest.mark.parametrize(
+    "module", ["ballplate.cli.common", "ballplate.simulator.inputs.messages", "numpy", "joblib"]
+)
 def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
     """The first second of every command is this."""
     path = small_sweep(tmp_path, 3)

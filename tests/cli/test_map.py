@@ -17,7 +17,9 @@ from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.volumetric.volumetric_errors import Volumetric
 
 MACHINES = Path("designs/park/machines")
-ARM, BRIDGE, MEASURED = (MACHINES / f"{name}.yaml" for name in ("gec-like", "npl-like", "measured-errors"))
+ARM, BRIDGE, MEASURED = (
+    MACHINES / f"{name}.yaml" for name in ("gec-like", "npl-like", "measured-errors")
+)
 
 SCALES = """\
 title: scales of 10, 20 and 30 um/m
@@ -49,18 +51,36 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert lines[1].startswith(
         "FB1: x carries z carries the probe, y carries the workpiece; errors are where the tip is"
     )
-    assert ["EYY", "δy(y)", "positioning", "error", "of", "Y", "6.000", "1.000", "um", "polynomial"] in [
-        line.split() for line in lines
-    ]
-    # (0.4 x 4 + 0.3 x 6 + 1.2 x 36) / 1.3 = 35.85 along every diagonal; random: 0.3 / 1.3 of 1 um at both ends.
+    assert [
+        "EYY",
+        "δy(y)",
+        "positioning",
+        "error",
+        "of",
+        "Y",
+        "6.000",
+        "1.000",
+        "um",
+        "polynomial",
+    ] in [line.split() for line in lines]
+    # (0.4 x 4 + 0.3 x 6 + 1.2 x 36) / 1.3 = 35.85 along every diagonal; random: 0.3 / 1.3 of 1 um
+    # at both ends.
     diagonals = [line.split() for line in lines if line.startswith(("1  ", "2  ", "3  ", "4  "))]
     assert [row[-2:] for row in diagonals] == [["35.85", "0.3264"]] * 4
-    assert "range in um: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 um at x = 400" in out
+    assert (
+        "range in um: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 um at x"
+        " = 400" in out
+    )
 
 
-def test_what_rounds_to_zero_has_no_sign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_rounds_to_zero_has_no_sign(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "small.yaml"
-    path.write_text(SCALES.replace("[0 um, 36 um]", "[0 um, -4 nm]").replace("6 um]", "-0.1 nm]"), encoding="utf-8")
+    path.write_text(
+        SCALES.replace("[0 um, 36 um]", "[0 um, -4 nm]").replace("6 um]", "-0.1 nm]"),
+        encoding="utf-8",
+    )
     for options in (("--grid", "2,2,2"), ("--error", "EYY")):
         assert run("map", path, *options) == 0
         assert not re.search(r"-0\.0+\b", capsys.readouterr().out)
@@ -75,7 +95,12 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     assert [one["random"] for one in found["grid"]] == expected.deviation.tolist()
     assert [one["error"] for one in found["diagonals"]] == built.diagonals().error.tolist()
     assert found["arrangement"] == "MB1" and found["parametric_errors"]["EBX"]["symbol"] == "Ey(x)"
-    assert found["parametric_errors"]["ECX"] == {"symbol": "Ez(x)", "unit": "rad", "range": None, "random": 2e-6}
+    assert found["parametric_errors"]["ECX"] == {
+        "symbol": "Ez(x)",
+        "unit": "rad",
+        "range": None,
+        "random": 2e-6,
+    }
     assert found["other_errors"]["thermal x"] == {
         "value": pytest.approx(6.3e-6),
         "unit": "1",
@@ -90,14 +115,19 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_csv_of_a_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("map", BRIDGE, "--line", "x = 450 mm, z = 0.2 m", "--points", "5", "--format", "csv") == 0
+    assert (
+        run("map", BRIDGE, "--line", "x = 450 mm, z = 0.2 m", "--points", "5", "--format", "csv")
+        == 0
+    )
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
     assert [float(row["y_mm"]) for row in rows] == np.linspace(0, 1150, 5).tolist()
     assert {(row["x_mm"], row["z_mm"]) for row in rows} == {("450", "200")}
     built = Volumetric(load_machine(BRIDGE))
     expected = built.systematic(np.array([[0.45, float(row["y_mm"]) / 1000, 0.2] for row in rows]))
     for row, error in zip(rows, expected, strict=True):
-        assert [float(row[f"error_{axis}_um"]) for axis in "xyz"] == pytest.approx((1e6 * error).tolist(), abs=1e-9)
+        assert [float(row[f"error_{axis}_um"]) for axis in "xyz"] == pytest.approx(
+            (1e6 * error).tolist(), abs=1e-9
+        )
         assert float(row["resultant_um"]) == pytest.approx(1e6 * np.linalg.norm(error))
 
 
@@ -105,17 +135,27 @@ def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:
     diagonal = "900 mm, 0 mm, 0 mm to [0 mm, 1.15 m, 400 mm]"
     assert run("map", BRIDGE, "--line", diagonal, "--points", "3", "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    assert [one["position"] for one in found["line"]] == [[0.9, 0.0, 0.0], [0.45, 0.575, 0.2], [0.0, 1.15, 0.4]]
+    assert [one["position"] for one in found["line"]] == [
+        [0.9, 0.0, 0.0],
+        [0.45, 0.575, 0.2],
+        [0.0, 1.15, 0.4],
+    ]
     second = Volumetric(load_machine(BRIDGE)).diagonals()
-    assert found["length"]["error"] == second.error[1] and found["length"]["random"] == second.deviation[1]
+    assert (
+        found["length"]["error"] == second.error[1]
+        and found["length"]["random"] == second.deviation[1]
+    )
     assert run("map", BRIDGE, "--line", diagonal, "--points", "3") == 0
     assert "length 1514.100 mm, length error 21.65 um, random 5.762 um" in capsys.readouterr().out
 
 
-def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_parametric_error_on_its_line_and_at_the_reference_point(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert run("map", MEASURED, "--error", "EYX", "--json") == 0
     found = json.loads(capsys.readouterr().out)
-    # Measured at z = 400 mm, the roll EAX adds -z EAX; least squares over the 17 points leave no slope.
+    # Measured at z = 400 mm, the roll EAX adds -z EAX; least squares over the 17 points leave no
+    # slope.
     assert run("map", MEASURED, "--error", "EAX", "--json") == 0
     roll = json.loads(capsys.readouterr().out)
     at, stated, values = (np.array(found[key]) for key in ("position", "stated", "value"))
@@ -131,7 +171,10 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytes
         "stated as table of 17 points at y = 100 mm, z = 400 mm, least squares\n"
     )
     assert run("map", ARM, "--error", "EYX") == 0
-    assert "polynomial, end points; at the reference point (no line stated)\n" in capsys.readouterr().out
+    assert (
+        "polynomial, end points; at the reference point (no line stated)\n"
+        in capsys.readouterr().out
+    )
     assert run("map", ARM, "--error", "EBX") == 0
     assert "stated as polynomial; a rotation is the same on all lines\n" in capsys.readouterr().out
     assert run("map", MEASURED, "--error", "EYX", "--format", "csv") == 0
@@ -141,28 +184,42 @@ def test_a_parametric_error_on_its_line_and_at_the_reference_point(capsys: pytes
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--grid", "3,2,2"), "magnified 1000 times; length errors of the diagonals from the corners 1: 42.9 µm, 2: "),
-        (("--line", "y = 600 mm, z = 600 mm"), "Volumetric errors along x at y = 600 mm, z = 600 mm"),
-        (("--line", "0 mm, 0 mm, 0 mm to 1 m, 1 m, 0 mm"), "Volumetric errors from (0, 0, 0) to (1000, 1000, 0) mm"),
+        (
+            ("--grid", "3,2,2"),
+            "magnified 1000 times; length errors of the diagonals from the corners 1: 42.9 µm, 2: ",
+        ),
+        (
+            ("--line", "y = 600 mm, z = 600 mm"),
+            "Volumetric errors along x at y = 600 mm, z = 600 mm",
+        ),
+        (
+            ("--line", "0 mm, 0 mm, 0 mm to 1 m, 1 m, 0 mm"),
+            "Volumetric errors from (0, 0, 0) to (1000, 1000, 0) mm",
+        ),
         (("--error", "EXX"), "EXX, positioning error of X, range 66.00 µm"),
     ],
 )
-def test_pictures(options: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pictures(
+    options: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("matplotlib")
     written = []
     for name in ("one.svg", "two.svg"):
         assert run("map", ARM, *options, "--plot", tmp_path / name) == 0
         written.append((tmp_path / name).read_bytes())
     assert written[0] == written[1]
-    assert words in written[0].decode("utf-8") and b"http" not in written[0].replace(b"http://www.w3.org", b"").replace(
-        b"http://purl.org", b""
-    ).replace(b"http://creativecommons.org", b"")
+    assert words in written[0].decode("utf-8") and b"http" not in written[0].replace(
+        b"http://www.w3.org", b""
+    ).replace(b"http://purl.org", b"").replace(b"http://creativecommons.org", b"")
     assert capsys.readouterr().err == ""
 
 
 def test_a_long_grid_is_drawn_with_some_of_its_lines(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    assert run("map", ARM, "--grid", "2,2,2000", "--format", "csv", "--plot", tmp_path / "long.svg") == 0
+    assert (
+        run("map", ARM, "--grid", "2,2,2000", "--format", "csv", "--plot", tmp_path / "long.svg")
+        == 0
+    )
     assert (tmp_path / "long.svg").stat().st_size < 300_000
 
 
@@ -188,17 +245,31 @@ def test_magnification_is_round() -> None:
     [
         (("--grid", "5"), 'expected three whole numbers, 2 or above, such as 13,9,9, not "5"'),
         (("--grid", "5,1,5"), "expected three whole numbers, 2 or above"),
-        (("--grid", "1000,1000,1000"), "1000000000 points are too many; at most 200000 are possible"),
+        (
+            ("--grid", "1000,1000,1000"),
+            "1000000000 points are too many; at most 200000 are possible",
+        ),
         (("--line", "y = 600"), 'y: "600" has no unit'),
-        (("--line", "1 m, 1 m, 1 m to 1 m, 1 m, 1 m"), "a line ends where it begins; give two points"),
+        (
+            ("--line", "1 m, 1 m, 1 m to 1 m, 1 m, 1 m"),
+            "a line ends where it begins; give two points",
+        ),
         (("--line", "1 m, 1 m to 1 m, 1 m, 1 m"), "has 2 co-ordinates; give three"),
-        (("--line", "y = 600 mm"), "two axes stand still on a line; write for example y = 600 mm, z = 600 mm"),
-        (("--line", "y = 600 mm, z = 600 mm", "--points", "1"), "a line has 2 to 200000 points, not 1"),
+        (
+            ("--line", "y = 600 mm"),
+            "two axes stand still on a line; write for example y = 600 mm, z = 600 mm",
+        ),
+        (
+            ("--line", "y = 600 mm, z = 600 mm", "--points", "1"),
+            "a line has 2 to 200000 points, not 1",
+        ),
         (("--line", "y = 1 mm, z = 1 mm", "--error", "EXX"), "not allowed with argument"),
         (("--plot", "map.gif"), "a picture's name ends in .svg, .png, .pdf"),
     ],
 )
-def test_wrong_usage(options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_usage(
+    options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as caught:
         run("map", ARM, *options)
     assert caught.value.code == 2
@@ -209,12 +280,18 @@ def test_wrong_usage(options: tuple[str, ...], message: str, capsys: pytest.Capt
     ("options", "message"),
     [
         (("--error", "EXY"), "does not state EXY, straightness of Y in X; it is zero (stated: EAY"),
-        (("--error", "EC0Y"), "EC0Y is the squareness of Y to X, a single number: -45.00 urad at the reference point"),
+        (
+            ("--error", "EC0Y"),
+            "EC0Y is the squareness of Y to X, a single number: -45.00 urad at the reference point",
+        ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
         (("--points", "10"), "--points is for --line; leave it out"),
         (("--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
-        (("--error", "EXX", "--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
+        (
+            ("--error", "EXX", "--magnification", "10"),
+            "--magnification is for the drawing of the grid; leave it out",
+        ),
     ],
 )
 def test_wrong_usage_that_the_file_tells(
@@ -227,7 +304,9 @@ def test_wrong_usage_that_the_file_tells(
 
 def test_a_bad_file_is_status_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "bad.yaml"
-    path.write_text(SCALES.replace("FB1", "FB3").replace("[1 um, 4 um]", "[1 um, 4]"), encoding="utf-8")
+    path.write_text(
+        SCALES.replace("FB1", "FB3").replace("[1 um, 4 um]", "[1 um, 4]"), encoding="utf-8"
+    )
     assert run("map", path) == 3
     out, err = capsys.readouterr()
     assert out == "" and [line.partition(": ")[0] for line in err.strip().split("\n")] == [
@@ -240,7 +319,9 @@ def test_a_bad_file_is_status_3(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "this describes a machine; use it with ballplate map" in capsys.readouterr().err
 
 
-def test_a_picture_is_not_written_over_the_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_picture_is_not_written_over_the_machine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "machine.svg"
     path.write_text(SCALES, encoding="utf-8")
     assert run("map", path, "--plot", path) == 2
@@ -250,7 +331,10 @@ def test_a_picture_is_not_written_over_the_machine(tmp_path: Path, capsys: pytes
 
 
 def test_a_missing_plotting_library_is_named(
-    scales: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    scales: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     for name in [one for one in sys.modules if one.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)

@@ -35,9 +35,12 @@ def _fork() -> None:
     raise OSError(errno.ENOMEM, "Cannot allocate memory")
 
 
-@pytest.mark.parametrize("command", ["check", "run", "plan", "reach", "lengths", "reliability", "compare"])
 @pytest.mark.parametrize(
-    ("failure", "told"), [(_array, "is: there is no room for another 2.00 EiB; "), (_plain, "is; "), (_fork, "is; ")]
+    "command", ["check", "run", "plan", "reach", "lengths", "reliability", "compare"]
+)
+@pytest.mark.parametrize(
+    ("failure", "told"),
+    [(_array, "is: there is no room for another 2.00 EiB; "), (_plain, "is; "), (_fork, "is; ")],
 )
 def test_no_memory_in_any_command(
     monkeypatch: pytest.MonkeyPatch,
@@ -66,7 +69,8 @@ def _killed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("work", "told"), [(_killed, "a worker process of run was ended"), (_array, "run needs more memory")]
+    ("work", "told"),
+    [(_killed, "a worker process of run was ended"), (_array, "run needs more memory")],
 )
 def test_no_memory_in_a_worker(work: Callable[[], None], told: str) -> None:
     """The first as if the system had ended it for want of memory."""
@@ -77,14 +81,20 @@ def test_no_memory_in_a_worker(work: Callable[[], None], told: str) -> None:
     assert message is not None and message.startswith(f"{QUICKSTART}: {told}")
 
 
-@pytest.mark.parametrize("error", [ValueError("1 GiB"), OSError(errno.ENOSPC, "No space left on device")])
+@pytest.mark.parametrize(
+    "error", [ValueError("1 GiB"), OSError(errno.ENOSPC, "No space left on device")]
+)
 def test_other_errors_are_none_of_memory(error: Exception) -> None:
     assert no_memory(error, Namespace(run=run, files=[])) is None
 
 
 def test_a_process_with_little_memory(tmp_path: Path) -> None:
-    """The design's plates have 40,000 balls; the limit is what the program has once it is loaded, and a little more."""
-    text = Path(QUICKSTART).read_text(encoding="utf-8").replace("balls: [5, 5]", "balls: [200, 200]")
+    """The design's plates have 40,000 balls; the limit is what the program has once it is loaded,
+    and a little more.
+    """
+    text = (
+        Path(QUICKSTART).read_text(encoding="utf-8").replace("balls: [5, 5]", "balls: [200, 200]")
+    )
     (tmp_path / "large.yaml").write_text(text, encoding="utf-8")
     code = (
         "import os, resource, sys, scipy.linalg, scipy.spatial;"

@@ -10,7 +10,9 @@ from ballplate.cli import main, parser
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
-    (found,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (found,) = (
+        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
     return dict(found.choices)
 
 
@@ -26,7 +28,9 @@ def complaint(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 def swapped(word: str, random: Random) -> str:
     """A word with two letters in its middle exchanged that are not the same."""
-    places = [k for k in range(1, len(word) - 1) if word[k] != word[k + 1] and "-" not in word[k : k + 2]]
+    places = [
+        k for k in range(1, len(word) - 1) if word[k] != word[k + 1] and "-" not in word[k : k + 2]
+    ]
     k = random.choice(places)
     return word[:k] + word[k + 1] + word[k] + word[k + 2 :]
 
@@ -35,7 +39,9 @@ def swapped(word: str, random: Random) -> str:
 def test_a_mistyped_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     for number in range(3):
         word = swapped(command, Random(number))
-        assert complaint(capsys, word, "x.yaml").endswith(f'invalid choice: {word!r}; did you mean "{command}"?')
+        assert complaint(capsys, word, "x.yaml").endswith(
+            f'invalid choice: {word!r}; did you mean "{command}"?'
+        )
 
 
 def test_a_word_that_is_no_command_is_told_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
@@ -46,22 +52,37 @@ def test_a_word_that_is_no_command_is_told_all_of_them(capsys: pytest.CaptureFix
 def test_every_option_mistyped(capsys: pytest.CaptureFixture[str]) -> None:
     tried = 0
     for name, command in commands().items():
-        needed = ["x.yaml" for one in command._actions if not one.option_strings and one.choices is None]
+        needed = [
+            "x.yaml" for one in command._actions if not one.option_strings and one.choices is None
+        ]
         needed += ["npl"] if name == "reproduce" else []
         for option in command._option_string_actions:
             mistyped = swapped(option, Random(tried)) if len(option) > 7 else "--"
             if any(known.startswith(mistyped) for known in command._option_string_actions):
                 continue
-            needs = [one.option_strings[-1] for one in command._actions if one.required and one.option_strings]
-            told = complaint(capsys, name, *needed, *(text for one in needs for text in (one, "x")), mistyped)
-            assert told == f'ballplate {name}: error: unrecognized arguments: {mistyped}; did you mean "{option}"?'
+            needs = [
+                one.option_strings[-1]
+                for one in command._actions
+                if one.required and one.option_strings
+            ]
+            told = complaint(
+                capsys, name, *needed, *(text for one in needs for text in (one, "x")), mistyped
+            )
+            assert (
+                told == f"ballplate {name}: error: unrecognized arguments: {mistyped}; did you mean"
+                f' "{option}"?'
+            )
             tried += 1
     assert tried > 50
 
 
 def test_a_value_with_an_option_that_is_unknown(capsys: pytest.CaptureFixture[str]) -> None:
-    assert complaint(capsys, "run", "x.yaml", "--trails=5").endswith('--trails=5; did you mean "--trials"?')
-    assert complaint(capsys, "run", "x.yaml", "--zzzzzzz").endswith("unrecognized arguments: --zzzzzzz")
+    assert complaint(capsys, "run", "x.yaml", "--trails=5").endswith(
+        '--trails=5; did you mean "--trials"?'
+    )
+    assert complaint(capsys, "run", "x.yaml", "--zzzzzzz").endswith(
+        "unrecognized arguments: --zzzzzzz"
+    )
 
 
 def test_a_mistyped_choice(capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,7 +24,7 @@ positions:
   - {name: "'=three", pose: {origin: [200 mm, 500 mm, 300 mm], rotation: [70 deg, 10 deg, 20 deg]}}
   - {name: "'four", pose: {origin: [500 mm, 500 mm, 300 mm], rotation: [0 deg, 80 deg, 20 deg]}}
 calibration: [{kind: coordinates, standard_uncertainty: 0.2 um}]
-"""  # noqa: E501
+"""
 
 
 @given(st.text(st.characters(blacklist_categories=["Cs"], blacklist_characters="\0"), max_size=8))

@@ -1,7 +1,8 @@
-"""Files that commands write: whatever goes wrong, it is told before the work, and nothing that was there is lost.
+"""Files that commands write: whatever goes wrong, it is told before the work, and nothing that was
+there is lost.
 
-Every command and every option that names a file to be written is walked through; one that is added and is not in
-`WALK` fails here.
+Every command and every option that names a file to be written is walked through; one that is added
+and is not in `WALK` fails here.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ METAVARS = ("FILE", "CSV", "YAML", "NAME.yaml", "STORE", "READINGS", "FOLDER")
 
 @dataclass(frozen=True)
 class Walk:
-    """A command: what it reads, in the order of its arguments, the options and names of what it writes, other options.
+    """A command: what it reads, in the order of its arguments, the options and names of what it
+    writes, other options.
 
     `also` are files that those read name.
     """
@@ -67,7 +69,9 @@ class Walk:
 EXPERIMENT = {"FILE": "design.yaml"}
 WALK = {
     "init": Walk({}, {"NAME.yaml": "new.yaml"}, prints=False),
-    "simulate": Walk(EXPERIMENT, {"-o": "r.csv", "--certificate": "c.csv"}, also=("balls.csv",), prints=False),
+    "simulate": Walk(
+        EXPERIMENT, {"-o": "r.csv", "--certificate": "c.csv"}, also=("balls.csv",), prints=False
+    ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
         {"--plot": "fit.svg"},
@@ -79,10 +83,15 @@ WALK = {
         ("--positions", "3", "--workers", "1"),
     ),
     "lengths": Walk(
-        EXPERIMENT, {"--csv": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"}, ("--grid", "3"), ("balls.csv",)
+        EXPERIMENT,
+        {"--csv": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},
+        ("--grid", "3"),
+        ("balls.csv",),
     ),
     "reliability": Walk(EXPERIMENT, {"--csv": "o.csv"}, also=("balls.csv",)),
-    "map": Walk({"FILE": "machine.yaml"}, {"--plot": "map.png"}, ("--grid", "2,2,2"), ("measured/exx.csv",)),
+    "map": Walk(
+        {"FILE": "machine.yaml"}, {"--plot": "map.png"}, ("--grid", "2,2,2"), ("measured/exx.csv",)
+    ),
     "spline": Walk(
         {"FILE": "points.csv"},
         {"--coefficients": "s.csv", "--plot": "s.pdf", "--whiskers": "w.svg"},
@@ -95,9 +104,13 @@ WALK = {
     "reach": Walk(EXPERIMENT, {}, ("--by", "repeatability")),
     "compare": Walk(EXPERIMENT, {}, ("--trials", "2", "--points", "5")),
     # A store is no file that is replaced; what it refuses is tested with it.
-    "sweep": Walk({"FILE": "sweep.yaml", "--store": "new.sqlite", "--folder": "."}, {}, ("--dry-run",)),
+    "sweep": Walk(
+        {"FILE": "sweep.yaml", "--store": "new.sqlite", "--folder": "."}, {}, ("--dry-run",)
+    ),
     "reproduce": Walk(
-        {"--designs": "certified", "--results": "results.json"}, {}, ("certified", "--experiment", "two-dimensions")
+        {"--designs": "certified", "--results": "results.json"},
+        {},
+        ("certified", "--experiment", "two-dimensions"),
     ),
     "schema": Walk({}, {}),
 }
@@ -120,11 +133,28 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy("designs/gilsinn/table-1.csv", folder / "points.csv")
     shutil.copy("designs/park/machines/measured-errors.yaml", folder / "machine.yaml")
     shutil.copytree("designs/park/machines/measured", folder / "measured")
-    figures = {"rank_deficiency": 0.0, "as_expected": 1.0, "U6_maximum_m": 2e-6, "U6_average_m": 1e-6}
+    figures = {
+        "rank_deficiency": 0.0,
+        "as_expected": 1.0,
+        "U6_maximum_m": 2e-6,
+        "U6_average_m": 1e-6,
+    }
     rows = [done(k, figures) for k in range(2)]
-    made_up(folder / "store.sqlite", "made up", [axis("size", ["1 mm", "2 mm"], [1e-3, 2e-3], "m")], rows).close()
+    made_up(
+        folder / "store.sqlite",
+        "made up",
+        [axis("size", ["1 mm", "2 mm"], [1e-3, 2e-3], "m")],
+        rows,
+    ).close()
     readings, certificate = folder / "readings.csv", folder / "certificate.csv"
-    arguments = ["simulate", str(folder / "design.yaml"), "-o", str(readings), "--certificate", str(certificate)]
+    arguments = [
+        "simulate",
+        str(folder / "design.yaml"),
+        "-o",
+        str(readings),
+        "--certificate",
+        str(certificate),
+    ]
     assert main(arguments) == 0
     return folder
 
@@ -164,8 +194,12 @@ def planned_once(monkeypatch: pytest.MonkeyPatch, shelf: Path) -> None:
 FOUND: list[Any] = []
 
 
-def line(command: str, files: Path, written: dict[str, Path], *more: str, reads: tuple[str, ...] = ()) -> list[str]:
-    """The command line that reads the files and writes these; `reads` are further files to be read."""
+def line(
+    command: str, files: Path, written: dict[str, Path], *more: str, reads: tuple[str, ...] = ()
+) -> list[str]:
+    """The command line that reads the files and writes these; `reads` are further files to be
+    read.
+    """
     walk = WALK[command]
     words = [command]
     for option, name in walk.reads.items():
@@ -188,7 +222,9 @@ def content(folder: Path) -> dict[str, bytes | None]:
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
-    (found,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (found,) = (
+        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
     return dict(found.choices)
 
 
@@ -208,7 +244,9 @@ def test_every_option_that_names_a_file_is_walked_through() -> None:
         assert bool(written) == any("--force" in one.option_strings for one in actions), command
 
 
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str], status: int, *told: str) -> None:
+def refused(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], status: int, *told: str
+) -> None:
     """A command ends with the status, one line, nothing printed, and no file touched."""
     capsys.readouterr()
     assert main(arguments) == status
@@ -224,16 +262,27 @@ class TestToldBeforeTheWork:
     """The command must not begin."""
 
     def test_folder(
-        self, command: str, option: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+        self,
+        command: str,
+        option: str,
+        files: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
     ) -> None:
         name = WALK[command].writes[option]
         (tmp_path / name).mkdir()
         before = content(tmp_path)
         for path, told in (
-            (tmp_path / "none" / name, "cannot be written (No such file or directory); check the folder"),
+            (
+                tmp_path / "none" / name,
+                "cannot be written (No such file or directory); check the folder",
+            ),
             (files / "balls.csv" / name, "cannot be written (Not a directory); check the folder"),
             (tmp_path / name, "is a folder; name a file in it"),
-            (tmp_path / (300 * "n" + name), "cannot be written (File name too long); name it shorter"),
+            (
+                tmp_path / (300 * "n" + name),
+                "cannot be written (File name too long); name it shorter",
+            ),
         ):
             refused(line(command, files, {option: path}, "--force"), capsys, 3, f"{path}: {told}")
         assert content(tmp_path) == before
@@ -252,7 +301,9 @@ class TestToldBeforeTheWork:
         before, opened = content(tmp_path), os.open
         for number in (errno.EROFS, errno.EACCES, errno.ENOSPC, errno.EDQUOT):
 
-            def refuse(name: Any, flags: int, *arguments: Any, number: int = number, **others: Any) -> int:
+            def refuse(
+                name: Any, flags: int, *arguments: Any, number: int = number, **others: Any
+            ) -> int:
                 if flags & os.O_CREAT and Path(name).parent == tmp_path:
                     raise OSError(number, os.strerror(number), name)
                 return opened(name, flags, *arguments, **others)
@@ -281,11 +332,21 @@ class TestToldBeforeTheWork:
             return opened(self, mode, *arguments, **others)
 
         monkeypatch.setattr(Path, "open", refuse)
-        refused(line(command, files, {option: path}, "--force"), capsys, 3, "if another program has it open, close it")
+        refused(
+            line(command, files, {option: path}, "--force"),
+            capsys,
+            3,
+            "if another program has it open, close it",
+        )
         assert path.read_bytes() == b"old"
 
     def test_existing_file(
-        self, command: str, option: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+        self,
+        command: str,
+        option: str,
+        files: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
     ) -> None:
         path = tmp_path / WALK[command].writes[option]
         path.write_text("old")
@@ -332,15 +393,29 @@ class TestToldBeforeTheWork:
             make_link(files / name, path)
             for force in ((), ("--force",)):
                 arguments = line(command, files, {option: path}, *force, reads=LEFT_OUT)
-                refused(arguments, capsys, 2, f"ballplate {command}: {option} {path} would overwrite ", "which is read")
+                refused(
+                    arguments,
+                    capsys,
+                    2,
+                    f"ballplate {command}: {option} {path} would overwrite ",
+                    "which is read",
+                )
             path.unlink()
         assert content(files) == before
 
     def test_other_output(
-        self, command: str, option: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+        self,
+        command: str,
+        option: str,
+        files: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
     ) -> None:
         for other in WALK[command].writes:
-            paths = {one: tmp_path / f"{k}{WALK[command].writes[one]}" for k, one in enumerate((option, other))}
+            paths = {
+                one: tmp_path / f"{k}{WALK[command].writes[one]}"
+                for k, one in enumerate((option, other))
+            }
             if other == option:
                 continue
             # Names that are different lead to the same place, where there is nothing yet.
@@ -351,16 +426,28 @@ class TestToldBeforeTheWork:
                 path.unlink()
 
     def test_screen(
-        self, command: str, option: str, files: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+        self,
+        command: str,
+        option: str,
+        files: Path,
+        capsys: pytest.CaptureFixture[str],
+        tmp_path: Path,
     ) -> None:
         (action,) = (one for one in commands()[command]._actions if label(one) == option)
         assert isinstance(action, OutputAction)
         arguments = line(command, files, {option: Path("-")})
         if action.takes_screen:
             with pytest.raises(AssertionError, match="has begun"):
-                main([*arguments, *(["-o", str(tmp_path / "r.csv")] if option == "--certificate" else [])])
+                main(
+                    [
+                        *arguments,
+                        *(["-o", str(tmp_path / "r.csv")] if option == "--certificate" else []),
+                    ]
+                )
         elif action.type is Path:
-            refused(arguments, capsys, 2, "would be standard output, which has the rest; name a file")
+            refused(
+                arguments, capsys, 2, "would be standard output, which has the rest; name a file"
+            )
         else:
             with pytest.raises(SystemExit) as left:
                 main(arguments)
@@ -368,28 +455,48 @@ class TestToldBeforeTheWork:
 
 
 @pytest.mark.usefixtures("idle")
-def test_readings_are_not_written_over_the_experiment(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_readings_are_not_written_over_the_experiment(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     design = files / "design.yaml"
-    refused(["simulate", str(design), "-o", str(design), "--force"], capsys, 2, "would overwrite", "which is read")
+    refused(
+        ["simulate", str(design), "-o", str(design), "--force"],
+        capsys,
+        2,
+        "would overwrite",
+        "which is read",
+    )
     assert design.read_text(encoding="utf-8") == DESIGN
 
 
 @pytest.mark.usefixtures("idle")
-def test_a_module_that_the_experiment_runs_is_an_input(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_module_that_the_experiment_runs_is_an_input(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     own = DESIGN.replace("{kind: metric}", '{kind: python, object: "my_model:build"}')
     (files / "own.yaml").write_text(own, encoding="utf-8")
     for name, text in (("my_model.py", "import my_other\n"), ("my_other.py", "")):
         (files / name).write_text(text, encoding="utf-8")
     for name in ("my_model.py", "my_other.py"):
         arguments = ["simulate", str(files / "own.yaml"), "-o", str(files / name), "--force"]
-        refused(arguments, capsys, 2, f"-o {files / name} would overwrite {files / name}, which is read")
+        refused(
+            arguments, capsys, 2, f"-o {files / name} would overwrite {files / name}, which is read"
+        )
 
 
 @pytest.mark.usefixtures("idle")
 def test_the_log_of_a_store_is_an_input(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = files / "store.sqlite-wal"
     log.write_bytes(b"rows that are not in the store yet")
-    arguments = ["report", str(files / "store.sqlite"), "--format", "text", "-o", str(log), "--force"]
+    arguments = [
+        "report",
+        str(files / "store.sqlite"),
+        "--format",
+        "text",
+        "-o",
+        str(log),
+        "--force",
+    ]
     refused(arguments, capsys, 2, f"-o {log} would overwrite {log}, which is read")
 
 
@@ -416,12 +523,16 @@ def test_capitals_make_no_other_file_where_the_disk_takes_none_for_different(
 
 
 @pytest.mark.usefixtures("idle")
-def test_every_reason_is_told_at_once(files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_reason_is_told_at_once(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "l.csv").write_text("old")
     paths = {"--csv": tmp_path / "l.csv", "--pairs": tmp_path / "none" / "p.csv"}
     assert main(line("lengths", files, paths)) == 3
     first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith(f"{paths['--csv']}: exists already") and second.startswith(f"{paths['--pairs']}: cannot be")
+    assert first.startswith(f"{paths['--csv']}: exists already") and second.startswith(
+        f"{paths['--pairs']}: cannot be"
+    )
 
 
 def test_a_page_without_its_extra_is_told_before_the_store_is_read(
@@ -433,7 +544,10 @@ def test_a_page_without_its_extra_is_told_before_the_store_is_read(
     for name in ("jinja2", "matplotlib"):
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, name, None)
-            told = "a page needs jinja2 and matplotlib; install them with: python -m pip install 'ballplate[report]'"
+            told = (
+                "a page needs jinja2 and matplotlib; install them with: python -m pip install"
+                " 'ballplate[report]'"
+            )
             refused(["report", str(files / "store.sqlite")], capsys, 3, told)
 
 
@@ -441,7 +555,9 @@ def test_a_file_to_which_standard_output_goes(files: Path, tmp_path: Path) -> No
     path = tmp_path / "l.csv"
     arguments = line("lengths", files, {"--csv": path}, "--force")
     with path.open("w") as stream:
-        found = subprocess.run([sys.executable, "-m", "ballplate", *arguments], stdout=stream, stderr=subprocess.PIPE)
+        found = subprocess.run(
+            [sys.executable, "-m", "ballplate", *arguments], stdout=stream, stderr=subprocess.PIPE
+        )
     told = f"ballplate lengths: --csv {path} is where standard output goes; name another file\n"
     assert (found.returncode, found.stderr.decode()) == (2, told)
 
@@ -468,7 +584,9 @@ def small_disk() -> Iterator[Callable[[int], None]]:
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def fault(kind: str, count: int, monkeypatch: pytest.MonkeyPatch, small_disk: Callable[[int], None]) -> int:
+def fault(
+    kind: str, count: int, monkeypatch: pytest.MonkeyPatch, small_disk: Callable[[int], None]
+) -> int:
     """Let the writing of so many files fail; the status that the command is to have."""
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     if kind == "limit of size":
@@ -518,7 +636,11 @@ def test_what_was_there_is_whole_when_writing_fails(
             assert any(told[0].startswith(f"{path}: ") for path in written.values())
             # What was computed is told nevertheless.
             assert bool(out) == walk.prints
-        claims = [one for one in err.splitlines() if one.endswith(" written") and "no file was written" not in one]
+        claims = [
+            one
+            for one in err.splitlines()
+            if one.endswith(" written") and "no file was written" not in one
+        ]
         assert "written to" not in err and not claims
     # And the same command succeeds where nothing fails.
     assert main(line(command, files, written, "--force")) in (0, 1)
@@ -528,13 +650,18 @@ def test_what_was_there_is_whole_when_writing_fails(
 
 @pytest.mark.usefixtures("planned_once")
 @pytest.mark.parametrize("command", [command for command, walk in WALK.items() if walk.writes])
-def test_a_full_device_is_told(command: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_full_device_is_told(
+    command: str, files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     option, name = next(iter(WALK[command].writes.items()))
     path = tmp_path / name
     path.symlink_to("/dev/full")
     # It is no file in whose place another could be put, and needs no --force.
     assert main(line(command, files, {option: path})) == 3
-    told = f"{path}: cannot be written (No space left on device); make room, or name a file on another disk"
+    told = (
+        f"{path}: cannot be written (No space left on device); make room, or name a file on another"
+        " disk"
+    )
     assert told in capsys.readouterr().err.splitlines()
     assert path.is_symlink() and stat.S_ISCHR(Path("/dev/full").stat().st_mode)
 
@@ -568,7 +695,9 @@ def test_a_reader_that_leaves_changes_nothing(
         written = {option: folder / one for option, one in WALK[command].writes.items()}
         with nullcontext() if to == "us" else printing(to):
             status = main(line(command, files, written))
-        found.append((status, set(content(folder)), capsys.readouterr().err.replace(str(folder), "")))
+        found.append(
+            (status, set(content(folder)), capsys.readouterr().err.replace(str(folder), ""))
+        )
     (status, names, err), left, (status_full, names_full, err_full) = found
     assert status in (0, 1)
     assert left == (status, names, err) and len(names) == len(WALK[command].writes)
@@ -581,11 +710,20 @@ def test_a_verdict_reaches_the_shell_through_head(files: Path) -> None:
     bad = files / "bad.yaml"
     bad.write_text(f"{DESIGN}expected_rank_deficiency: 1\n", encoding="utf-8")
     command = f'"{sys.executable}" -m ballplate check "{bad}" "{files / "design.yaml"}"'
-    for tail, expected in (("| true", "1"), ("| head -1 >/dev/null", "1"), (">&-", "3"), (">/dev/null", "1")):
+    for tail, expected in (
+        ("| true", "1"),
+        ("| head -1 >/dev/null", "1"),
+        (">&-", "3"),
+        (">/dev/null", "1"),
+    ):
         script = f"{command} {tail}; echo ${{PIPESTATUS[0]}}"
         found = subprocess.run(["bash", "-c", script], capture_output=True, text=True)
         assert found.stdout.split() == [expected], tail
-        told = "standard output: cannot be written (Bad file descriptor); give it room\n" if expected == "3" else ""
+        told = (
+            "standard output: cannot be written (Bad file descriptor); give it room\n"
+            if expected == "3"
+            else ""
+        )
         assert found.stderr == told
 
 
@@ -668,7 +806,11 @@ def test_an_open_file_is_an_input_too(files: Path, capsys: pytest.CaptureFixture
 
 @pytest.mark.parametrize("start", ["/proc/self/cwd", "/proc/self/root"])
 def test_files_reached_through_a_process_are_files(
-    start: str, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    start: str,
+    files: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     path = tmp_path / "readings.csv"
     path.write_text("mine")
@@ -681,11 +823,16 @@ def test_files_reached_through_a_process_are_files(
 
 @pytest.mark.parametrize("has_links", [True, False])
 def test_a_file_that_has_come_meanwhile_stays(
-    has_links: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    has_links: bool,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if not has_links:
         # As on disks of cameras and some servers.
-        monkeypatch.setattr(os, "link", FaultyCall(os.link, 1, PermissionError(errno.EPERM, "not permitted")))
+        monkeypatch.setattr(
+            os, "link", FaultyCall(os.link, 1, PermissionError(errno.EPERM, "not permitted"))
+        )
     path = tmp_path / "plan.yaml"
 
     def write(temporary: Path) -> None:
@@ -698,7 +845,9 @@ def test_a_file_that_has_come_meanwhile_stays(
 
 
 def test_disks_without_hard_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "link", FaultyCall(os.link, 1, PermissionError(errno.EPERM, "not permitted")))
+    monkeypatch.setattr(
+        os, "link", FaultyCall(os.link, 1, PermissionError(errno.EPERM, "not permitted"))
+    )
     assert write_outputs({tmp_path / "a.csv": written_text("a")}, force=False)
     assert content(tmp_path) == {"a.csv": b"a"}
 
@@ -716,7 +865,9 @@ def test_new_files_come_together_or_not_at_all(
     assert content(tmp_path) == {}
 
 
-def test_an_extra_that_cannot_be_loaded_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_extra_that_cannot_be_loaded_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     def broken(path: Path) -> None:
         raise ImportError("a library of another version", name="matplotlib._path")
 

@@ -73,13 +73,18 @@ def test_the_table_of_a_fit_shows_machine_and_rotations_whatever_they_are_called
     end = next(i for i, line in enumerate(lines) if line.startswith("(origins of positions"))
     shown = [line[:40].split("  ")[0] for line in lines[start + 1 : end]]
     scales = ["scale: x", "a: origin y", "z: origin high: rotation x"]
-    turns = [f"{name}: rotation {axis}" for name in ("a", "z: origin high", "end: x") for axis in "xyz"]
+    turns = [
+        f"{name}: rotation {axis}" for name in ("a", "z: origin high", "end: x") for axis in "xyz"
+    ]
     assert shown == scales + turns
     # Every parameter is in --json, those of the same name by their kinds.
     assert len(found.estimates) == 3 + 18 + 9
     assert main(["fit", str(path), str(readings), "--json"]) == 0
     estimates = json.loads(capsys.readouterr().out)["estimates"]
     assert len(estimates) == len(found.estimates)
-    twice = {"a: origin y": ("machine", "origin"), "z: origin high: rotation x": ("machine", "rotation")}
+    twice = {
+        "a: origin y": ("machine", "origin"),
+        "z: origin high: rotation x": ("machine", "rotation"),
+    }
     for name, kinds in twice.items():
         assert name not in estimates and {f"{kind}: {name}" for kind in kinds} <= estimates.keys()

@@ -24,17 +24,34 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
     out = capsys.readouterr().out
     assert "754 observations; redundancy 580.0 in all" in out
     assert "estimated from the other residuals: 4.152 standard deviations" in out
-    assert "cannot be detected, harmless: offset x of probe down, offset y of probe down, offset z of probe down" in out
+    assert (
+        "cannot be detected, harmless: offset x of probe down, offset y of probe down, offset z of"
+        " probe down" in out
+    )
     assert "DANGEROUS" not in out and "scale of the certificate of plate" in out
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 754
     assert sum(float(row["redundancy"]) for row in rows) == pytest.approx(580.0)
-    worst = max((row for row in rows if row["kind"] == "reading"), key=lambda row: float(row["minimal_detectable"]))
+    worst = max(
+        (row for row in rows if row["kind"] == "reading"),
+        key=lambda row: float(row["minimal_detectable"]),
+    )
     assert (worst["position"], worst["ball"], worst["axis"]) == ("z high", "r1c1", "x")
 
 
 def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--variant", "length known", "--json"]) == 0
+    assert (
+        main(
+            [
+                "reliability",
+                "designs/hurt_foss/bar-bell.yaml",
+                "--variant",
+                "length known",
+                "--json",
+            ]
+        )
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)
     by_name = {event["name"]: event for event in found["events"]}
     certificate = by_name["certified length 1-2 of bar"]
@@ -47,8 +64,12 @@ def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture
 
 def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%", "--json"]
-    assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--variant", "flat", *options]) == 0
-    assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(1.959964 + 1.281552, abs=1e-4)
+    assert (
+        main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--variant", "flat", *options]) == 0
+    )
+    assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(
+        1.959964 + 1.281552, abs=1e-4
+    )
 
 
 @pytest.mark.parametrize(
@@ -67,7 +88,10 @@ def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixtu
 
 
 def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--csv", str(tmp_path / "t.csv")]) == 2
+    assert (
+        main(["reliability", "designs/hurt_foss/bar-bell.yaml", "--csv", str(tmp_path / "t.csv")])
+        == 2
+    )
     assert "choose one with --variant: length known, " in capsys.readouterr().err
     own = tmp_path / "own.yaml"
     own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
@@ -166,33 +190,71 @@ def waves(rows: Rows) -> None:
         (nothing, [], []),
         (
             one_reading,
-            ["ball r3c5 in position z high with down read .* too high in y .* leave out line 41 of r.csv"],
+            [
+                "ball r3c5 in position z high with down read .* too high in y .* leave out line 41"
+                " of r.csv"
+            ],
             [3e-6],
         ),
         (
             three_readings,
-            ["too high in z .* line 7 of", "too low in x .* line 100 of", "too high in y .* line 202 of"],
+            [
+                "too high in z .* line 7 of",
+                "too low in x .* line 100 of",
+                "too high in y .* line 202 of",
+            ],
             [2e-6, 2e-6, 2.5e-6],
         ),
         (
             slip,
-            ["plate slipped in position z high, by 1.* along y, between lines 3[678] and (39|40) of r.csv"],
+            [
+                "plate slipped in position z high, by 1.* along y, between lines 3[678] and (39|40)"
+                " of r.csv"
+            ],
             [1.2e-6],
         ),
         (
             probe,
-            ["offset z of probe (left|right) stated [12].* too .*; it cannot be told from offset z of probe "],
+            [
+                "offset z of probe (left|right) stated [12].* too .*; it cannot be told from offset"
+                " z of probe "
+            ],
             [2e-6],
         ),
-        (dirt, ["ball r3c2 in position x low read 1.* too high in y each time .* lines 63 and 88 of r.csv"], [1.5e-6]),
+        (
+            dirt,
+            [
+                "ball r3c2 in position x low read 1.* too high in y each time .* lines 63 and 88 of"
+                " r.csv"
+            ],
+            [1.5e-6],
+        ),
         (
             warm_twice,
-            [r"plate [12]\.\d.* ppm larger in position x high and [12]\.\d.* ppm larger in position y low .*"],
+            [
+                r"plate [12]\.\d.* ppm larger in position x high and [12]\.\d.* ppm larger in"
+                r" position y low .*"
+            ],
             [2e-6],
         ),
-        (loose_ball, ["ball r2c4 displaced on its plate from position y low on, by -?1.* along z"], [1.5e-6]),
-        (late_slip, ["plate slipped in position x low, by -0.* along z, between lines 8[0-5] and 8[5-9]"], [0.8e-6]),
-        (warm, [r"plate [23]\.\d+\(0.\d+\) ppm larger in position z low .* check the temperature there"], [3e-6]),
+        (
+            loose_ball,
+            ["ball r2c4 displaced on its plate from position y low on, by -?1.* along z"],
+            [1.5e-6],
+        ),
+        (
+            late_slip,
+            ["plate slipped in position x low, by -0.* along z, between lines 8[0-5] and 8[5-9]"],
+            [0.8e-6],
+        ),
+        (
+            warm,
+            [
+                r"plate [23]\.\d+\(0.\d+\) ppm larger in position z low .* check the temperature"
+                r" there"
+            ],
+            [3e-6],
+        ),
     ],
 )
 def test_what_a_fit_suspects(
@@ -219,7 +281,9 @@ def test_a_restless_position_is_no_set_of_single_readings(
 ) -> None:
     for sigma in ("given", "estimated"):
         (one,) = suspected(restless, sigma, clean, tmp_path, capsys)
-        assert one["kind"] == "scatter" and one["name"] == "scatter of the readings in position x high"
+        assert (
+            one["kind"] == "scatter" and one["name"] == "scatter of the readings in position x high"
+        )
         # With 150 readings the ratio is known to about a twelfth.
         assert one["value"] == pytest.approx(3.0, abs=0.8)
 
@@ -229,12 +293,19 @@ def test_a_wave_in_a_scale_is_laid_to_the_model(
 ) -> None:
     for sigma in ("given", "estimated"):
         (one,) = suspected(waves, sigma, clean, tmp_path, capsys)
-        assert one["kind"] == "model" and "what explains most is an error in x that depends on x" in one["words"]
+        assert (
+            one["kind"] == "model"
+            and "what explains most is an error in x that depends on x" in one["words"]
+        )
         assert one["value"] > 1.5 and one["lines"] == []
 
 
 def suspected(
-    spoil: Callable[[Rows], None], sigma: str, clean: Rows, folder: Path, capsys: pytest.CaptureFixture[str]
+    spoil: Callable[[Rows], None],
+    sigma: str,
+    clean: Rows,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> list[dict[str, Any]]:
     rows = [dict(row) for row in clean]
     spoil(rows)

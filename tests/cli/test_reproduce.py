@@ -14,7 +14,17 @@ NPL = ["reproduce", "npl"]
 
 def test_section_6_quick(capsys: pytest.CaptureFixture[str]) -> None:
     wanted = [name for name in npl().statements.sections if name.startswith("6")]
-    assert main([*NPL, "--quick", "--json", *(word for name in wanted for word in ("--experiment", name))]) == 0
+    assert (
+        main(
+            [
+                *NPL,
+                "--quick",
+                "--json",
+                *(word for name in wanted for word in ("--experiment", name)),
+            ]
+        )
+        == 0
+    )
     out, err = capsys.readouterr()
     found = json.loads(out)
     assert err == "" and found["agrees"] and found["document"] == "NPL Report CISE 15/98"
@@ -24,15 +34,27 @@ def test_section_6_quick(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(figures) == sum(len(column.figures) for column in npl().columns)
     for figure in figures:
         assert figure["ratio"] == pytest.approx(figure["published"] / figure["ours"])
-        assert figure["agrees"] and figure["within"][0] <= figure["ratio_after_factor"] <= figure["within"][1]
-        assert set(figure["rests_on"]) <= set(found["assumptions"]) and {"a", "b", "c"} <= set(figure["rests_on"])
+        assert (
+            figure["agrees"]
+            and figure["within"][0] <= figure["ratio_after_factor"] <= figure["within"][1]
+        )
+        assert set(figure["rests_on"]) <= set(found["assumptions"]) and {"a", "b", "c"} <= set(
+            figure["rests_on"]
+        )
         assert figure["exception"] is None or found["exceptions"][figure["exception"]]["reason"]
-    ranks = {rank["design"]: (rank["published"], rank["ours"]) for one in sections.values() for rank in one["ranks"]}
+    ranks = {
+        rank["design"]: (rank["published"], rank["ours"])
+        for one in sections.values()
+        for rank in one["ranks"]
+    }
     assert ranks["6.1.1[B]"] == (2, 2) and ranks["6.2.1[n=4 NDEL=7]"] == ("some", 6)
     erratum = sections["6.2.2"]["errata"][0]
     assert erratum["confirmed"] and len(erratum["columns"]) == 6
     for one in erratum["columns"]:
-        assert one["deviation_as_meant"] < 0.02 and one["deviation_as_headed"] > 4 * one["deviation_as_meant"]
+        assert (
+            one["deviation_as_meant"] < 0.02
+            and one["deviation_as_headed"] > 4 * one["deviation_as_meant"]
+        )
     # What nobody has explained is told as that.
     assert [key for key, one in found["exceptions"].items() if one["open"]] == ["2", "3"]
     assert len(sections["6.2.3"]["computed_only"]) == 12 and sections["6.2.7"]["left_out"]
@@ -45,7 +67,9 @@ def test_text_of_one_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Erratum in Table 11" in out and "Open differences" not in out
     tables = [line for line in out.splitlines() if "  " in line]
     assert max(map(len, tables)) <= 80
-    assert any(line.split()[:6] == ["11", "U3", "average", "n=7", "NDEL=7", "30.557"] for line in tables)
+    assert any(
+        line.split()[:6] == ["11", "U3", "average", "n=7", "NDEL=7", "30.557"] for line in tables
+    )
 
 
 def test_markdown(capsys: pytest.CaptureFixture[str]) -> None:

@@ -39,32 +39,49 @@ def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
     assert "offset x" not in out and "fit without --no-offsets" in err
 
 
-def test_data_are_those_of_the_full_fit_beside_the_reversal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_data_are_those_of_the_full_fit_beside_the_reversal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     found = data(capsys, "fit", *DUMMY, *REVERSAL)
     full = data(capsys, "fit", *DUMMY)
     relation = found["multiple_redundancy"].pop("relation")
     assert found["multiple_redundancy"] == full
     for name in ("alpha", "gamma"):
         assert relation[name] == full["estimates"][name]
-    assert relation["beta"]["value"] == pytest.approx(full["estimates"]["first: rotation z"]["value"], abs=1e-12)
+    assert relation["beta"]["value"] == pytest.approx(
+        full["estimates"]["first: rotation z"]["value"], abs=1e-12
+    )
     uncertainty = full["estimates"]["first: rotation z"]["standard_uncertainty"]
     assert relation["beta"]["standard_uncertainty"] == pytest.approx(uncertainty)
     # The other position is held where it is, and the scales near enough one.
-    assert relation["offset x"]["value"] == pytest.approx(full["estimates"]["first: origin x"]["value"], abs=1e-9)
+    assert relation["offset x"]["value"] == pytest.approx(
+        full["estimates"]["first: origin x"]["value"], abs=1e-9
+    )
     uncertainty = full["estimates"]["first: origin x"]["standard_uncertainty"]
     assert relation["offset x"]["standard_uncertainty"] == pytest.approx(uncertainty, rel=1e-4)
     assert found["axes"] == full["plates"]["plate"]["axes"] == {"origin": "1", "x": "2"}
     for ball, place in full["plates"]["plate"]["balls"].items():
         for axis in "xy":
-            assert found["balls"][ball][axis]["value"] == pytest.approx(place[axis]["value"], abs=3e-9)
+            assert found["balls"][ball][axis]["value"] == pytest.approx(
+                place[axis]["value"], abs=3e-9
+            )
     assert found["positions"] == {"first": "first", "second": "turned"}
-    assert len(found["residuals"]) == 9 and found["sigma"] == pytest.approx(0.534e-6 * 0.0254, rel=1e-3)
+    assert len(found["residuals"]) == 9 and found["sigma"] == pytest.approx(
+        0.534e-6 * 0.0254, rel=1e-3
+    )
 
 
 def test_either_sense_and_either_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Counter-clockwise, the position listed second comes first; parameters are told for the same relation."""
-    text = Path(ANGLES).read_text().partition("expected_rank_deficiency")[0].partition("positions:")[0]
-    poses = {"a": "{origin: [250 mm, 250 mm], rotation: 0 deg}", "b": "{origin: [650 mm, 250 mm], rotation: 90 deg}"}
+    """Counter-clockwise, the position listed second comes first; parameters are told for the same
+    relation.
+    """
+    text = (
+        Path(ANGLES).read_text().partition("expected_rank_deficiency")[0].partition("positions:")[0]
+    )
+    poses = {
+        "a": "{origin: [250 mm, 250 mm], rotation: 0 deg}",
+        "b": "{origin: [650 mm, 250 mm], rotation: 90 deg}",
+    }
     readings, found = tmp_path / "r.csv", {}
     for order in ("ab", "ba"):
         path = tmp_path / f"{order}.yaml"
@@ -78,7 +95,9 @@ def test_either_sense_and_either_order(tmp_path: Path, capsys: pytest.CaptureFix
     for name, estimate in one["multiple_redundancy"]["relation"].items():
         beside = other["multiple_redundancy"]["relation"][name]
         assert estimate["value"] == pytest.approx(beside["value"], abs=1e-12)
-        assert estimate["standard_uncertainty"] == pytest.approx(beside["standard_uncertainty"], rel=1e-4)
+        assert estimate["standard_uncertainty"] == pytest.approx(
+            beside["standard_uncertainty"], rel=1e-4
+        )
         assert one["estimates"][name]["value"] == other["estimates"][name]["value"]
         # Beyond what noise explains the reversal and the full estimate are the same, too.
         assert one["estimates"][name]["value"] == pytest.approx(estimate["value"], abs=2e-9)
@@ -89,12 +108,15 @@ def test_either_sense_and_either_order(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize(
-    ("angle", "words", "status"), [("90.03", "108 arcsec", 0), ("90.2", "720 arcsec", 1), ("80", "10 degrees", 1)]
+    ("angle", "words", "status"),
+    [("90.03", "108 arcsec", 0), ("90.2", "720 arcsec", 1), ("80", "10 degrees", 1)],
 )
 def test_too_far_from_a_quarter_turn(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], angle: str, words: str, status: int
 ) -> None:
-    """What is neglected is told as it is: the difference from multiple redundancy, which neglects nothing."""
+    """What is neglected is told as it is: the difference from multiple redundancy, which neglects
+    nothing.
+    """
     path, readings = tmp_path / "far.yaml", str(tmp_path / "r.csv")
     path.write_text(Path(ANGLES).read_text().replace("rotation: 90 deg", f"rotation: {angle} deg"))
     chosen = ["--variant", "quarter turn"]
@@ -105,13 +127,18 @@ def test_too_far_from_a_quarter_turn(
     found = json.loads(out)
     full = found["multiple_redundancy"]
     balls = full["plates"]["plate"]["balls"]
-    off = [found["balls"][ball][axis]["value"] - balls[ball][axis]["value"] for ball in balls for axis in "xy"]
+    off = [
+        found["balls"][ball][axis]["value"] - balls[ball][axis]["value"]
+        for ball in balls
+        for axis in "xy"
+    ]
     assert found["neglected_coordinates"] == pytest.approx(np.abs(off).max(), rel=0.01)
     size = 1e6 * found["neglected_coordinates"]
     unit = f"{size / 1e3:.2g} mm" if size > 1e3 else f"{size:.2g} um"
     assert f"changes co-ordinates of balls by up to {unit}" in err.replace("0.020 um", "0.02 um")
     shift = max(
-        abs(found["estimates"][name]["value"] - full["relation"][name]["value"]) for name in ("offset x", "offset y")
+        abs(found["estimates"][name]["value"] - full["relation"][name]["value"])
+        for name in ("offset x", "offset y")
     )
     assert found["neglected_offset"] == pytest.approx(shift, rel=0.01)
     # No result is off by more standard uncertainties than told.
@@ -140,8 +167,12 @@ def test_readings_without_noise(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 def test_positions_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
     """The readings shipped give their true machine and plate back, within their uncertainties."""
-    found = data(capsys, "fit", ANGLES, str(FOLDER / "angles-readings.csv"), "--variant", "any angles")
-    assert found["status"] == "converged" and found["rank_deficiency"] == 0 and not found["too_large"]
+    found = data(
+        capsys, "fit", ANGLES, str(FOLDER / "angles-readings.csv"), "--variant", "any angles"
+    )
+    assert (
+        found["status"] == "converged" and found["rank_deficiency"] == 0 and not found["too_large"]
+    )
     for name, true in (("alpha", 12e-6), ("gamma", 8e-6)):
         estimate = found["estimates"][name]
         assert estimate["standard_uncertainty"] < 3e-7
@@ -160,10 +191,14 @@ def test_positions_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_rank_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
-    """Squareness and scale difference show by the sine of the angle, and half a turn shows neither."""
+    """Squareness and scale difference show by the sine of the angle, and half a turn shows
+    neither.
+    """
     judged = json.loads(told(capsys, "run", ANGLES, "--json")[0])
     found = {one["experiment"]: one for one in judged}
-    deficiency = {name.partition("[")[2][:-1]: one["rank_deficiency"] for name, one in found.items()}
+    deficiency = {
+        name.partition("[")[2][:-1]: one["rank_deficiency"] for name, one in found.items()
+    }
     assert deficiency == {
         "any angles": 0,
         "three positions": 0,
@@ -179,27 +214,48 @@ def test_rank_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
         assert "gamma (difference of the scales of x and y)" in words
         assert found[f"angles[{name}]"]["quantities"]["U3"]["undetermined"] == 2
     quarter, small = (
-        found[f"angles[{name}]"]["quantities"]["U3 angles"]["maximum"] for name in ("quarter turn", "small turn")
+        found[f"angles[{name}]"]["quantities"]["U3 angles"]["maximum"]
+        for name in ("quarter turn", "small turn")
     )
     assert small * np.sin(np.radians(5)) == pytest.approx(quarter, rel=1e-6)
 
 
 def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Everything that is not as it should be is named at once, at its place, with nothing on standard output."""
+    """Everything that is not as it should be is named at once, at its place, with nothing on
+    standard output.
+    """
     path, readings = tmp_path / "e.yaml", tmp_path / "r.csv"
     told(capsys, "simulate", ANGLES, "-o", str(readings), "--variant", "quarter turn")
     lines = readings.read_text().splitlines()
-    readings.write_text("\n".join(line for line in lines if ",r2c2," not in line or "straight" in line) + "\n")
-    out, err = told(capsys, "fit", ANGLES, str(readings), "--variant", "quarter turn", *REVERSAL, status=3)
+    readings.write_text(
+        "\n".join(line for line in lines if ",r2c2," not in line or "straight" in line) + "\n"
+    )
+    out, err = told(
+        capsys, "fit", ANGLES, str(readings), "--variant", "quarter turn", *REVERSAL, status=3
+    )
     assert out == ""
     assert (
-        f'{readings}: the reversal needs every ball in both positions; in "turned by 90" the readings lack "r2c2"; '
-        in err
+        f'{readings}: the reversal needs every ball in both positions; in "turned by 90" the'
+        ' readings lack "r2c2"; ' in err
     )
-    out, err = told(capsys, "simulate", ANGLES, "-o", str(tmp_path / "h.csv"), "--variant", "half a turn")
-    out, err = told(capsys, "fit", ANGLES, str(tmp_path / "h.csv"), "--variant", "half a turn", *REVERSAL, status=3)
+    out, err = told(
+        capsys, "simulate", ANGLES, "-o", str(tmp_path / "h.csv"), "--variant", "half a turn"
+    )
+    out, err = told(
+        capsys,
+        "fit",
+        ANGLES,
+        str(tmp_path / "h.csv"),
+        "--variant",
+        "half a turn",
+        *REVERSAL,
+        status=3,
+    )
     assert out == ""
-    assert 'a turn of 180 degrees lies between "straight" and "turned by 180"; turn the plate by about 90' in err
+    assert (
+        'a turn of 180 degrees lies between "straight" and "turned by 180"; turn the plate by'
+        " about 90" in err
+    )
     path.write_text(
         "title: t\n"
         "machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\n"
@@ -215,8 +271,13 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     )
     told(capsys, "simulate", str(path), "-o", str(tmp_path / "s.csv"))
     out, err = told(capsys, "fit", str(path), str(tmp_path / "s.csv"), *REVERSAL, status=3)
-    assert out == "" and [line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()] == [
-        '3:21: error_model.kind: the reversal is about a machine of kind "metric" in two dimensions',
+    assert out == "" and [
+        line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()
+    ] == [
+        (
+            '3:21: error_model.kind: the reversal is about a machine of kind "metric" in two'
+            " dimensions"
+        ),
         "5:1: artefacts: the reversal takes one artefact",
         "8:1: positions: the reversal takes two positions, a quarter turn apart",
     ]
@@ -225,31 +286,55 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 def test_several_probes_and_priors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, readings = tmp_path / "e.yaml", tmp_path / "r.csv"
     text = (
-        Path(ANGLES).read_text().replace("rotation: 37 deg", "rotation: 90 deg").replace("[400 mm, 150", "[700 mm, 150")
+        Path(ANGLES)
+        .read_text()
+        .replace("rotation: 37 deg", "rotation: 90 deg")
+        .replace("[400 mm, 150", "[700 mm, 150")
     )
     positions = "".join(
-        line.replace("}}", "}, probes: [a, b]}") + "\n" for line in text.splitlines() if "  - {name: " in line
+        line.replace("}}", "}, probes: [a, b]}") + "\n"
+        for line in text.splitlines()
+        if "  - {name: " in line
     )
-    text = text.partition("positions:")[0] + "probes: {a: [0 mm, 0 mm], b: [20 mm, 0 mm]}\npositions:\n"
+    text = (
+        text.partition("positions:")[0]
+        + "probes: {a: [0 mm, 0 mm], b: [20 mm, 0 mm]}\npositions:\n"
+    )
     path.write_text(text + "".join(f"{line}\n" for line in positions.splitlines()[:2]))
     told(capsys, "simulate", str(path), "-o", str(readings))
     _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, status=3)
-    assert f"{readings}: the reversal takes readings with one probe, not with a, b; keep those with one" in err
-    readings.write_text("".join(f"{line}\n" for line in readings.read_text().splitlines() if ",b," not in line))
+    assert (
+        f"{readings}: the reversal takes readings with one probe, not with a, b; keep those"
+        " with one" in err
+    )
+    readings.write_text(
+        "".join(f"{line}\n" for line in readings.read_text().splitlines() if ",b," not in line)
+    )
     one = data(capsys, "fit", str(path), str(readings), *REVERSAL)
     assert one["estimates"]["alpha"]["value"] == pytest.approx(12e-6, abs=2e-6)
-    path.write_text(path.read_text() + "priors: [{parameter: gamma, standard_uncertainty: 1 ppm}]\n")
+    path.write_text(
+        path.read_text() + "priors: [{parameter: gamma, standard_uncertainty: 1 ppm}]\n"
+    )
     assert data(capsys, "fit", str(path), str(readings), *REVERSAL)["scale"] == "x"
     _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, "--scale", "none", status=3)
-    assert "priors: priors are about the file's error model; write scale: none there instead of --scale" in err
+    assert (
+        "priors: priors are about the file's error model; write scale: none there instead of"
+        " --scale" in err
+    )
 
 
 def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:
     for option in (["--pairs", "all"], ["--across-probes"]):
         _, err = told(capsys, "fit", *DUMMY, *REVERSAL, *option, status=2)
-        assert f"{option[0]} goes with --estimator distances, cresto or kruth only; leave it out" in err
+        assert (
+            f"{option[0]} goes with --estimator distances, cresto or kruth only; leave it out"
+            in err
+        )
     _, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--monomials", status=2)
-    assert "--monomials goes with --estimator full, distances, cresto or kruth only; leave it out" in err
+    assert (
+        "--monomials goes with --estimator full, distances, cresto or kruth only; leave it out"
+        in err
+    )
     for option in (["--scale", "x"], ["--no-offsets"]):
         _, err = told(capsys, "fit", *DUMMY, *option, status=2)
         assert f"{option[0]} goes with --estimator reversal only; leave it out" in err

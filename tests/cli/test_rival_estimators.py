@@ -8,7 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.estimators.distances import MOST_DERIVATIVES, ball_pairs, compare_estimators, count_terms
+from ballplate.estimators.distances import (
+    MOST_DERIVATIVES,
+    ball_pairs,
+    compare_estimators,
+    count_terms,
+)
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.rivals import RivalName
 from ballplate.simulator.experiment.load import load
@@ -29,25 +34,46 @@ def test_fit(estimator: str, capsys: pytest.CaptureFixture[str], tmp_path: Path)
     full = json.loads(capsys.readouterr().out)["estimates"]
     assert main(["fit", QUICKSTART, readings, "--json", "--estimator", estimator]) == 0
     rival = json.loads(capsys.readouterr().out)
-    assert rival["estimator"] == estimator and rival["status"] == "converged" and rival["rank_deficiency"] == 0
-    differences = [value["value"] - full[name]["value"] for name, value in rival["estimates"].items()]
+    assert (
+        rival["estimator"] == estimator
+        and rival["status"] == "converged"
+        and rival["rank_deficiency"] == 0
+    )
+    differences = [
+        value["value"] - full[name]["value"] for name, value in rival["estimates"].items()
+    ]
     assert len(differences) == 69
     sizes = [full[name]["standard_uncertainty"] for name in rival["estimates"]]
-    # Distances hardly show the roll of X and what goes with it: there a rival is some ten times less certain.
+    # Distances hardly show the roll of X and what goes with it: there a rival is some ten times
+    # less certain.
     assert 0.1 < np.sqrt(np.mean(np.square(np.array(differences) / sizes))) < 20
-    assert main(["fit", QUICKSTART, readings, "--estimator", estimator, "--monomials", "--pairs", "all"]) == 0
+    assert (
+        main(
+            ["fit", QUICKSTART, readings, "--estimator", estimator, "--monomials", "--pairs", "all"]
+        )
+        == 0
+    )
     out = capsys.readouterr().out
-    assert "300 pairs of balls" in out and "EXX t^4" in out and max(map(len, out.splitlines())) <= 180
+    assert (
+        "300 pairs of balls" in out and "EXX t^4" in out and max(map(len, out.splitlines())) <= 180
+    )
 
 
 def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*COMPARED, "--published-rms", "0.34713 um"]) == 0
     out, err = capsys.readouterr()
-    assert "62 pairs of balls" in out and "root mean square" in out and "published" in out and "0.3471" in out
+    assert (
+        "62 pairs of balls" in out
+        and "root mean square" in out
+        and "published" in out
+        and "0.3471" in out
+    )
     assert err == "" or "data sets of 6.2.7[5 x 5]" in err
     assert main([*COMPARED, "--json", "--published-maximum", "1.3355 um"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["trials"] == 4 and found["not_converged"] == [] and len(found["rms"]["values"]) == 4
+    assert (
+        found["trials"] == 4 and found["not_converged"] == [] and len(found["rms"]["values"]) == 4
+    )
     assert 0 <= found["maximum"]["share_below_published"] <= 1 and "published" not in found["rms"]
     # More data sets add to those before.
     assert main([*COMPARED[:-1], "2", "--json"]) == 0
@@ -66,7 +92,16 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
             main([*COMPARED, *arguments])
         assert caught.value.code == 2
     capsys.readouterr()
-    square = ["compare", "designs/npl/6.2.2.yaml", "--variant", "n=5 NDEL=5", "--trials", "1", "--pairs", "braced"]
+    square = [
+        "compare",
+        "designs/npl/6.2.2.yaml",
+        "--variant",
+        "n=5 NDEL=5",
+        "--trials",
+        "1",
+        "--pairs",
+        "braced",
+    ]
     assert main(square) == 3
     assert '"braced" is not defined for this artefact' in capsys.readouterr().err
 
@@ -74,11 +109,20 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
 def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    text = Path(QUICKSTART).read_text(encoding="utf-8").replace("  - {name: ", "  - {artefact: plate, name: ")
+    text = (
+        Path(QUICKSTART)
+        .read_text(encoding="utf-8")
+        .replace("  - {name: ", "  - {artefact: plate, name: ")
+    )
     bar = "  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n"
-    place = "  - {name: bar, artefact: bar, pose: {origin: [300 mm, 200 mm, 300 mm]}, probes: [down], repeats: 3}\n"
+    place = (
+        "  - {name: bar, artefact: bar, pose: {origin: [300 mm, 200 mm, 300 mm]}, probes: [down],"
+        " repeats: 3}\n"
+    )
     known = "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.1 um}\n"
-    text = text.replace("artefacts:\n", f"artefacts:\n{bar}").replace("positions:\n", f"positions:\n{place}")
+    text = text.replace("artefacts:\n", f"artefacts:\n{bar}").replace(
+        "positions:\n", f"positions:\n{place}"
+    )
     file = tmp_path / "bar.yaml"
     text = text.replace("  - kind: distances\n", "  - kind: distances\n    artefact: plate\n")
     file.write_text(text.replace("calibration:\n", f"calibration:\n{known}"), encoding="utf-8")
@@ -88,7 +132,9 @@ def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings(
 
 
 def _terms(experiment: Experiment, pair_set: Integers, estimator: str, across_probes: bool) -> int:
-    """Terms of equation (12) and of Cresto's estimator without those of certificates, pair by pair."""
+    """Terms of equation (12) and of Cresto's estimator without those of certificates, pair by
+    pair.
+    """
     count = 0
     for one, other in pair_set:
         times = 0
@@ -99,7 +145,9 @@ def _terms(experiment: Experiment, pair_set: Integers, estimator: str, across_pr
                 for of in position.readings
                 for p in group.probes
                 for q in of.probes
-                if one in group.ball_indices and other in of.ball_indices and (across_probes or p == q)
+                if one in group.ball_indices
+                and other in of.ball_indices
+                and (across_probes or p == q)
             ]
             times += len(probes)
         count += times * (times - 1) // 2 if estimator == "cresto" else times
@@ -112,7 +160,9 @@ def _terms(experiment: Experiment, pair_set: Integers, estimator: str, across_pr
 def test_more_terms_than_there_is_memory_for(
     monkeypatch: pytest.MonkeyPatch, estimator: RivalName, pair_set: str | None, across_probes: bool
 ) -> None:
-    """Refused is one term more than possible; what is counted are the terms that the estimators have."""
+    """Refused is one term more than possible; what is counted are the terms that the estimators
+    have.
+    """
     (experiment,) = load(QUICKSTART)
     design = lay_out(experiment)
     terms = _terms(experiment, ball_pairs(experiment, pair_set), estimator, across_probes)
@@ -124,9 +174,11 @@ def test_more_terms_than_there_is_memory_for(
     monkeypatch.setattr("ballplate.estimators.distances.MOST_DERIVATIVES", terms * parameters - 1)
     with pytest.raises(ExperimentError) as caught:
         compare_estimators(experiment, 1, estimator, pair_set, across_probes, points=2)
-    assert str(caught.value) == (
-        f"{QUICKSTART}: artefacts: {estimator} with these pairs of balls has {terms} terms; at most {terms - 1} are "
-        f"possible with {parameters} parameters: take fewer --pairs, such as corners, or fewer balls"
+    assert (
+        str(caught.value)
+        == f"{QUICKSTART}: artefacts: {estimator} with these pairs of balls has {terms} terms; at"
+        f" most {terms - 1} are possible with {parameters} parameters: take fewer --pairs, such"
+        " as corners, or fewer balls"
     )
 
 
@@ -134,8 +186,13 @@ def test_pairs_of_very_many_balls_are_refused_before_they_are_made(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """800 million pairs of 40,000 balls would take 13 GB alone."""
-    text = Path(QUICKSTART).read_text(encoding="utf-8").replace("balls: [5, 5]", "balls: [200, 200]")
+    text = (
+        Path(QUICKSTART).read_text(encoding="utf-8").replace("balls: [5, 5]", "balls: [200, 200]")
+    )
     (tmp_path / "large.yaml").write_text(text, encoding="utf-8")
     assert main(["compare", str(tmp_path / "large.yaml"), "--pairs", "all"]) == 3
     count = 10 * 40_000 * 39_999 // 2
-    assert f"has {count} terms; at most {MOST_DERIVATIVES // 69} are possible" in capsys.readouterr().err
+    assert (
+        f"has {count} terms; at most {MOST_DERIVATIVES // 69} are possible"
+        in capsys.readouterr().err
+    )

@@ -1,4 +1,6 @@
-"""Signals at random moments, to commands started as their user would: status, words, files, and processes left."""
+"""Signals at random moments, to commands started as their user would: status, words, files, and
+processes left.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,24 @@ import pytest
 
 from tests.sweeps.support import ROOT, command, hearing_interruptions, run, small_sweep, stored
 
-pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+pytestmark = pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="looks processes up in /proc"
+)
 
 DESIGNS = ROOT / "designs"
-PLAN = ("plan", DESIGNS / "planning/campaign.yaml", "--curve", "-o", "choice.yaml", "--sheet", "sheet.csv")
+PLAN = (
+    "plan",
+    DESIGNS / "planning/campaign.yaml",
+    "--curve",
+    "-o",
+    "choice.yaml",
+    "--sheet",
+    "sheet.csv",
+)
 TRIALS = ("run", DESIGNS / "npl/6.2.7.yaml", "--trials", "1000000")
 
-# Commands that may last over a second, with the seconds of processor time up to which they are interrupted.
+# Commands that may last over a second, with the seconds of processor time up to which they are
+# interrupted.
 ENDLESS = {
     "run by one": ((*TRIALS, "--workers", 1), 8.0),
     "run by two": ((*TRIALS, "--workers", 2), 8.0),
@@ -36,21 +49,50 @@ ENDING = {
     "report": (("report", "small.sqlite", "-o", "page.html"), 2.0),
     "export": (("export", "small.sqlite", "-o", "table.csv"), 0.8),
     "reach": (("reach", DESIGNS / "npl/5.3.yaml"), 1.5),
-    "lengths": (("lengths", DESIGNS / "quickstart.yaml", "--grid", 12, "--csv", "points.csv", "--plot", "u.svg"), 2.5),
+    "lengths": (
+        (
+            "lengths",
+            DESIGNS / "quickstart.yaml",
+            "--grid",
+            12,
+            "--csv",
+            "points.csv",
+            "--plot",
+            "u.svg",
+        ),
+        2.5,
+    ),
     "reliability": (("reliability", DESIGNS / "npl/6.2.7.yaml", "--csv", "all.csv"), 1.5),
-    "fit": (("fit", DESIGNS / "certified/three-planes.yaml", DESIGNS / "certified/three-planes.csv"), 2.0),
+    "fit": (
+        ("fit", DESIGNS / "certified/three-planes.yaml", DESIGNS / "certified/three-planes.csv"),
+        2.0,
+    ),
     "reproduce": (("reproduce", "npl", "--designs", DESIGNS / "npl"), 12.0),
     "check": (("check", "--suggest", DESIGNS / "npl/6.1.2.yaml"), 1.5),
     "map": (("map", DESIGNS / "park/machines/gec-like.yaml", "--plot", "map.png"), 1.2),
-    "simulate": (("simulate", DESIGNS / "quickstart.yaml", "-o", "readings.csv", "--certificate", "c.csv"), 0.8),
+    "simulate": (
+        ("simulate", DESIGNS / "quickstart.yaml", "-o", "readings.csv", "--certificate", "c.csv"),
+        0.8,
+    ),
 }
-OUTPUTS = ("choice.yaml", "sheet.csv", "page.html", "table.csv", "points.csv", "u.svg", "all.csv", "map.png")
+OUTPUTS = (
+    "choice.yaml",
+    "sheet.csv",
+    "page.html",
+    "table.csv",
+    "points.csv",
+    "u.svg",
+    "all.csv",
+    "map.png",
+)
 OUTPUTS += ("readings.csv", "c.csv")
 WORDS = {signal.SIGINT: "interrupted; ", signal.SIGTERM: "terminated; "}
 
 
 def processes_of(group: int) -> dict[int, float]:
-    """The processes of a group that have not ended, with the processor time that they took, in seconds."""
+    """The processes of a group that have not ended, with the processor time that they took, in
+    seconds.
+    """
     found = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
@@ -58,7 +100,9 @@ def processes_of(group: int) -> dict[int, float]:
             with suppress(OSError):
                 words = (folder / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
                 if int(words[2]) == group and words[0] != "Z":
-                    found[int(folder.name)] = (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+                    found[int(folder.name)] = (int(words[11]) + int(words[12])) / os.sysconf(
+                        "SC_CLK_TCK"
+                    )
     return found
 
 
@@ -90,7 +134,9 @@ def start() -> Iterator[Start]:
     """Starts a command in a session of its own; what is left of it at the end is killed."""
     started: list[subprocess.Popen[str]] = []
 
-    def begin(folder: Path, *arguments: object, program: list[str] | None = None) -> subprocess.Popen[str]:
+    def begin(
+        folder: Path, *arguments: object, program: list[str] | None = None
+    ) -> subprocess.Popen[str]:
         process = subprocess.Popen(
             program or command(*arguments),
             cwd=folder,
@@ -127,11 +173,17 @@ def copied(small: Path, folder: Path) -> Path:
     return folder
 
 
-def interrupted(start: Start, folder: Path, arguments: tuple[object, ...], spent: float, number: int, to: str) -> bool:
-    """Whether a command, sent a signal after some processor time, ended by it; it is checked however it ends."""
+def interrupted(
+    start: Start, folder: Path, arguments: tuple[object, ...], spent: float, number: int, to: str
+) -> bool:
+    """Whether a command, sent a signal after some processor time, ended by it; it is checked
+    however it ends.
+    """
     process = start(folder, *arguments)
     in_time = wait_until(lambda: answers(process.pid), process)
-    in_time = in_time and wait_until(lambda: sum(processes_of(process.pid).values()) >= spent, process)
+    in_time = in_time and wait_until(
+        lambda: sum(processes_of(process.pid).values()) >= spent, process
+    )
     with suppress(ProcessLookupError):
         (os.killpg if to == "group" else os.kill)(process.pid, number)
     _, err = process.communicate(timeout=60)
@@ -170,7 +222,9 @@ def test_a_signal_at_a_random_moment(name: str, small: Path, tmp_path: Path, sta
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", [*ENDLESS, *ENDING])
-def test_signals_at_ten_random_moments(name: str, small: Path, tmp_path: Path, start: Start) -> None:
+def test_signals_at_ten_random_moments(
+    name: str, small: Path, tmp_path: Path, start: Start
+) -> None:
     """Files are whole where there are some: the same as of a run that nothing disturbed."""
     chance = random.Random(f"ten of {name}")
     arguments, most = (ENDLESS | ENDING)[name]
@@ -206,8 +260,13 @@ def test_no_process_is_left_where_the_command_is_killed(
     process = start(folder, *arguments)
 
     def at_work() -> bool:
-        others = {one: spent for one, spent in processes_of(process.pid).items() if one != process.pid}
-        return len(others) >= arguments[arguments.index("--workers") + 1] and max(others.values()) > 0.3
+        others = {
+            one: spent for one, spent in processes_of(process.pid).items() if one != process.pid
+        }
+        return (
+            len(others) >= arguments[arguments.index("--workers") + 1]
+            and max(others.values()) > 0.3
+        )
 
     assert wait_until(at_work, process)
     process.kill()
@@ -219,12 +278,18 @@ def test_no_process_is_left_where_the_command_is_killed(
 
 # A command that does something else instead of its work, and how that goes.
 STUCK = {
-    "in a long call of linear algebra": "import numpy; ready(); numpy.linalg.svd(numpy.random.rand(6000, 6000))",
-    "where the exception is swallowed": "ready()\nwhile True:\n    try:\n        while True:\n            pass\n"
-    "    except BaseException:\n        pass",
+    "in a long call of linear algebra": (
+        "import numpy; ready(); numpy.linalg.svd(numpy.random.rand(6000, 6000))"
+    ),
+    "where the exception is swallowed": (
+        "ready()\nwhile True:\n    try:\n        while True:\n            pass\n"
+        "    except BaseException:\n        pass"
+    ),
     "where nobody reads what is said": "ready()\nwhile True: sys.stderr.write('x' * 100000)",
     "in code of its own": "ready()\nexec('while True: pass')",
-    "in an exception that came of it": "ready()\ntry:\n    while True: pass\nexcept BaseException: raise ValueError",
+    "in an exception that came of it": (
+        "ready()\ntry:\n    while True: pass\nexcept BaseException: raise ValueError"
+    ),
 }
 INSTEAD = """\
 import sys
@@ -242,10 +307,16 @@ sys.exit(main())
 """
 
 
-def instead_of_work(start: Start, folder: Path, body: str, before: str = "") -> subprocess.Popen[str]:
-    """A command that does something else, once it has begun; as a module, as a person may start it."""
+def instead_of_work(
+    start: Start, folder: Path, body: str, before: str = ""
+) -> subprocess.Popen[str]:
+    """A command that does something else, once it has begun; as a module, as a person may start
+    it.
+    """
     indented = "".join(f"    {line}\n" for line in body.splitlines())
-    (folder / "instead.py").write_text(INSTEAD.format(before=before, body=indented), encoding="utf-8")
+    (folder / "instead.py").write_text(
+        INSTEAD.format(before=before, body=indented), encoding="utf-8"
+    )
     process = start(folder, program=[sys.executable, "-m", "instead"])
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
     time.sleep(0.2)

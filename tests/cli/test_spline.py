@@ -43,8 +43,13 @@ def test_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert out.splitlines()[-2].endswith("0 um/mm")
 
 
-def test_json_is_in_metres_and_its_pieces_give_its_points(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(*DOME, "--start-slope", "0", "--end-value", "-30 um", "--end", "0 mm, 0 mm", "--json") == 0
+def test_json_is_in_metres_and_its_pieces_give_its_points(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert (
+        run(*DOME, "--start-slope", "0", "--end-value", "-30 um", "--end", "0 mm, 0 mm", "--json")
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)
     assert (found["free_coefficients"], found["degrees_of_freedom"], found["order"]) == (6, 15, 4)
     for held in found["prescribed"]:
@@ -52,7 +57,9 @@ def test_json_is_in_metres_and_its_pieces_give_its_points(capsys: pytest.Capture
     for point in found["points"]:
         piece = [one for one in found["pieces"] if one["start"] <= point["x"]][-1]
         u = point["x"] - piece["start"]
-        assert sum(c * u**k for k, c in enumerate(piece["coefficients"])) == pytest.approx(point["curve"], abs=1e-17)
+        assert sum(c * u**k for k, c in enumerate(piece["coefficients"])) == pytest.approx(
+            point["curve"], abs=1e-17
+        )
         assert point["residual"] == pytest.approx(point["y"] - point["curve"], abs=1e-18)
     assert [found["points"][0]["point"], found["points"][-1]["point"]] == ["12", "32"]
     squares = sum(point["residual"] ** 2 for point in found["points"])
@@ -66,7 +73,9 @@ def test_features_share_value_and_slope(capsys: pytest.CaptureFixture[str]) -> N
     assert free["boundaries"] == pytest.approx([0.00127], rel=1e-12)
     first, second = free["pieces"][:2]
     length = first["end"] - first["start"]
-    assert first["coefficients"][0] + first["coefficients"][1] * length == pytest.approx(second["coefficients"][0])
+    assert first["coefficients"][0] + first["coefficients"][1] * length == pytest.approx(
+        second["coefficients"][0]
+    )
     assert first["coefficients"][1] == pytest.approx(second["coefficients"][1], rel=1e-9)
     assert max(abs(c) * length**k for k, c in enumerate(first["coefficients"]) if k > 1) < 1e-18
     assert run(*arguments, "--at", TANGENT, "slope", "0") == 0
@@ -76,8 +85,12 @@ def test_features_share_value_and_slope(capsys: pytest.CaptureFixture[str]) -> N
     assert held["sum_of_squares"] > free["sum_of_squares"]
 
 
-def test_knots_keep_away_from_boundaries(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """With a knot one point before a boundary the curve would be least known next to it, where points are as dense."""
+def test_knots_keep_away_from_boundaries(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """With a knot one point before a boundary the curve would be least known next to it, where
+    points are as dense.
+    """
     x = np.arange(0.0, 300.0, 10.0)
     errors = 5 * np.sin(x / 80) + np.random.default_rng(2).normal(0.0, 0.3, len(x))
     rows = "".join(f"{a},{b}\n" for a, b in zip(x, errors, strict=True))
@@ -88,8 +101,12 @@ def test_knots_keep_away_from_boundaries(capsys: pytest.CaptureFixture[str], tmp
         arguments = (tmp_path / "data.csv", "--boundary", "150 mm", *knots)
         assert run(*arguments, "--evaluate", places, "--json") == 0
         found = json.loads(capsys.readouterr().out)
-        spread[bool(knots)] = [value["standard_uncertainty"] / found["sigma"] for value in found["values"]]
-    assert max(spread[True]) > 1.3 * max(spread[True][::2]) and max(spread[False]) < 1.1 * max(spread[False][::2])
+        spread[bool(knots)] = [
+            value["standard_uncertainty"] / found["sigma"] for value in found["values"]
+        ]
+    assert max(spread[True]) > 1.3 * max(spread[True][::2]) and max(spread[False]) < 1.1 * max(
+        spread[False][::2]
+    )
     assert run(tmp_path / "data.csv", "--boundary", "150 mm") == 0
     out = capsys.readouterr().out
     assert "4 knots at 40, 90, 190, 240 mm" in out
@@ -99,7 +116,9 @@ def test_knots_keep_away_from_boundaries(capsys: pytest.CaptureFixture[str], tmp
     assert "3 knots at 40, 90, 140 mm" in capsys.readouterr().out
 
 
-def test_the_feature_column_makes_no_boundaries_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_feature_column_makes_no_boundaries_and_says_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert run(*DOME) == 0
     told = "one curve over nose, dome: the column feature makes no boundaries; --boundary does"
     assert told in capsys.readouterr().out
@@ -108,7 +127,9 @@ def test_the_feature_column_makes_no_boundaries_and_says_so(capsys: pytest.Captu
     assert "the column feature" not in out and "belongs to both" not in out
 
 
-def test_uncertainties_given_and_estimated(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_uncertainties_given_and_estimated(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     rows = "".join(f"{k},{k % 3},{0.5 + 0.1 * k}\n" for k in range(12))
     (tmp_path / "data.csv").write_text(f"position_mm,error_um,u_um\n{rows}", encoding="utf-8")
     found = []
@@ -119,7 +140,9 @@ def test_uncertainties_given_and_estimated(capsys: pytest.CaptureFixture[str], t
     assert given["sigma"] == 1.0 and given["coverage_factor"] == pytest.approx(1.959964)
     factor = math.sqrt(given["sum_of_squares"] / given["degrees_of_freedom"])
     assert estimated["sigma"] == pytest.approx(factor) and estimated["coverage_factor"] > 2.3
-    ratio = estimated["points"][3]["standard_uncertainty"] / given["points"][3]["standard_uncertainty"]
+    ratio = (
+        estimated["points"][3]["standard_uncertainty"] / given["points"][3]["standard_uncertainty"]
+    )
     assert ratio == pytest.approx(factor)
     assert run(tmp_path / "data.csv") == 0
     assert "sigma 1.000, given (" in capsys.readouterr().out
@@ -128,7 +151,9 @@ def test_uncertainties_given_and_estimated(capsys: pytest.CaptureFixture[str], t
 def test_nothing_is_told_of_uncertainty_without_degrees_of_freedom(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    (tmp_path / "data.csv").write_text("position_mm,error_um\n0,0\n1,2\n2,1\n4,0\n", encoding="utf-8")
+    (tmp_path / "data.csv").write_text(
+        "position_mm,error_um\n0,0\n1,2\n2,1\n4,0\n", encoding="utf-8"
+    )
     assert run(tmp_path / "data.csv", "--plot", tmp_path / "plot.svg") == 0
     assert "no degrees of freedom are left to estimate sigma from" in capsys.readouterr().out
     assert run(tmp_path / "data.csv", "--json", "--evaluate", "1 mm") == 0
@@ -153,7 +178,9 @@ def test_a_closed_curve(capsys: pytest.CaptureFixture[str], ring: Path) -> None:
 
 
 @pytest.mark.parametrize("powers", ["local", "global"])
-def test_coefficients_for_a_controller(capsys: pytest.CaptureFixture[str], tmp_path: Path, powers: str) -> None:
+def test_coefficients_for_a_controller(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, powers: str
+) -> None:
     """The file evaluates to the curve, in the units of its columns' names."""
     arguments = (*DOME, "--start-slope", "0", "--powers", powers)
     assert run(*arguments, "--coefficients", "-") == 0
@@ -162,7 +189,14 @@ def test_coefficients_for_a_controller(capsys: pytest.CaptureFixture[str], tmp_p
     assert (tmp_path / "c.csv").read_text(encoding="utf-8") == text
     points = json.loads(capsys.readouterr().out)["points"]
     rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
-    assert list(rows[0]) == ["start_mm", "end_mm", "c0_um", "c1_um_per_mm", "c2_um_per_mm2", "c3_um_per_mm3"]
+    assert list(rows[0]) == [
+        "start_mm",
+        "end_mm",
+        "c0_um",
+        "c1_um_per_mm",
+        "c2_um_per_mm2",
+        "c3_um_per_mm3",
+    ]
     for point in points:
         x = point["x"] * 1e3
         row = [row for row in rows if float(row["start_mm"]) <= x + 1e-9][-1]
@@ -176,7 +210,20 @@ def test_drawings(tmp_path: Path) -> None:
         folder = tmp_path / str(first)
         folder.mkdir()
         plot, bars = folder / "fit.svg", folder / "whiskers.svg"
-        assert run(*DOME, "--start-slope", "0", "--plot", plot, "--whiskers", bars, "--magnification", "300") == 0
+        assert (
+            run(
+                *DOME,
+                "--start-slope",
+                "0",
+                "--plot",
+                plot,
+                "--whiskers",
+                bars,
+                "--magnification",
+                "300",
+            )
+            == 0
+        )
         assert (
             plot.read_bytes().startswith(b"<?xml")
             and b"<title>semi finish error against arc length" in plot.read_bytes()
@@ -188,10 +235,19 @@ def test_drawings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--knots", "10, 20 mm"), '--knots: "10" has no unit; write for example "10 mm" or "10 um"'),
-        (("--start-slope", "3 um"), '--start-slope: "3 um" is not a slope; write for example "2 um/mm", or 0'),
+        (
+            ("--knots", "10, 20 mm"),
+            '--knots: "10" has no unit; write for example "10 mm" or "10 um"',
+        ),
+        (
+            ("--start-slope", "3 um"),
+            '--start-slope: "3 um" is not a slope; write for example "2 um/mm", or 0',
+        ),
         (("--start-slope", "3 um/s"), '"3 um/s" is not a slope; write for example "2 um/mm", or 0'),
-        (("--start-slope", "0,2 um/mm"), '"0,2 um/mm" has a decimal comma; write for example "0.2 um/mm"'),
+        (
+            ("--start-slope", "0,2 um/mm"),
+            '"0,2 um/mm" has a decimal comma; write for example "0.2 um/mm"',
+        ),
         (("--start-value", "1 urad"), "--start-value:"),
         (("--at", "3 mm", "bend", "0"), '--at: "bend" should be value or slope'),
         (("--start", "end"), "the curve starts at its start"),
@@ -202,15 +258,22 @@ def test_drawings(tmp_path: Path) -> None:
         (("--uncertainty", "0 um"), "must be above zero"),
         (("--plot", "a.svg", "--whiskers", "a.svg"), "are the same file; name another"),
         (("--magnification", "nan"), "--magnification should be above 0"),
-        (("--magnification", "300"), "--magnification is that of --whiskers; add that, or leave it out"),
+        (
+            ("--magnification", "300"),
+            "--magnification is that of --whiskers; add that, or leave it out",
+        ),
         (("--json", "--coefficients", "-"), "both go to the screen"),
         (("--evaluate", "x mm"), '--evaluate: "x mm" is not a length'),
     ],
 )
-def test_wrong_usage(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], text: str) -> None:
+def test_wrong_usage(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], text: str
+) -> None:
     assert run(*DOME, *arguments) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("ballplate spline: ") and text in err and err.count("\n") == 1
+    assert (
+        out == "" and err.startswith("ballplate spline: ") and text in err and err.count("\n") == 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -221,7 +284,10 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str], arguments: tuple[str, .
             ["-1 mm is outside the curve", "60 mm is outside the curve, from 0 mm to 56.9"],
         ),
         (("--knots", "70 mm"), ["the knot at 70 mm is not between the ends, 0 mm and 56.9"]),
-        (("--knots", "5.1 mm, 5.2 mm, 5.3 mm, 5.4 mm, 5.5 mm, 5.6 mm, 6 mm"), ["the curve lacks", "leave out knots"]),
+        (
+            ("--knots", "5.1 mm, 5.2 mm, 5.3 mm, 5.4 mm, 5.5 mm, 5.6 mm, 6 mm"),
+            ["the curve lacks", "leave out knots"],
+        ),
         (
             ("--start-slope", "0", "--at", "start", "slope", "1 um/mm"),
             ["the slope at 0 mm is prescribed twice, differently; leave one of them out"],
@@ -233,11 +299,20 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str], arguments: tuple[str, .
         ),
         (("--boundary", "9 mm", "--knots", "9 mm"), ["9 mm is a boundary and a knot"]),
         (("--order", "2", "--boundary", "9 mm"), ["broken lines share no slope"]),
-        (("--x", "nominal_z", "--start", TANGENT), ["nominal co-ordinates tell a place on the profile"]),
+        (
+            ("--x", "nominal_z", "--start", TANGENT),
+            ["nominal co-ordinates tell a place on the profile"],
+        ),
         (("--points", "12-32,44"), ['no point "44"']),
-        (("--points", "12"), ["all points are at 0 mm, where there is no curve; give points at several"]),
+        (
+            ("--points", "12"),
+            ["all points are at 0 mm, where there is no curve; give points at several"],
+        ),
         (("--points", "12-40"), ['"12-40" goes beyond the points, 1 to 32']),
-        (("--sigma", "given"), ["no uncertainty is given that could be believed; add a column such as u_um, or give"]),
+        (
+            ("--sigma", "given"),
+            ["no uncertainty is given that could be believed; add a column such as u_um, or give"],
+        ),
         (("--start", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
         (("--end", "20 mm, -20 mm"), ["the place (20 mm, -20 mm) is not on the profile"]),
     ],
@@ -260,17 +335,29 @@ def test_many_points_are_fitted_and_too_many_coefficients_refused(
     assert run(tmp_path / "data.csv", "--every", "100", "--json") == 0
     assert json.loads(capsys.readouterr().out)["sigma"] < 1e-10
     assert run(tmp_path / "data.csv") == 3
-    assert "1603 coefficients are too many; at most 500 are possible, leave out knots" in capsys.readouterr().err
+    assert (
+        "1603 coefficients are too many; at most 500 are possible, leave out knots"
+        in capsys.readouterr().err
+    )
 
 
-def test_points_at_the_same_place_are_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_points_at_the_same_place_are_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     rows = "".join(f"{10 - k // 2},{k // 2},{k}\n" for k in (0, 2, 3, 6, 8))
-    (tmp_path / "data.csv").write_text(f"nominal_x_mm,nominal_z_mm,error_um\n{rows}", encoding="utf-8")
+    (tmp_path / "data.csv").write_text(
+        f"nominal_x_mm,nominal_z_mm,error_um\n{rows}", encoding="utf-8"
+    )
     assert run(tmp_path / "data.csv") == 3
-    assert "two neighbouring points stand at (9 mm, 1 mm); leave one of them out" in capsys.readouterr().err
+    assert (
+        "two neighbouring points stand at (9 mm, 1 mm); leave one of them out"
+        in capsys.readouterr().err
+    )
 
 
-def test_whiskers_need_a_profile(capsys: pytest.CaptureFixture[str], ring: Path, tmp_path: Path) -> None:
+def test_whiskers_need_a_profile(
+    capsys: pytest.CaptureFixture[str], ring: Path, tmp_path: Path
+) -> None:
     assert run(ring, "--whiskers", tmp_path / "a.svg") == 2
     assert "--whiskers needs a profile" in capsys.readouterr().err
     assert run(*DOME, "--plot", tmp_path / "missing" / "a.svg") == 3
@@ -320,5 +407,7 @@ def test_a_polynomial_through_as_many_points_as_its_order(
     size = max(map(abs, expected))
     for told, true in zip(found["values"], expected, strict=True):
         assert abs(told["curve"] - true) < 1e-6 * size
-        by_piece = np.polynomial.polynomial.polyval(told["x"] - piece["start"], piece["coefficients"])
+        by_piece = np.polynomial.polynomial.polyval(
+            told["x"] - piece["start"], piece["coefficients"]
+        )
         assert abs(by_piece - true) < 1e-6 * size

@@ -1,4 +1,6 @@
-"""Standard streams that are closed or full: what is said of them, and that nothing else takes their place."""
+"""Standard streams that are closed or full: what is said of them, and that nothing else takes their
+place.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,15 @@ from tests.sweeps.support import ROOT, small_sweep
 COMMAND = f'"{sys.executable}" -m ballplate'
 
 
-def found_by(line: list[str], folder: Path, unbuffered: str = "") -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+def found_by(
+    line: list[str], folder: Path, unbuffered: str = ""
+) -> subprocess.CompletedProcess[str]:
+    environment = {
+        **os.environ,
+        "PYTHONUNBUFFERED": unbuffered,
+        "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONPATH": str(ROOT),
+    }
     return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True)
 
 
@@ -56,7 +65,10 @@ def test_other_errors_of_files_are_not_those_of_standard_output(
 
     monkeypatch.setattr(schema, "run", fail)
     assert main(["schema"]) == 3
-    told = "/a\\x0afile: cannot be used (Read-only file system); check the name, the permissions and the room there\n"
+    told = (
+        "/a\\x0afile: cannot be used (Read-only file system); check the name, the permissions and"
+        " the room there\n"
+    )
     assert capsys.readouterr() == ("", told)
 
 

@@ -1,4 +1,6 @@
-"""What commands tell on standard error beside errors and warnings: -q less, -v more, and the results stay the same."""
+"""What commands tell on standard error beside errors and warnings: -q less, -v more, and the
+results stay the same.
+"""
 
 from __future__ import annotations
 
@@ -22,27 +24,39 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
 
 
 def test_every_command_takes_both() -> None:
-    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (commands,) = (
+        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
     for command in commands.choices.values():
-        assert {"-q", "--quiet", "-v", "--verbose"} <= set(command._option_string_actions), command.prog
+        assert {"-q", "--quiet", "-v", "--verbose"} <= set(command._option_string_actions), (
+            command.prog
+        )
 
 
 @pytest.mark.parametrize("command", ["check", "lengths", "reliability"])
 def test_results_are_the_same(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    plain, quiet, verbose = (told(capsys, command, QUICKSTART, *more) for more in ([], ["-q"], ["-v"]))
+    plain, quiet, verbose = (
+        told(capsys, command, QUICKSTART, *more) for more in ([], ["-q"], ["-v"])
+    )
     assert plain[:2] == quiet[:2] == verbose[:2] and plain[2] == quiet[2] == []
     lines = verbose[2]
     assert lines[0] == f"ballplate {version('ballplate')}" and f"numpy {version('numpy')}" in lines
     assert f"reads {QUICKSTART}" in lines
-    assert re.fullmatch(rf"{command}: [0-9.e-]+ s, [0-9.e-]+ s of the processor in this process", lines[-1])
+    assert re.fullmatch(
+        rf"{command}: [0-9.e-]+ s, [0-9.e-]+ s of the processor in this process", lines[-1]
+    )
     steps = {"lengths": "lengths", "reliability": "observations"}
-    assert command == "check" or re.fullmatch(rf"(\d+) of \1 {steps[command]}: [0-9.e-]+ s", lines[-2])
+    assert command == "check" or re.fullmatch(
+        rf"(\d+) of \1 {steps[command]}: [0-9.e-]+ s", lines[-2]
+    )
 
 
 def test_files_that_an_experiment_names_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     machine = Path("designs/park/machines/measured-errors.yaml")
     lines = told(capsys, "map", machine, "--grid", "2,2,2", "-v")[2]
-    read = {Path(line.removeprefix("reads ")).resolve() for line in lines if line.startswith("reads ")}
+    read = {
+        Path(line.removeprefix("reads ")).resolve() for line in lines if line.startswith("reads ")
+    }
     named = set(re.findall(r"[\w/-]+\.csv", machine.read_text(encoding="utf-8")))
     assert named and {(machine.parent / name).resolve() for name in named} <= read
 
@@ -57,12 +71,17 @@ def test_notes_go_and_errors_stay(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 def test_doubts_about_the_verdict_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "doubtful.yaml"
-    file.write_text(Path(QUICKSTART).read_text().replace("repeatability: ", "repeatability: 1000 "), encoding="utf-8")
+    file.write_text(
+        Path(QUICKSTART).read_text().replace("repeatability: ", "repeatability: 1000 "),
+        encoding="utf-8",
+    )
     plain, quiet = told(capsys, "check", file), told(capsys, "check", file, "-q")
     assert plain == quiet and plain[2]
 
 
-def test_no_bar_when_quiet(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_bar_when_quiet(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     with monkeypatch.context() as patched:
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
         assert "351 lengths" in "".join(told(capsys, "lengths", QUICKSTART, "--grid", "3")[2])

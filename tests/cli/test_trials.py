@@ -41,9 +41,16 @@ def test_trials_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", QUICKSTART, "--trials", "100", "--seed", "4", "--workers", "2", "--json") == 0
     assert capsys.readouterr().out == first
     found = json.loads(first)["monte_carlo"]
-    assert (found["trials"], found["seed"], found["not_converged"], found["interrupted"]) == (100, 4, [], False)
+    assert (found["trials"], found["seed"], found["not_converged"], found["interrupted"]) == (
+        100,
+        4,
+        [],
+        False,
+    )
     for one in found["quantities"].values():
-        assert 0.8 < one["spread_ratio"]["value"] < 1.2 and one["spread_ratio"]["standard_error"] > 0
+        assert (
+            0.8 < one["spread_ratio"]["value"] < 1.2 and one["spread_ratio"]["standard_error"] > 0
+        )
         assert 0.85 < one["coverage_sigma_estimated"]["value"] < 1.0
 
 
@@ -60,27 +67,36 @@ def test_a_deficient_design_is_told_why_not(capsys: pytest.CaptureFixture[str]) 
     assert "no Monte Carlo: the design is rank deficient by 2" in capsys.readouterr().out
 
 
-def test_a_true_machine_too_wild_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_true_machine_too_wild_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     text = Path(QUICKSTART).read_text(encoding="utf-8")
     wild = tmp_path / "wild.yaml"
     head, tail = text.split("true_machine:")
     tail = tail.partition("\n\n")[2]
     wild.write_text(
-        f"{head}true_machine: {{kind: random, position: 30 m, rotation: 3 rad}}\n\n{tail}", encoding="utf-8"
+        f"{head}true_machine: {{kind: random, position: 30 m, rotation: 3 rad}}\n\n{tail}",
+        encoding="utf-8",
     )
     line = 1 + head.count("\n")
     for command in (["run", wild, "--trials", "10"], ["simulate", wild, "-o", tmp_path / "r.csv"]):
         assert run(*command) == 3
         err = capsys.readouterr().err
-        assert err.startswith(f"{wild}:{line}:15: true_machine: the errors of the true machine are too large")
+        assert err.startswith(
+            f"{wild}:{line}:15: true_machine: the errors of the true machine are too large"
+        )
 
 
-def test_a_true_machine_that_cannot_be_fitted_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_true_machine_that_cannot_be_fitted_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     text = Path(QUICKSTART).read_text(encoding="utf-8")
     wild = tmp_path / "wild.yaml"
     head, tail = text.split("true_machine:")
     tail = tail.partition("\n\n")[2]
-    wild.write_text(f"{head}true_machine: {{kind: random, rotation: 200 mrad}}\n\n{tail}", encoding="utf-8")
+    wild.write_text(
+        f"{head}true_machine: {{kind: random, rotation: 200 mrad}}\n\n{tail}", encoding="utf-8"
+    )
     assert run("run", wild, "--trials", "10") == 3
     assert "true_machine: the e" in capsys.readouterr().err
 
@@ -132,7 +148,10 @@ def test_an_interruption_reports_what_is_done(workers: str) -> None:
     assert process.returncode == 130
     found = json.loads(out)["monte_carlo"]
     assert found["interrupted"] and found["trials"] >= 512
-    assert "interrupted: the figures are those of the data sets done so far" in err and "Traceback" not in err
+    assert (
+        "interrupted: the figures are those of the data sets done so far" in err
+        and "Traceback" not in err
+    )
 
 
 class Terminal:
@@ -174,8 +193,14 @@ def test_the_bar_fits_the_terminal(width: int, monkeypatch: pytest.MonkeyPatch) 
         if width == 200:
             bar, words = drawn.strip().removeprefix("|").split("|")
             assert bar.count("#") == pytest.approx(len(bar) / 4, abs=1)
-            assert words.startswith(" 512/2048 data sets, 00:20 so far, ") and words.endswith(", accurate to 1.5 %")
-    assert terminal.lines[-1] == "" and terminal.lines[-2].isspace() and len(terminal.lines[-2]) >= len(drawn)
+            assert words.startswith(" 512/2048 data sets, 00:20 so far, ") and words.endswith(
+                ", accurate to 1.5 %"
+            )
+    assert (
+        terminal.lines[-1] == ""
+        and terminal.lines[-2].isspace()
+        and len(terminal.lines[-2]) >= len(drawn)
+    )
     assert "\x1b" not in terminal.text
 
 
@@ -203,17 +228,24 @@ def test_lines_without_a_terminal_come_now_and_then(
             now += 0.5
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
-        f"{done}/80 data sets, 00:{done // 2:02d} so far, 00:{(80 - done) // 2:02d} left" for done in (10, 20, 30, 40)
+        f"{done}/80 data sets, 00:{done // 2:02d} so far, 00:{(80 - done) // 2:02d} left"
+        for done in (10, 20, 30, 40)
     ]
 
 
 def test_every_step_of_a_plan_tells_how_much_there_is(tmp_path: Path) -> None:
-    given = "pool:\n  candidates:\n    - {planes: [z], levels: [100 mm, 400 mm], corners: {x: [50 mm], y: [50 mm]}"
+    given = (
+        "pool:\n  candidates:\n    - {planes: [z], levels: [100 mm, 400 mm], corners: {x: [50 mm],"
+        " y: [50 mm]}"
+    )
     file = tmp_path / "pool.yaml"
     file.write_text(Path(QUICKSTART).read_text() + f"\n{given}, probes: [down]}}\n")
     told: list[tuple[str, int, int]] = []
     bp.plan(file, positions=7, curve=True, report=lambda *step: told.append(step))
-    steps = {what: [one for one in told if one[0] == what] for what in dict.fromkeys(one[0] for one in told)}
+    steps = {
+        what: [one for one in told if one[0] == what]
+        for what in dict.fromkeys(one[0] for one in told)
+    }
     assert {"candidates", "gains", "budgets of the curve"} < set(steps)
     for what, reports in steps.items():
         wanted = reports[-1][2]

@@ -1,4 +1,6 @@
-"""Files from a change that somebody proposes: no module is run, and no name is read as a command."""
+"""Files from a change that somebody proposes: no module is run, and no name is read as a
+command.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ PLACES = {
     "error model": ("error_model:", f"error_model: {PYTHON}\nformer:"),
     "true machine": ("  seed: 7", f"  seed: 7\n  error_model: {PYTHON}"),
     "variant": ("# Offsets", f"variants: {{one: {{}}, two: {{error_model: {PYTHON}}}}}\n# Offsets"),
-    "key of a variant": ("# Offsets", "variants: {one: {}, two: {error_model.kind: python}}\n# Offsets"),
+    "key of a variant": (
+        "# Offsets",
+        "variants: {one: {}, two: {error_model.kind: python}}\n# Offsets",
+    ),
 }
 
 
@@ -52,7 +57,9 @@ def test_modules_are_refused_before_they_are_run(
     assert not Path("intruder").exists()
 
 
-def test_modules_are_run_where_they_are_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_modules_are_run_where_they_are_allowed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = written(tmp_path, "true machine")
     monkeypatch.chdir(tmp_path)
     assert main(["check", str(path)]) == 3
@@ -76,14 +83,25 @@ def test_patterns_are_expanded_without_a_shell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    names = ["a.yaml", "b/c.yaml", "b/d/e f.yaml", "b/[x].yaml", "sweeps/s.yaml", "b/machines/m.yaml"]
+    names = [
+        "a.yaml",
+        "b/c.yaml",
+        "b/d/e f.yaml",
+        "b/[x].yaml",
+        "sweeps/s.yaml",
+        "b/machines/m.yaml",
+    ]
     for name in names:
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).write_text(QUICKSTART.read_text(encoding="utf-8"), encoding="utf-8")
 
     def checked(*patterns: str, status: int = 0) -> list[str]:
         assert main(["check", "--format", "github", "--", *patterns]) == status
-        return [line.split(": ")[1] for line in capsys.readouterr().out.splitlines() if line.startswith("as expected")]
+        return [
+            line.split(": ")[1]
+            for line in capsys.readouterr().out.splitlines()
+            if line.startswith("as expected")
+        ]
 
     assert checked("**/*.yaml") == ["a.yaml", "b/[x].yaml", "b/c.yaml", "b/d/e f.yaml"]
     assert checked("b/*.yaml", "b/c.yaml", "a.yaml") == ["b/[x].yaml", "b/c.yaml", "a.yaml"]
@@ -102,13 +120,23 @@ def test_names_of_files_are_no_commands(
     monkeypatch.chdir(tmp_path)
     text = QUICKSTART.read_text(encoding="utf-8")
     wrong = text.replace("expected_rank_deficiency: 0", "expected_rank_deficiency: 1")
-    for k, name in enumerate(("a\n::warning::b.yaml", "c\r::error::d.yaml", "\x1b[31m##[error]e.yaml")):
+    for k, name in enumerate(
+        ("a\n::warning::b.yaml", "c\r::error::d.yaml", "\x1b[31m##[error]e.yaml")
+    ):
         Path(name).mkdir()
         Path(name, "design.yaml").write_text(text, encoding="utf-8")
         Path(name, "wrong.yaml").write_text(wrong, encoding="utf-8")
         Path(name, "broken.yaml").write_text("title: [", encoding="utf-8")
         assert (
-            main(["check", "--format", "github", *(f"{name}/{one}.yaml" for one in ("design", "wrong", "broken"))]) == 3
+            main(
+                [
+                    "check",
+                    "--format",
+                    "github",
+                    *(f"{name}/{one}.yaml" for one in ("design", "wrong", "broken")),
+                ]
+            )
+            == 3
         )
         out = capsys.readouterr().out
         lines = out.split("\n")[:-1]
@@ -174,4 +202,6 @@ def test_a_report_for_build_servers_has_no_lines_of_a_name(
     )
     assert main(["check", "--format", "junit", *names]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert not any(line.startswith("::") for line in lines) and any("\\x0a::error::" in line for line in lines)
+    assert not any(line.startswith("::") for line in lines) and any(
+        "\\x0a::error::" in line for line in lines
+    )

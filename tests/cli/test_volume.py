@@ -1,4 +1,6 @@
-"""The volume limits what error models are functions of: scale readings, the ball less the probe's offset."""
+"""The volume limits what error models are functions of: scale readings, the ball less the probe's
+offset.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def write(
     listed = ", ".join(f"{1000 * one} mm" for one in offset)
     path = folder / "e.yaml"
     path.write_text(
-        EXPERIMENT.format(offset=listed, plane=plane, level=level, corner=corner, probes=probes, model=model)
+        EXPERIMENT.format(
+            offset=listed, plane=plane, level=level, corner=corner, probes=probes, model=model
+        )
     )
     return str(path)
 
@@ -57,11 +61,15 @@ def test_scale_readings_outside_are_refused_though_the_balls_are_inside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     path = write(tmp_path, level="900 mm", probes="[short, long]")
-    assert main([command, path, *(["-o", str(tmp_path / "r.csv")] if command == "simulate" else [])]) == 3
-    assert capsys.readouterr().err.removeprefix(f"{path}:") == (
-        '8:5: positions[0]: reading ball "r1c1" with probe "long" puts the scales at z = 1300 mm (the ball at 900 mm '
-        "less the offset of -400 mm), 300 mm above the measuring volume, and 8 more readings; move the artefact, or "
-        "read it otherwise\n"
+    assert (
+        main([command, path, *(["-o", str(tmp_path / "r.csv")] if command == "simulate" else [])])
+        == 3
+    )
+    assert (
+        capsys.readouterr().err.removeprefix(f"{path}:")
+        == '8:5: positions[0]: reading ball "r1c1" with probe "long" puts the scales at z = 1300 mm'
+        " (the ball at 900 mm less the offset of -400 mm), 300 mm above the measuring volume,"
+        " and 8 more readings; move the artefact, or read it otherwise\n"
     )
     assert not (tmp_path / "r.csv").exists()
 
@@ -71,7 +79,10 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
     generator = np.random.default_rng(5)
     accepted = 0
     for _ in range(120):
-        offset, at = generator.uniform(-0.3, 0.3, 3).round(3), generator.uniform(-0.3, 0.9, 3).round(3)
+        offset, at = (
+            generator.uniform(-0.3, 0.3, 3).round(3),
+            generator.uniform(-0.3, 0.9, 3).round(3),
+        )
         plane = "xyz"[generator.integers(3)]
         axes = [axis for axis in "xyz" if axis != plane]
         corner = ", ".join(f"{axis}: {1000 * at['xyz'.index(axis)]} mm" for axis in axes)
@@ -79,7 +90,9 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
         text = {"offset": offset, "plane": plane, "level": level, "corner": f"{{{corner}}}"}
         path = Path(write(tmp_path, **text))
         narrow = path.read_text()
-        path.write_text(narrow.replace("[1 m, 1 m, 1 m]", "{x: [-2 m, 3 m], y: [-2 m, 3 m], z: [-2 m, 3 m]}"))
+        path.write_text(
+            narrow.replace("[1 m, 1 m, 1 m]", "{x: [-2 m, 3 m], y: [-2 m, 3 m], z: [-2 m, 3 m]}")
+        )
         design = lay_out(load(path)[0])
         balls = locations(design, nominal_state(design), design.readings)
         x = balls - design.probes[design.readings.probe]
@@ -94,7 +107,9 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
     assert 5 < accepted < 115
 
 
-def test_readings_outside_are_told_by_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_readings_outside_are_told_by_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path, readings = write(tmp_path, level="300 mm"), tmp_path / "r.csv"
     assert main(["simulate", path, "-o", str(readings)]) == 0
     main(["fit", path, str(readings)])
@@ -102,12 +117,15 @@ def test_readings_outside_are_told_by_fit(tmp_path: Path, capsys: pytest.Capture
     # The whole plate stood 350 mm higher than planned, and its last ball stands in line 10.
     lines = readings.read_text().splitlines()
     cells = [line.split(",") for line in lines[1:]]
-    higher = [",".join([*row[:-1], repr(float(row[-1]) + 350 + (k == 8) * 0.02)]) for k, row in enumerate(cells)]
+    higher = [
+        ",".join([*row[:-1], repr(float(row[-1]) + 350 + (k == 8) * 0.02)])
+        for k, row in enumerate(cells)
+    ]
     readings.write_text("\n".join([lines[0], *higher]))
     main(["fit", path, str(readings)])
     told = [line for line in capsys.readouterr().err.splitlines() if "extrapolated" in line]
     assert told == [
-        "warning: 9 readings are outside the measuring volume, and the error model is extrapolated there; furthest is "
-        "ball r3c3 in position flat with probe long, at z = 1050 mm, 50 mm above it (line 10); correct machine.volume, "
-        "or the readings"
+        "warning: 9 readings are outside the measuring volume, and the error model is extrapolated"
+        " there; furthest is ball r3c3 in position flat with probe long, at z = 1050 mm, 50 mm"
+        " above it (line 10); correct machine.volume, or the readings"
     ]

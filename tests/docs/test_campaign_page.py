@@ -1,4 +1,6 @@
-"""Figures and pictures on the page about campaigns that take too long for every build of the pages."""
+"""Figures and pictures on the page about campaigns that take too long for every build of the
+pages.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,13 @@ NEAR = 2e-3
 
 
 def examples() -> dict[str, list[str]]:
-    """Commands on the page that its build does not run, with the lines of their output that it shows."""
+    """Commands on the page that its build does not run, with the lines of their output that it
+    shows.
+    """
     page = PAGE.read_text(encoding="utf-8")
-    blocks = re.findall(r"^```console\n\$ ballplate ([^\n]*)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    blocks = re.findall(
+        r"^```console\n\$ ballplate ([^\n]*)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL
+    )
     return {command: shown.splitlines() for command, shown in blocks}
 
 
@@ -75,7 +81,10 @@ def test_the_text_quotes_what_the_command_says() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("command", examples())
 def test_what_is_shown_comes_out_again(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     shutil.copytree("designs", tmp_path / "designs")
     picture = PAGE.with_name(picture_of(command)).resolve()
@@ -84,6 +93,8 @@ def test_what_is_shown_comes_out_again(
     assert main(shlex.split(command)) == 0
     lines = iter(capsys.readouterr().out.splitlines())
     for line in shown:
-        found = next((other for other in lines if parts(other)[0] == parts(line)[0]), "nothing of that kind")
+        found = next(
+            (other for other in lines if parts(other)[0] == parts(line)[0]), "nothing of that kind"
+        )
         assert_same(found, line)
     assert_same(title(tmp_path / picture_of(command)), title(picture))

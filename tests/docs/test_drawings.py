@@ -1,4 +1,6 @@
-"""The drawings of the documentation are those that their script makes, and tell what the program computes."""
+"""The drawings of the documentation are those that their script makes, and tell what the program
+computes.
+"""
 
 from __future__ import annotations
 

@@ -77,6 +77,10 @@ LIMITS = {
 
 @pytest.mark.parametrize("what", LIMITS)
 def test_the_page_tells_the_limit(what: str) -> None:
-    (row,) = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith(f"| {what}")]
+    (row,) = [
+        line
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        if line.startswith(f"| {what}")
+    ]
     numbers = [int(found.replace(" ", "")) for found in re.findall(r"[0-9]+(?: [0-9]{3})*", row)]
     assert tuple(numbers[-len(LIMITS[what]) :]) == LIMITS[what]

@@ -1,4 +1,6 @@
-"""The documentation: it builds without a warning, and what it tells about files outside of it is so."""
+"""The documentation: it builds without a warning, and what it tells about files outside of it is
+so.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +66,10 @@ def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
     assert len(pages) >= 15
     for path, page in pages.items():
         for address in (a for a in page.loaded if not a.startswith("data:")):
-            assert "//" not in address and (path.parent / address.partition("?")[0].partition("#")[0]).exists(), address
+            assert (
+                "//" not in address
+                and (path.parent / address.partition("?")[0].partition("#")[0]).exists()
+            ), address
         for address in page.links:
             target, _, name = address.partition("#")
             if "//" not in address and name:
@@ -79,17 +84,26 @@ def test_reference_pages_have_everything(built: Path) -> None:
             for key, value in section["properties"].items():
                 assert key in format_page
                 # Typography aside.
-                assert re.sub(r"\W+", " ", value["description"]) in re.sub(r"\W+", " ", format_page), (key, value)
+                assert re.sub(r"\W+", " ", value["description"]) in re.sub(
+                    r"\W+", " ", format_page
+                ), (key, value)
     command_page = Page(built / "reference/commands.html").text
-    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (commands,) = (
+        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
     for command in commands.choices.values():
         assert command.prog in command_page
-        assert set(command._option_string_actions) - {"--help"} <= set(re.findall(r"--?[\w-]+", command_page))
+        assert set(command._option_string_actions) - {"--help"} <= set(
+            re.findall(r"--?[\w-]+", command_page)
+        )
 
 
 def test_examples_have_run(built: Path) -> None:
     tutorial = Page(built / "tutorial.html").text
-    assert "rank deficiency 5, expected full rank" in tutorial and "full rank, as expected; 168" in tutorial
+    assert (
+        "rank deficiency 5, expected full rank" in tutorial
+        and "full rank, as expected; 168" in tutorial
+    )
     # The text quotes these from the tables.
     for figure in ("0.2623", "1.525"):
         assert figure in tutorial
@@ -99,14 +113,31 @@ def test_examples_have_run(built: Path) -> None:
 @pytest.mark.parametrize(
     ("example", "message"),
     [
-        ("```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```", "exit status 0 instead of 1"),
-        ("```{picture} none.svg\n:alt: nothing\n```", "none.svg is no SVG or PNG file that an example has written"),
+        (
+            "```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```",
+            "exit status 0 instead of 1",
+        ),
+        (
+            "```{picture} none.svg\n:alt: nothing\n```",
+            "none.svg is no SVG or PNG file that an example has written",
+        ),
     ],
 )
 def test_an_example_that_fails_ends_the_build(tmp_path: Path, example: str, message: str) -> None:
     (tmp_path / "index.md").write_text(f"# Wrong\n\n{example}\n", encoding="utf-8")
     found = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"],
+        [
+            sys.executable,
+            "-m",
+            "sphinx",
+            "-q",
+            "-c",
+            DOCS,
+            "-b",
+            "html",
+            tmp_path,
+            tmp_path / "built",
+        ],
         capture_output=True,
         text=True,
     )
@@ -115,26 +146,60 @@ def test_an_example_that_fails_ends_the_build(tmp_path: Path, example: str, mess
 
 def test_a_picture_that_an_example_has_written_is_in_the_page(tmp_path: Path) -> None:
     drawing = "<svg xmlns='http://www.w3.org/2000/svg'/>"
-    page = f"# Right\n\n```{{file}} one.svg\n{drawing}\n```\n\n```{{picture}} one.svg\n:alt: a < b\nA *caption*.\n```\n"
+    page = (
+        f"# Right\n\n```{{file}} one.svg\n{drawing}\n```\n\n```{{picture}} one.svg\n:alt: a < b\nA"
+        " *caption*.\n```\n"
+    )
     (tmp_path / "index.md").write_text(page, encoding="utf-8")
-    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "-q",
+        "-c",
+        DOCS,
+        "-b",
+        "html",
+        tmp_path,
+        tmp_path / "built",
+    ]
     subprocess.run(command, check=True, capture_output=True)
     built = (tmp_path / "built/index.html").read_text(encoding="utf-8")
     data = base64.b64encode(f"{drawing}\n".encode()).decode()
-    assert f'src="data:image/svg+xml;base64,{data}" alt="a &lt; b"' in built and "A <em>caption</em>." in built
+    assert (
+        f'src="data:image/svg+xml;base64,{data}" alt="a &lt; b"' in built
+        and "A <em>caption</em>." in built
+    )
 
 
 def test_a_program_goes_on_with_the_names_of_the_last_one(tmp_path: Path) -> None:
-    """Values, modules and classes of modules, but nothing of programs before one that does not go on."""
+    """Values, modules and classes of modules, but nothing of programs before one that does not go
+    on.
+    """
     programs = (
         ("", "import math\nlost = open('a.txt', 'w')\nx = 6"),
         (":continued:\n\n", "y = int(math.pow(x, 2)) + 1\nprint(f'y is {y}')"),
         (":continued:\n\n", "print(f'x and y are {x + y}', 'lost' in dir())"),
         ("", "print('kept:', [name for name in ('x', 'y', 'math') if name in dir()])"),
     )
-    blocks = "\n\n".join(f"```{{python-run}}\n{option}{program}\n```" for option, program in programs)
+    blocks = "\n\n".join(
+        f"```{{python-run}}\n{option}{program}\n```" for option, program in programs
+    )
     (tmp_path / "index.md").write_text(f"# Right\n\n{blocks}\n", encoding="utf-8")
-    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-c", DOCS, "-b", "html", tmp_path, tmp_path / "built"]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "-q",
+        "-c",
+        DOCS,
+        "-b",
+        "html",
+        tmp_path,
+        tmp_path / "built",
+    ]
     subprocess.run(command, check=True, capture_output=True)
     text = Page(tmp_path / "built/index.html").text
     assert "y is 37" in text and "x and y are 43 False" in text and "kept: []" in text

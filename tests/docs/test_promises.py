@@ -1,4 +1,6 @@
-"""The page of promises: every test that it names exists, and none of those that hold the most is left out."""
+"""The page of promises: every test that it names exists, and none of those that hold the most is
+left out.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +28,18 @@ def rows() -> list[str]:
 
 @cache
 def long_by_test(path: str) -> dict[str, bool]:
-    """The tests of a file, those of classes with the name of the class before, and whether they run only when asked."""
+    """The tests of a file, those of classes with the name of the class before, and whether they run
+    only when asked.
+    """
     found = {}
     for node in ast.parse(Path(path).read_text(encoding="utf-8")).body:
         of_class = node.body if isinstance(node, ast.ClassDef) else [node]
         prefix = f"{node.name}::" if isinstance(node, ast.ClassDef) else ""
         for one in of_class:
             if isinstance(one, ast.FunctionDef) and one.name.startswith("test_"):
-                found[prefix + one.name] = "pytest.mark.long" in map(ast.unparse, one.decorator_list)
+                found[prefix + one.name] = "pytest.mark.long" in map(
+                    ast.unparse, one.decorator_list
+                )
     return found
 
 
@@ -70,6 +76,10 @@ def test_the_files_that_hold_the_most_are_named() -> None:
 
 def test_all_tests_of_outputs_signals_and_stores_are_named() -> None:
     named = {(path, test) for path, test, _ in NAMED.findall("\n".join(rows()))}
-    for path in ("tests/cli/test_outputs.py", "tests/cli/test_signals.py", "tests/sweeps/test_damaged_stores.py"):
+    for path in (
+        "tests/cli/test_outputs.py",
+        "tests/cli/test_signals.py",
+        "tests/sweeps/test_damaged_stores.py",
+    ):
         missing = [test for test in long_by_test(path) if (path, test) not in named]
         assert not missing, path

@@ -1,4 +1,6 @@
-"""The workflow that tests on every system: it is one that GitHub takes, and runs what the README says."""
+"""The workflow that tests on every system: it is one that GitHub takes, and runs what the README
+says.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ import yaml
 
 WORKFLOW = Path(".github/workflows/tests.yml")
 README = Path("README.md").read_text(encoding="utf-8")
-STEPS = [step for job in yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))["jobs"].values() for step in job["steps"]]
+STEPS = [
+    step
+    for job in yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))["jobs"].values()
+    for step in job["steps"]
+]
 
 
 def command(name: str) -> str:
@@ -40,7 +46,9 @@ def test_a_linter_finds_nothing(schema: str, file: Path, tmp_path: Path) -> None
     assert linted(file) == 0
     wrong = tmp_path / "wrong.yml"
     text = file.read_text(encoding="utf-8")
-    wrong.write_text(text.replace("timeout-minutes: 60", "").replace("using:", "usign:"), encoding="utf-8")
+    wrong.write_text(
+        text.replace("timeout-minutes: 60", "").replace("using:", "usign:"), encoding="utf-8"
+    )
     if schema == "vendor.github-workflows":
         wrong.write_text(text.replace("runs-on:", "run-on:"), encoding="utf-8")
     assert linted(wrong) == 1
@@ -48,9 +56,13 @@ def test_a_linter_finds_nothing(schema: str, file: Path, tmp_path: Path) -> None
 
 def test_it_may_do_little_and_uses_what_cannot_change() -> None:
     workflow: Any = yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))
-    assert workflow["permissions"] == {"contents": "read"} and "pull_request_target" not in WORKFLOW.read_text("utf-8")
+    assert workflow["permissions"] == {
+        "contents": "read"
+    } and "pull_request_target" not in WORKFLOW.read_text("utf-8")
     used = [step["uses"] for step in STEPS if "uses" in step]
-    assert len(used) == 4 and all(re.fullmatch(r"actions/[a-z-]+@[0-9a-f]{40}", one) for one in used)
+    assert len(used) == 4 and all(
+        re.fullmatch(r"actions/[a-z-]+@[0-9a-f]{40}", one) for one in used
+    )
     assert not any("permissions" in job for job in workflow["jobs"].values())
     # Nothing that somebody else chooses, such as the name of a branch, gets into a script.
     assert not any("${{" in step.get("run", "") for step in STEPS)
@@ -66,7 +78,9 @@ def test_every_system_and_version_is_tried() -> None:
 
 def test_it_runs_the_commands_of_the_readme() -> None:
     scripts = [step["run"].strip() for step in STEPS if "run" in step]
-    on_windows = command("test command").replace("/bin/", "/Scripts/").replace("python3 ", "python ")
+    on_windows = (
+        command("test command").replace("/bin/", "/Scripts/").replace("python3 ", "python ")
+    )
     assert scripts == [".ci/run", "\n".join(on_windows.split(" && ")), command("oldest versions")]
 
 
@@ -74,9 +88,24 @@ def test_every_dependency_states_the_oldest_version_tried() -> None:
     project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     stated = [*project["dependencies"], *(one for name in extras for one in extras[name])]
-    assert all(re.fullmatch(r"[A-Za-z0-9-]+>=[0-9.]+|ballplate\[[a-z,]+\]", one) for one in stated), stated
-    # What the tests take along is what the command above installs: all but what only benchmarks need.
-    tried = {"test", *re.findall(r"\w+", next(one for one in extras["test"] if one.startswith("ballplate["))[9:])}
-    tried |= {name for one in extras["docs"] if one.startswith("ballplate[") for name in re.findall(r"\w+", one[9:])}
+    assert all(
+        re.fullmatch(r"[A-Za-z0-9-]+>=[0-9.]+|ballplate\[[a-z,]+\]", one) for one in stated
+    ), stated
+    # What the tests take along is what the command above installs: all but what only benchmarks
+    # need.
+    tried = {
+        "test",
+        *re.findall(
+            r"\w+", next(one for one in extras["test"] if one.startswith("ballplate["))[9:]
+        ),
+    }
+    tried |= {
+        name
+        for one in extras["docs"]
+        if one.startswith("ballplate[")
+        for name in re.findall(r"\w+", one[9:])
+    }
     assert set(extras) - tried == {"benchmark"}
-    assert "3.11" in project["requires-python"] and command("oldest versions").startswith("python3.11 ")
+    assert "3.11" in project["requires-python"] and command("oldest versions").startswith(
+        "python3.11 "
+    )

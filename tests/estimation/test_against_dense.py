@@ -40,7 +40,9 @@ RELATIVE = 1e-9
 def with_points(design: Design, count: int = 15) -> Design:
     """The design with random evaluation points in its volume, read with a tip on the side."""
     unit = np.random.default_rng(7).random((count, 3))
-    return replace(design, points=design.lower + unit * (design.upper - design.lower), point_probe=1)
+    return replace(
+        design, points=design.lower + unit * (design.upper - design.lower), point_probe=1
+    )
 
 
 def grid_of_four() -> Design:
@@ -74,18 +76,24 @@ def unequal_axes() -> Design:
     """A repeatability of its own for each axis, and a volume that is no unit cube."""
     balls = grid(4)
     sigmas, lower, upper = (1e-7, 3e-7, 7e-7), (-0.1, 0.0, -0.2), (1.2, 1.05, 1.0)
-    return plate_design(balls, six_positions(), corner_sides(balls), repeatability=sigmas, lower=lower, upper=upper)
+    return plate_design(
+        balls, six_positions(), corner_sides(balls), repeatability=sigmas, lower=lower, upper=upper
+    )
 
 
 def repeats() -> Design:
     """Each reading taken once to four times."""
     design = grid_of_four()
     readings = design.readings
-    return replace(design, readings=replace(readings, repeats=1 + (np.arange(len(readings)) * 5) % 4))
+    return replace(
+        design, readings=replace(readings, repeats=1 + (np.arange(len(readings)) * 5) % 4)
+    )
 
 
 def some_balls_only() -> Design:
-    """The second and the last position read but a part of the balls, one ball there with one tip only."""
+    """The second and the last position read but a part of the balls, one ball there with one tip
+    only.
+    """
     design = grid_of_five()
     readings = design.readings
     missing = (readings.position == 1) & (readings.ball % 3 == 0)
@@ -95,7 +103,9 @@ def some_balls_only() -> Design:
 
 
 def planar_distances() -> Design:
-    """Distances of which only the first two co-ordinates count, with a few certified co-ordinates."""
+    """Distances of which only the first two co-ordinates count, with a few certified
+    co-ordinates.
+    """
     balls = grid(4) + np.array([0.0, 0.0, 0.02]) * (np.arange(16) % 3)[:, None]
     design = plate_design(balls, six_positions(), neighbours(grid(4)), coordinates=(0, 3, 12))
     flat = np.full(len(design.distances), 2)
@@ -252,8 +262,12 @@ def compare(design: Design, state: State, problem: dense.Problem, x: Real | None
         quantity, open_ = summary[symbol], np.isnan(expected[symbol])
         assert (quantity.count, quantity.undetermined) == (len(open_), open_.sum()), symbol
         if not open_.all():
-            assert quantity.maximum == pytest.approx(np.nanmax(expected[symbol]), rel=RELATIVE), symbol
-            assert quantity.average == pytest.approx(np.nanmean(expected[symbol]), rel=RELATIVE), symbol
+            assert quantity.maximum == pytest.approx(np.nanmax(expected[symbol]), rel=RELATIVE), (
+                symbol
+            )
+            assert quantity.average == pytest.approx(np.nanmean(expected[symbol]), rel=RELATIVE), (
+                symbol
+            )
     return found.deficiency
 
 
@@ -273,20 +287,27 @@ FULL_RANK = [
 ]
 
 
-@pytest.mark.parametrize(("make", "coefficients"), FULL_RANK, ids=lambda v: getattr(v, "__name__", f"NDEL{v}"))
-def test_every_uncertainty_of_a_design_of_full_rank(make: Callable[[], Design], coefficients: int) -> None:
+@pytest.mark.parametrize(
+    ("make", "coefficients"), FULL_RANK, ids=lambda v: getattr(v, "__name__", f"NDEL{v}")
+)
+def test_every_uncertainty_of_a_design_of_full_rank(
+    make: Callable[[], Design], coefficients: int
+) -> None:
     design = with_points(make())
     assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == 0
 
 
 @pytest.mark.parametrize(
-    ("make", "coefficients", "deficiency"), [(deficient_grid_of_four, 7, 6), (deficient_grid_of_seven, 10, 3)]
+    ("make", "coefficients", "deficiency"),
+    [(deficient_grid_of_four, 7, 6), (deficient_grid_of_seven, 10, 3)],
 )
 def test_rank_and_what_is_left_determined_of_a_deficient_design(
     make: Callable[[], Design], coefficients: int, deficiency: int
 ) -> None:
     design = with_points(make(), 8)
-    assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+    assert (
+        compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+    )
 
 
 @pytest.mark.parametrize(
@@ -297,15 +318,26 @@ def test_evaluation_points_some_at_a_time(
 ) -> None:
     monkeypatch.setattr("ballplate.simulator.estimation.functions.PLACES_AT_ONCE", 3)
     design = with_points(make(), 8)
-    assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+    assert (
+        compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
+    )
 
 
 @pytest.mark.parametrize(
     ("make", "coefficients"),
-    [(neighbour_distances, 5), (length_standard_by_distance, 5), (two_artefacts, 5), (deficient_grid_of_four, 7)],
+    [
+        (neighbour_distances, 5),
+        (length_standard_by_distance, 5),
+        (two_artefacts, 5),
+        (deficient_grid_of_four, 7),
+    ],
 )
-def test_covariances_of_functions_with_one_another(make: Callable[[], Design], coefficients: int) -> None:
-    """Of balls that distances tie together, of points, of parameters and of distances, all with all."""
+def test_covariances_of_functions_with_one_another(
+    make: Callable[[], Design], coefficients: int
+) -> None:
+    """Of balls that distances tie together, of points, of parameters and of distances, all with
+    all.
+    """
     design = with_points(make(), 8)
     found, problem = linearise(design), dense.planned(design, coefficients, 5)
     reference = dense.linearised(problem)
@@ -328,14 +360,19 @@ def test_covariances_of_functions_with_one_another(make: Callable[[], Design], c
         for other, right in zip(functions, jacobians, strict=True):
             size = np.outer(reference.of(left), reference.of(right))
             expected = left @ reference.covariance @ right.T
-            np.testing.assert_allclose(found.covariance(one, other) / size, expected / size, atol=1e-8)
+            np.testing.assert_allclose(
+                found.covariance(one, other) / size, expected / size, atol=1e-8
+            )
 
 
 @pytest.mark.parametrize(
-    "make", [unequal_axes, length_standard_by_distance, length_standard_by_projection, two_artefacts]
+    "make",
+    [unequal_axes, length_standard_by_distance, length_standard_by_projection, two_artefacts],
 )
 def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], Design]) -> None:
-    """Balls, poses, machine errors and readings off nominal: uncertainties, S^2 and the Newton step."""
+    """Balls, poses, machine errors and readings off nominal: uncertainties, S^2 and the Newton
+    step.
+    """
     design = with_points(make(), 8)
     random = np.random.default_rng(3)
     nominal = nominal_state(design)
@@ -375,7 +412,9 @@ def test_away_from_the_nominal_point_with_errors_and_scatter(make: Callable[[], 
 
 
 def in_reference_basis(problem: dense.Problem, design: Design, a: Real) -> Real:
-    """The same error functions in the reference's coefficients, by way of the monomials both can report."""
+    """The same error functions in the reference's coefficients, by way of the monomials both can
+    report.
+    """
     monomials = design.model.reported().matrix @ a
     found, start = [], 0
     for function in problem.functions:

@@ -1,4 +1,6 @@
-"""Ball bars and Bryan gauges against closed forms, differences, and a fit that shares no code with ours."""
+"""Ball bars and Bryan gauges against closed forms, differences, and a fit that shares no code with
+ours.
+"""
 
 from __future__ import annotations
 
@@ -50,14 +52,35 @@ def truth_of(experiment: Experiment, design: Design) -> tuple[Design, State]:
 BOTH = {
     "artefacts": {
         "bar": {"kind": "two_spheres", "length": "400 mm", "role": "length_standard"},
-        "gauge": {"kind": "bryan_gauge", "radius": "300 mm", "directions": {"random": 12, "lowest": "10 deg"}},
-        "short": {"kind": "bryan_gauge", "radius": "200 mm", "directions": {"random": 6, "seed": 2}},
+        "gauge": {
+            "kind": "bryan_gauge",
+            "radius": "300 mm",
+            "directions": {"random": 12, "lowest": "10 deg"},
+        },
+        "short": {
+            "kind": "bryan_gauge",
+            "radius": "200 mm",
+            "directions": {"random": 6, "seed": 2},
+        },
     },
-    "probes": {"magnet": ["0 mm", "0 mm", "0 mm"], "other": {"offset": ["0 mm", "0 mm", "-50 mm"], "unknown": True}},
+    "probes": {
+        "magnet": ["0 mm", "0 mm", "0 mm"],
+        "other": {"offset": ["0 mm", "0 mm", "-50 mm"], "unknown": True},
+    },
     "positions": [
-        {"name": "bar", "artefact": "bar", "pose": {"origin": ["100 mm", "100 mm", "100 mm"]}, "probes": ["magnet"]},
+        {
+            "name": "bar",
+            "artefact": "bar",
+            "pose": {"origin": ["100 mm", "100 mm", "100 mm"]},
+            "probes": ["magnet"],
+        },
         *(
-            {"name": name, "artefact": gauge, "pose": {"origin": [x, "400 mm", "150 mm"]}, "probes": [probe]}
+            {
+                "name": name,
+                "artefact": gauge,
+                "pose": {"origin": [x, "400 mm", "150 mm"]},
+                "probes": [probe],
+            }
             for name, gauge, x, probe in (
                 ("left", "gauge", "350 mm", "magnet"),
                 ("right", "gauge", "650 mm", "other"),
@@ -65,12 +88,16 @@ BOTH = {
             )
         ),
     ],
-    "calibration": [{"kind": "radius", "artefact": "gauge", "standard_uncertainty": "2 um", "value": "300.1 mm"}],
+    "calibration": [
+        {"kind": "radius", "artefact": "gauge", "standard_uncertainty": "2 um", "value": "300.1 mm"}
+    ],
 }
 
 
 def test_rows_are_derivatives(tmp_path: Path) -> None:
-    """By machine errors, pivots, probe offsets and unknown lengths together, certificates shared."""
+    """By machine errors, pivots, probe offsets and unknown lengths together, certificates
+    shared.
+    """
     experiment = changed(tmp_path, "bryan-gauge", **BOTH)
     design = lay_out(experiment)
     layout = shared_layout(design)
@@ -85,7 +112,9 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
     def residual(step: np.ndarray) -> np.ndarray:
         still = np.zeros_like(design.balls)
         arguments = (step, still, layout.model, layout.offset_columns, layout.lengths)
-        return length_shared_rows(design, layout, moved(design, state, layout.pose_columns, *arguments), x)[0]
+        return length_shared_rows(
+            design, layout, moved(design, state, layout.pose_columns, *arguments), x
+        )[0]
 
     state = replace(nominal_state(design), a=1e-4 * generator.standard_normal(6))
     expected = central_difference(residual, np.zeros(len(layout)), 1e-6)
@@ -93,15 +122,22 @@ def test_rows_are_derivatives(tmp_path: Path) -> None:
 
 
 def test_one_bar_along_one_axis_has_the_uncertainty_of_the_closed_form(tmp_path: Path) -> None:
-    places = [{"name": str(k), "pose": {"origin": ["250 mm", f"{100 * k} mm", "300 mm"]}} for k in range(1, 6)]
+    places = [
+        {"name": str(k), "pose": {"origin": ["250 mm", f"{100 * k} mm", "300 mm"]}}
+        for k in range(1, 6)
+    ]
     found = predict(changed(tmp_path, "bar-bell", positions=places))
     assert found.verdict.deficiency == 5
     # The mean of five lengths whose ends have 1 um each, on a certificate with 0.5 um.
-    assert found.quantities["U3 ratios"].maximum == pytest.approx(np.sqrt(2e-12 / 5 + 0.25e-12) / 0.5, rel=1e-9)
+    assert found.quantities["U3 ratios"].maximum == pytest.approx(
+        np.sqrt(2e-12 / 5 + 0.25e-12) / 0.5, rel=1e-9
+    )
 
 
 def directions(parameters: np.ndarray) -> np.ndarray:
-    """Axes of a machine with scale errors and angles, written down anew: columns are what a unit of reading moves."""
+    """Axes of a machine with scale errors and angles, written down anew: columns are what a unit of
+    reading moves.
+    """
     sx, sy, sz, c, b, a = parameters
     y = np.array([np.cos(np.pi / 2 + c), np.sin(np.pi / 2 + c), 0.0])
     z0 = np.cos(np.pi / 2 - b)
@@ -136,11 +172,20 @@ def test_the_fit_is_the_one_of_scipy(variant: str, tmp_path: Path) -> None:
             lengths = [np.linalg.norm(axes @ (x[2 * k] - x[2 * k + 1])) for k in range(12)]
         else:
             centres = design.origins + unknown[7:].reshape(pivots, 3)
-            lengths = [np.linalg.norm(axes @ p - centres[k]) for k, p in zip(readings.position, x, strict=True)]
+            lengths = [
+                np.linalg.norm(axes @ p - centres[k])
+                for k, p in zip(readings.position, x, strict=True)
+            ]
         return np.append((np.array(lengths) - radius) / noise, unknown[6] / 0.5e-6)
 
     theirs = least_squares(
-        residual, np.zeros(7 + 3 * pivots), "3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15
+        residual,
+        np.zeros(7 + 3 * pivots),
+        "3-point",
+        x_scale="jac",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
     )
     spread = np.sqrt(np.diag(np.linalg.inv(theirs.jac.T @ theirs.jac)))
     ours = {e.name: e for e in found.estimates}
@@ -154,7 +199,10 @@ def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
     observed = FOLDER / "bryan-gauge-readings.csv"
     unknown = shipped("bryan-gauge", "radius unknown")
     badly = changed(
-        tmp_path, "bryan-gauge", calibration=[{"kind": "radius", "standard_uncertainty": "20 um"}], seed=151
+        tmp_path,
+        "bryan-gauge",
+        calibration=[{"kind": "radius", "standard_uncertainty": "20 um"}],
+        seed=151,
     )
     found = [fit(one, read_readings(observed, lay_out(one)), "given") for one in (unknown, badly)]
     assert [one.verdict.deficiency for one in found] == [1, 0]
@@ -165,18 +213,28 @@ def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
     for name, angle in (("C0Y", "angle xy"), ("B0Z", "angle xz"), ("A0Z", "angle yz")):
         excess = -1.0 if name == "B0Z" else 1.0
         assert excess * left[angle].value == pytest.approx(right[name].value, abs=1e-9)
-        assert left[angle].standard_uncertainty == pytest.approx(right[name].standard_uncertainty, rel=1e-4)
+        assert left[angle].standard_uncertainty == pytest.approx(
+            right[name].standard_uncertainty, rel=1e-4
+        )
     difference = right["scale y"].value - right["scale x"].value
     assert left["scale y - scale x"].value == pytest.approx(difference, abs=1e-9)
 
 
 def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
-    """Readings of other directions than drawn, of a pivot that stands elsewhere, fit just as well."""
+    """Readings of other directions than drawn, of a pivot that stands elsewhere, fit just as
+    well.
+    """
     drawn = changed(tmp_path, "bryan-gauge")
     really = changed(
         tmp_path,
         "bryan-gauge",
-        artefacts={"gauge": {"kind": "bryan_gauge", "radius": "300 mm", "directions": {"random": 60, "seed": 4}}},
+        artefacts={
+            "gauge": {
+                "kind": "bryan_gauge",
+                "radius": "300 mm",
+                "directions": {"random": 60, "seed": 4},
+            }
+        },
         positions=[{"name": "pivot", "pose": {"origin": ["480 mm", "430 mm", "120 mm"]}}],
     )
     design = lay_out(really)
@@ -186,11 +244,17 @@ def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
         write_readings(stream, design, readings, x)
     found = fit(drawn, read_readings(tmp_path / "r.csv", lay_out(drawn)), "given")
     values = {e.name: e.value for e in found.estimates}
-    np.testing.assert_allclose([values[p.name] for p in design.model.parameters], truth.a, rtol=0, atol=1e-10)
-    assert [values[f"pivot: origin {axis}"] for axis in "xyz"] == pytest.approx([0.48, 0.43, 0.12], abs=1e-10)
+    np.testing.assert_allclose(
+        [values[p.name] for p in design.model.parameters], truth.a, rtol=0, atol=1e-10
+    )
+    assert [values[f"pivot: origin {axis}"] for axis in "xyz"] == pytest.approx(
+        [0.48, 0.43, 0.12], abs=1e-10
+    )
     uncertainty = {e.name: e.standard_uncertainty for e in found.estimates}
     planned = predict(really).quantities["U3"]
-    assert max(uncertainty[p.name] for p in design.model.parameters) == pytest.approx(planned.maximum, rel=1e-3)
+    assert max(uncertainty[p.name] for p in design.model.parameters) == pytest.approx(
+        planned.maximum, rel=1e-3
+    )
 
 
 def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
@@ -198,12 +262,16 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
         changed(
             tmp_path,
             "bryan-gauge",
-            positions=[{"name": "pivot", "pose": {"origin": ["500 mm", "400 mm", "100 mm"]}, "repeats": k}],
+            positions=[
+                {"name": "pivot", "pose": {"origin": ["500 mm", "400 mm", "100 mm"]}, "repeats": k}
+            ],
         )
         for k in (1, 2)
     )
     known = predict(twice).quantities["U3 angles"].maximum
-    assert known == pytest.approx(predict(once).quantities["U3 angles"].maximum / np.sqrt(2.0), rel=1e-9)
+    assert known == pytest.approx(
+        predict(once).quantities["U3 angles"].maximum / np.sqrt(2.0), rel=1e-9
+    )
     design = lay_out(twice)
     readings, x = exact_readings(*truth_of(twice, design))
     # The second time the ball stands 20 mm to the side of the first on the same sphere.
@@ -213,11 +281,15 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
     with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
         write_readings(stream, design, readings, x)
     observed = read_readings(tmp_path / "r.csv", design)
-    assert len(observed.design.lengths) == 120 and len(np.unique(observed.design.lengths.first)) == 120
+    assert (
+        len(observed.design.lengths) == 120 and len(np.unique(observed.design.lengths.first)) == 120
+    )
 
 
 def test_a_bar_whose_ends_are_plate_balls_turns_about_itself_for_nobody(tmp_path: Path) -> None:
-    """As a plate, too, the two balls say nothing of the turn about their line, and it is no parameter."""
+    """As a plate, too, the two balls say nothing of the turn about their line, and it is no
+    parameter.
+    """
     as_plate = changed(
         tmp_path, "bar-bell", artefacts={"bar": {"kind": "two_spheres", "length": "500 mm"}}, calibration=[
             {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.5 um"}
@@ -226,7 +298,9 @@ def test_a_bar_whose_ends_are_plate_balls_turns_about_itself_for_nobody(tmp_path
     found, alone = predict(as_plate), predict(shipped("bar-bell", "length known"))
     assert found.verdict.deficiency == 0
     for symbol in ("U3 ratios", "U3 angles"):
-        assert found.quantities[symbol].maximum == pytest.approx(alone.quantities[symbol].maximum, rel=1e-6)
+        assert found.quantities[symbol].maximum == pytest.approx(
+            alone.quantities[symbol].maximum, rel=1e-6
+        )
 
 
 def test_a_sphere_through_points(tmp_path: Path) -> None:
@@ -236,9 +310,13 @@ def test_a_sphere_through_points(tmp_path: Path) -> None:
     centre, radius = fit_sphere([1.0, 2.0, 3.0] + 0.25 * directions, np.zeros(3))
     np.testing.assert_allclose(centre, [1.0, 2.0, 3.0], rtol=0, atol=1e-14)
     assert radius == pytest.approx(0.25, abs=1e-14)
-    flat = np.array([1.0, 2.0, 3.0]) + 0.25 * np.column_stack([np.cos(range(9)), np.sin(range(9)), np.zeros(9)])
+    flat = np.array([1.0, 2.0, 3.0]) + 0.25 * np.column_stack(
+        [np.cos(range(9)), np.sin(range(9)), np.zeros(9)]
+    )
     # Points on a circle leave the height of the centre as it is.
-    np.testing.assert_allclose(fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14)
+    np.testing.assert_allclose(
+        fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14
+    )
 
 
 def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path) -> None:
@@ -260,5 +338,7 @@ def test_true_gauges_have_the_certified_radius(tmp_path: Path) -> None:
     design = lay_out(changed(tmp_path, "bryan-gauge", **BOTH))
     drawn = np.linalg.norm(true_artefacts(design, np.random.default_rng(1)), axis=1)
     of_gauge = design.ball_artefact == 1
-    assert len(set(drawn[of_gauge].round(12))) == 1 and 1e-7 < abs(drawn[of_gauge][0] - 0.3001) < 1e-5
+    assert (
+        len(set(drawn[of_gauge].round(12))) == 1 and 1e-7 < abs(drawn[of_gauge][0] - 0.3001) < 1e-5
+    )
     np.testing.assert_allclose(drawn[design.ball_artefact == 2], 0.2, rtol=1e-12)

@@ -25,21 +25,27 @@ CERTIFICATES = {
     "x": "[{kind: coordinates, balls: all, standard_uncertainty: {x: 0.1 um}}]",
     "first": "[{kind: coordinates, balls: [b1], standard_uncertainty: 0.1 um}]",
 }
-POSES = ("[0 deg, 0 deg, 20 deg]", "[40 deg, -20 deg, 70 deg]", "[-10 deg, 50 deg, 10 deg]", "[0 deg, -50 deg, 10 deg]")
+POSES = (
+    "[0 deg, 0 deg, 20 deg]",
+    "[40 deg, -20 deg, 70 deg]",
+    "[-10 deg, 50 deg, 10 deg]",
+    "[0 deg, -50 deg, 10 deg]",
+)
 
 
 def experiment_file(folder: Path, layout: str, certificate: str, first: int = 0) -> Path:
     poses = [*POSES[first:], *POSES[:first]]
     places = "".join(
-        f"  - {{name: p{POSES.index(pose)}, pose: {{origin: [300 mm, 400 mm, 400 mm], rotation: {pose}}}}}\n"
+        f"  - {{name: p{POSES.index(pose)}, pose: {{origin: [300 mm, 400 mm, 400 mm], rotation:"
+        f" {pose}}}}}\n"
         for pose in poses
     )
     path = folder / "e.yaml"
     path.write_text(
-        "title: t\nmachine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\n"
-        "error_model: {kind: kinematic, position_coefficients: 2, rotation_coefficients: 1}\n"
-        f"probes: {{down: [0 mm, 0 mm, -50 mm]}}\nartefacts: {{plate: {{kind: balls, coordinates: {layout}}}}}\n"
-        f"positions:\n{places}calibration: {certificate}\n",
+        "title: t\nmachine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\nerror_model:"
+        " {kind: kinematic, position_coefficients: 2, rotation_coefficients: 1}\nprobes: {down:"
+        " [0 mm, 0 mm, -50 mm]}\nartefacts: {plate: {kind: balls, coordinates:"
+        f" {layout}}}}}\npositions:\n{places}calibration: {certificate}\n",
         encoding="utf-8",
     )
     return path
@@ -51,7 +57,9 @@ def named(coordinates: str) -> str:
 
 
 def dense(design: Design) -> np.ndarray:
-    """Derivatives of readings and certificates by balls, by all six parameters of every pose, and by the machine."""
+    """Derivatives of readings and certificates by balls, by all six parameters of every pose, and
+    by the machine.
+    """
     n, k, readings = len(design.balls), len(design.position_names), design.readings
     blocks = reading_blocks(design, nominal_state(design), readings, None)
     rows = np.zeros((len(readings), 3, 3 * n + 6 * k + len(design.model.parameters)))
@@ -66,9 +74,15 @@ def dense(design: Design) -> np.ndarray:
 
 @pytest.mark.parametrize("certificate", CERTIFICATES)
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_what_is_held_takes_no_observation_away(layout: str, certificate: str, tmp_path: Path) -> None:
-    """The rank of all parameters, poses whole, is that of the free ones: nothing too much or too little is held."""
-    (experiment,) = load(experiment_file(tmp_path, named(LAYOUTS[layout]), CERTIFICATES[certificate]))
+def test_what_is_held_takes_no_observation_away(
+    layout: str, certificate: str, tmp_path: Path
+) -> None:
+    """The rank of all parameters, poses whole, is that of the free ones: nothing too much or too
+    little is held.
+    """
+    (experiment,) = load(
+        experiment_file(tmp_path, named(LAYOUTS[layout]), CERTIFICATES[certificate])
+    )
     design = lay_out(experiment)
     whole = dense(design)
     poses = 3 * len(design.balls) + np.flatnonzero(design.held)
@@ -79,7 +93,8 @@ def test_what_is_held_takes_no_observation_away(layout: str, certificate: str, t
         return int((values > 1e-9 * values[0]).sum())
 
     assert rank(held) == rank(whole)
-    # The machine's own errors apart, no motion is left: what is open of the whole is a frame, or a turn unseen.
+    # The machine's own errors apart, no motion is left: what is open of the whole is a frame, or a
+    # turn unseen.
     model = len(design.model.parameters)
     of_artefact = held[:, : held.shape[1] - model]
     assert rank(of_artefact) == of_artefact.shape[1]
@@ -92,4 +107,6 @@ def test_the_order_of_positions_does_not_matter(layout: str, tmp_path: Path) -> 
         path = experiment_file(tmp_path, named(LAYOUTS[layout]), CERTIFICATES["all"], first)
         found.append(predict(load(path)[0]).quantities)
     for symbol in ("U4", "U5", "U6"):
-        assert found[0][symbol].average == pytest.approx(found[1][symbol].average, rel=1e-9, nan_ok=True)
+        assert found[0][symbol].average == pytest.approx(
+            found[1][symbol].average, rel=1e-9, nan_ok=True
+        )

@@ -1,4 +1,6 @@
-"""The non-linear estimate: exact data come back, in few iterations, from starting values of the readings alone."""
+"""The non-linear estimate: exact data come back, in few iterations, from starting values of the
+readings alone.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,12 @@ from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings, scale_readings
+from ballplate.simulator.readings.generate import (
+    exact_readings,
+    noisy_certificate,
+    noisy_readings,
+    scale_readings,
+)
 
 from tests.reference.designs import corner_sides, grid, plate_design, six_positions
 
@@ -59,7 +66,9 @@ def design_with(calibration: str, full: bool = False) -> Design:
         corner_sides(balls) if calibration == "distances" else (),
         range(25) if calibration == "coordinates" else (),
     )
-    return replace(built, model=kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1), full))
+    return replace(
+        built, model=kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1), full)
+    )
 
 
 @pytest.mark.parametrize("calibration", ["distances", "coordinates"])
@@ -121,7 +130,8 @@ def test_deficient_designs_leave_what_is_open_where_it_was() -> None:
     design = exactly_calibrated(design, truth)
     readings, x = exact_readings(design, truth)
     solution = gauss_newton(replace(design, readings=readings), x, initial_state(design, x))
-    # Away from zero error the six directions are no longer open exactly, so that they may only be weak.
+    # Away from zero error the six directions are no longer open exactly, so that they may only be
+    # weak.
     assert solution.factor.sum_of_squares < 1e-12 * solution.iterations[0].sum_of_squares
     assert np.abs(solution.state.a).max() < 1e-2
 
@@ -158,7 +168,9 @@ def test_noise_has_the_stated_size_and_seed() -> None:
 
 def test_repeats_give_a_row_each() -> None:
     design = design_with("distances")
-    design = replace(design, readings=replace(design.readings, repeats=np.full(len(design.readings), 3)))
+    design = replace(
+        design, readings=replace(design.readings, repeats=np.full(len(design.readings), 3))
+    )
     readings, x = exact_readings(design, truth_of(design))
     assert len(x) == len(readings) == 750 and set(readings.repeats) == {1}
 

@@ -1,6 +1,7 @@
 """Lengths that share readings, against dense computations and data sets drawn as they come about.
 
-The dense reference has the full covariance of all lengths and its pseudo-inverse; ours goes by positions.
+The dense reference has the full covariance of all lengths and its pseudo-inverse; ours goes by
+positions.
 """
 
 from __future__ import annotations
@@ -46,11 +47,16 @@ COARSE: dict[str, Any] = {"error_model": {"kind": "metric"}}
 
 
 def consecutive(balls: int) -> dict[str, Any]:
-    return {"pairs": [[f"b{k}", f"b{k + 1}"] for k in range(balls - 1)], "standard_uncertainty": "0.3 um"}
+    return {
+        "pairs": [[f"b{k}", f"b{k + 1}"] for k in range(balls - 1)],
+        "standard_uncertainty": "0.3 um",
+    }
 
 
 def some_of_it() -> list[dict[str, Any]]:
-    """Positions in which different balls of a bar are read, more often than once, with one probe or two."""
+    """Positions in which different balls of a bar are read, more often than once, with one probe or
+    two.
+    """
     return [
         {"balls": ["b0", "b1", "b2"], "probes": ["down"], "repeats": 2},
         {"balls": ["b0", "b2", "b3"], "probes": ["down", "right"]},
@@ -61,7 +67,9 @@ def some_of_it() -> list[dict[str, Any]]:
 
 
 def twice_certified() -> list[dict[str, Any]]:
-    """Two certificates of one bar: of all its lengths, and of some again, one of these each time anew."""
+    """Two certificates of one bar: of all its lengths, and of some again, one of these each time
+    anew.
+    """
     return [
         ALL,
         {"pairs": [["b0", "b1"], ["b1", "b3"]], "standard_uncertainty": "0.4 um"},
@@ -77,7 +85,9 @@ CASES: dict[str, Make] = {
     "six balls, consecutive pairs": lambda folder: experiment(folder, bar(6), consecutive(6)),
     "plate, all pairs": lambda folder: experiment(folder, flat(3), ALL),
     "plate, all pairs projected": lambda folder: experiment(folder, flat(3), PROJECTED),
-    "plate, neighbours": lambda folder: experiment(folder, flat(3), {**GROWING, "pairs": "neighbours"}),
+    "plate, neighbours": lambda folder: experiment(
+        folder, flat(3), {**GROWING, "pairs": "neighbours"}
+    ),
     "six balls in space": lambda folder: experiment(folder, spatial(), GROWING),
     "some balls only": lambda folder: experiment(folder, bar(4), GROWING, some_of_it()),
     "two certificates": lambda folder: experiment(folder, bar(4), twice_certified(), some_of_it()),
@@ -97,12 +107,18 @@ def test_a_larger_plate_is_that_of_the_full_covariance(pairs: str, tmp_path: Pat
 
 def assert_as_dense(design: Design) -> None:
     assert compare(design, nominal_state(design), dense.planned(design, 3, 2)) == 0
-    assert len(design.length_whitening) == np.linalg.matrix_rank(dense.length_covariance(design), 1e-21)
+    assert len(design.length_whitening) == np.linalg.matrix_rank(
+        dense.length_covariance(design), 1e-21
+    )
 
 
-@pytest.mark.parametrize("name", ["three balls, projected", "six balls, all pairs", "plate, all pairs"])
+@pytest.mark.parametrize(
+    "name", ["three balls, projected", "six balls, all pairs", "plate, all pairs"]
+)
 def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) -> None:
-    """Uncertainties, S^2 and the Newton step, of standards whose lengths are as consistent as in reality."""
+    """Uncertainties, S^2 and the Newton step, of standards whose lengths are as consistent as in
+    reality.
+    """
     design = lay_out(CASES[name](tmp_path))
     random, nominal = np.random.default_rng(3), nominal_state(design)
     of_plate = np.zeros((len(design.balls), 1))
@@ -111,17 +127,22 @@ def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) 
     state = State(
         nominal.balls + 1e-5 * of_plate * random.standard_normal(nominal.balls.shape),
         rotation_from_vector(turn) @ nominal.rotations,
-        nominal.origins + 1e-4 * random.standard_normal(nominal.origins.shape) * ~design.held[:, :3],
+        nominal.origins
+        + 1e-4 * random.standard_normal(nominal.origins.shape) * ~design.held[:, :3],
         1e-5 * random.standard_normal(nominal.a.shape),
     )
     scatter = random.standard_normal((len(design.readings), 3))
     x = expected_readings(design, nominal, design.readings) + 1e-6 * scatter
-    error = random.standard_normal(len(np.unique(design.lengths.certificate)))[design.lengths.certificate]
+    error = random.standard_normal(len(np.unique(design.lengths.certificate)))[
+        design.lengths.certificate
+    ]
     value = design.lengths.value + design.lengths.uncertainty * error
     design = replace(design, lengths=replace(design.lengths, value=value))
     problem = dense.planned(design, 3, 2)
     a = in_reference_basis(problem, design, state.a)
-    problem = replace(problem, scales=x, rotations=state.rotations, origins=state.origins, balls=state.balls, a=a)
+    problem = replace(
+        problem, scales=x, rotations=state.rotations, origins=state.origins, balls=state.balls, a=a
+    )
     assert compare(design, state, problem, x) == 0
     layout = shared_layout(design)
     factor = eliminate(design, layout, state, x)
@@ -168,7 +189,13 @@ CASES_AND_PLANE = CASES | {"plane": in_a_plane}
 
 @pytest.mark.parametrize(
     "name",
-    ["three balls, all pairs", "six balls, all pairs", "plate, all pairs projected", "two certificates", "plane"],
+    [
+        "three balls, all pairs",
+        "six balls, all pairs",
+        "plate, all pairs projected",
+        "two certificates",
+        "plane",
+    ],
 )
 def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -> None:
     """W'W is the pseudo-inverse of the covariance, W by itself and its transpose."""
@@ -177,10 +204,14 @@ def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -
     covariance = 1e12 * dense.length_covariance(design)
     twice = 1e-12 * white.pulled(white.whitened(np.eye(m)))
     expected = np.linalg.pinv(covariance, rcond=1e-12, hermitian=True)
-    np.testing.assert_allclose(covariance @ twice @ covariance, covariance, atol=1e-9 * np.abs(covariance).max())
+    np.testing.assert_allclose(
+        covariance @ twice @ covariance, covariance, atol=1e-9 * np.abs(covariance).max()
+    )
     # Outside the range of the covariance nothing is ever observed, so that roots may differ there.
     within = covariance @ expected
-    np.testing.assert_allclose(within @ twice @ within, expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        within @ twice @ within, expected, atol=1e-9 * np.abs(expected).max()
+    )
     whitened = white.whitened(white.whitened(1e-12 * covariance).T)
     np.testing.assert_allclose(whitened, np.eye(len(white)), atol=1e-9)
 
@@ -210,7 +241,9 @@ FULL = {
     ],
     ids=["two", "three", "six", "consecutive", "plate", "projected", "space"],
 )
-def test_replicates_scatter_as_stated(standard: dict[str, Any], known: dict[str, Any], tmp_path: Path) -> None:
+def test_replicates_scatter_as_stated(
+    standard: dict[str, Any], known: dict[str, Any], tmp_path: Path
+) -> None:
     """Readings are drawn, and lengths formed of them; so is one error of each certificate."""
     assert_honest(experiment(tmp_path, standard, known, **TRUE), 2048)
 
@@ -221,7 +254,9 @@ def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("standard", [bar(6), flat(4)], ids=["six", "plate"])
-def test_many_replicates_of_a_model_that_is_not_linear(standard: dict[str, Any], tmp_path: Path) -> None:
+def test_many_replicates_of_a_model_that_is_not_linear(
+    standard: dict[str, Any], tmp_path: Path
+) -> None:
     assert_honest(experiment(tmp_path, standard, ALL, **TRUE, **FULL), 1024)
 
 
@@ -239,15 +274,20 @@ def assert_honest(made: Experiment, count: int) -> None:
     assert abs(misfit.rejected.value - 0.05) < 4 * misfit.rejected.error
 
 
-def physical(made: Experiment, generator: np.random.Generator) -> tuple[Design, Real, Design, State]:
-    """Readings of a true standard, and certificates that err about it, without any of the program's random numbers.
+def physical(
+    made: Experiment, generator: np.random.Generator
+) -> tuple[Design, Real, Design, State]:
+    """Readings of a true standard, and certificates that err about it, without any of the program's
+    random numbers.
 
-    The standard's balls are off the drawing by 20 um, and each certified length by its uncertainty from what it truly
-    is; the design has a reading for each of the readings drawn.
+    The standard's balls are off the drawing by 20 um, and each certified length by its uncertainty
+    from what it truly is; the design has a reading for each of the readings drawn.
     """
     design = lay_out(made)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(made.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(made.true_machine, design.model, *corners)
+    )
     balls = truth.balls.copy()
     balls[~design.is_plate[design.ball_artefact]] += 2e-5 * generator.standard_normal(3)
     off = 2e-5 * generator.standard_normal(balls.shape)
@@ -270,8 +310,12 @@ def physical(made: Experiment, generator: np.random.Generator) -> tuple[Design, 
     [(bar(6), GROWING), (flat(2), ALL)],
     ids=["six", "plate"],
 )
-def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[str, Any], tmp_path: Path) -> None:
-    """Over 80 data sets each parameter scatters by its uncertainty, and S^2 about its degrees of freedom."""
+def test_fits_of_readings_drawn_by_hand(
+    standard: dict[str, Any], known: dict[str, Any], tmp_path: Path
+) -> None:
+    """Over 80 data sets each parameter scatters by its uncertainty, and S^2 about its degrees of
+    freedom.
+    """
     made = experiment(tmp_path, standard, known, **COARSE, **TRUE_METRIC)
     uncertainty = {name: one.maximum for name, one in predict(made).quantities.items()}
     generator, errors, squares = np.random.default_rng(4), [], []
@@ -287,7 +331,8 @@ def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[st
     root = spectrum(eliminate(design, layout, state)).root[layout.model]
     stated = root @ root.T
     assert np.sqrt(np.diag(stated)[:3].max()) == pytest.approx(uncertainty["U3 ratios"], rel=1e-9)
-    # The sum of squares in units of the stated covariance is chi-square with six degrees of freedom for each data set.
+    # The sum of squares in units of the stated covariance is chi-square with six degrees of freedom
+    # for each data set.
     total = float(np.einsum("ri,ij,rj->", errors, np.linalg.inv(stated), errors))
     expected = 6 * count
     assert abs(total - expected) < 4 * np.sqrt(2 * expected)
@@ -295,12 +340,18 @@ def test_fits_of_readings_drawn_by_hand(standard: dict[str, Any], known: dict[st
     assert abs(np.mean(squares) - freedom) < 4 * np.sqrt(2 * freedom / count)
 
 
-TRUE_METRIC = {"true_machine": {"kind": "coefficients", "values": {"scale x": "20 ppm", "C0Y": "30 urad"}}}
+TRUE_METRIC = {
+    "true_machine": {"kind": "coefficients", "values": {"scale x": "20 ppm", "C0Y": "30 urad"}}
+}
 
 
 @pytest.mark.parametrize("estimator", get_args(RivalName))
-def test_estimators_of_distances_take_the_same_lengths(estimator: RivalName, tmp_path: Path) -> None:
-    """Without a plate the lengths are all there is, and every estimator is the weighted one of the dense covariance."""
+def test_estimators_of_distances_take_the_same_lengths(
+    estimator: RivalName, tmp_path: Path
+) -> None:
+    """Without a plate the lengths are all there is, and every estimator is the weighted one of the
+    dense covariance.
+    """
     made = experiment(tmp_path, flat(3), GROWING, **COARSE, **TRUE_METRIC)
     design, x, _, _ = physical(made, np.random.default_rng(8))
     alone = without_plate(design)
@@ -318,8 +369,13 @@ def without_plate(design: Design) -> Design:
 
 
 def weighted(design: Design, x: Real) -> tuple[Real, Real]:
-    """Gauss-Newton on the lengths alone, with the pseudo-inverse of their covariance: values and uncertainties."""
-    given, inverse = design.lengths, np.linalg.pinv(1e12 * dense.length_covariance(design), 1e-12, hermitian=True)
+    """Gauss-Newton on the lengths alone, with the pseudo-inverse of their covariance: values and
+    uncertainties.
+    """
+    given, inverse = (
+        design.lengths,
+        np.linalg.pinv(1e12 * dense.length_covariance(design), 1e-12, hermitian=True),
+    )
 
     def off(a: Real) -> Real:
         seen = x + design.model.error(x, a, design.probes[design.readings.probe])
@@ -332,8 +388,12 @@ def weighted(design: Design, x: Real) -> tuple[Real, Real]:
     return a, np.sqrt(np.diag(np.linalg.inv(rows.T @ inverse @ rows)))
 
 
-@pytest.mark.parametrize(("pairs", "lengths", "independent"), [("corner sides", 4, 4), ("all", 6, 5)])
-def test_length_equations_of_shared_balls(pairs: str, lengths: int, independent: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("pairs", "lengths", "independent"), [("corner sides", 4, 4), ("all", 6, 5)]
+)
+def test_length_equations_of_shared_balls(
+    pairs: str, lengths: int, independent: int, tmp_path: Path
+) -> None:
     """Of four balls in a plane, whose six distances are five pieces of information."""
     known = {"pairs": pairs, "standard_uncertainty": "0.1 um"}
     made = experiment(tmp_path, flat(2), known, machine=MACHINE, **COARSE, **TRUE_METRIC)
@@ -345,12 +405,17 @@ def test_length_equations_of_shared_balls(pairs: str, lengths: int, independent:
     given = design.lengths
     seen = x + design.probes[design.readings.probe]
     difference = seen[given.first] - seen[given.second]
-    rows = np.stack([difference[:, i] * difference[:, j] for i in range(3) for j in range(3)], axis=1)
+    rows = np.stack(
+        [difference[:, i] * difference[:, j] for i in range(3) for j in range(3)], axis=1
+    )
     rows = rows[:, [0, 1, 2, 4, 5, 8]] * [1, 2, 2, 1, 2, 1]
     off = (difference**2).sum(axis=1) - given.value**2
-    # The noise of an equation is 2 D (n - m); it is the same in all three co-ordinates of all readings.
+    # The noise of an equation is 2 D (n - m); it is the same in all three co-ordinates of all
+    # readings.
     noise = np.zeros((len(given), 3 * len(seen)))
-    for k, (first, second, along) in enumerate(zip(given.first, given.second, given.direction, strict=True)):
+    for k, (first, second, along) in enumerate(
+        zip(given.first, given.second, given.direction, strict=True)
+    ):
         for sign, end in ((2.0, first), (-2.0, second)):
             noise[k, 3 * end : 3 * end + 3] = sign * along * given.value[k]
     assert len(given) == lengths * len(POSES)
@@ -366,12 +431,17 @@ def test_a_ball_a_little_off_the_line_counts_as_in_line(tmp_path: Path) -> None:
     """What it would add to first order is less than what nobody knows of its place."""
     crooked = bar(3)
     crooked["coordinates"]["b1"][1] = "0.003 mm"
-    found = [predict(experiment(tmp_path, one, ALL)).quantities["U6"].average for one in (bar(3), crooked)]
+    found = [
+        predict(experiment(tmp_path, one, ALL)).quantities["U6"].average
+        for one in (bar(3), crooked)
+    ]
     assert found[1] == pytest.approx(found[0], rel=1e-4)
 
 
 def test_lengths_that_follow_from_others_tell_nothing_of_the_machine(tmp_path: Path) -> None:
-    """With certificates that are all but exact, the outer length of three balls follows from the other two."""
+    """With certificates that are all but exact, the outer length of three balls follows from the
+    other two.
+    """
     exact = {"standard_uncertainty": "1 pm"}
     every = experiment(tmp_path, bar(3), {"pairs": "all"} | exact)
     two = experiment(tmp_path, bar(3), {"pairs": [["b0", "b1"], ["b1", "b2"]]} | exact)
@@ -388,14 +458,20 @@ def test_true_standards_differ_from_their_certificates_as_stated(tmp_path: Path)
     for _ in range(400):
         balls = true_artefacts(design, generator)
         ends = [balls[design.readings.ball[k]] for k in (given.first[:3], given.second[:3])]
-        off.append((np.linalg.norm(ends[0] - ends[1], axis=1) - given.value[:3]) / given.uncertainty[:3])
+        off.append(
+            (np.linalg.norm(ends[0] - ends[1], axis=1) - given.value[:3]) / given.uncertainty[:3]
+        )
     scatter = np.array(off).T @ np.array(off) / 400
     np.testing.assert_allclose(scatter, np.eye(3), atol=4 * np.sqrt(2 / 400))
 
 
 def test_lengths_without_shared_balls_are_whitened_one_by_one(tmp_path: Path) -> None:
     design = lay_out(
-        experiment(tmp_path, bar(4), {"pairs": [["b0", "b1"], ["b2", "b3"]], "standard_uncertainty": "1 um"})
+        experiment(
+            tmp_path,
+            bar(4),
+            {"pairs": [["b0", "b1"], ["b2", "b3"]], "standard_uncertainty": "1 um"},
+        )
     )
     assert isinstance(design.lengths, Lengths) and not design.length_whitening.joint
     assert len(design.length_whitening) == len(design.lengths)

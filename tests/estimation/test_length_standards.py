@@ -18,19 +18,27 @@ from ballplate.simulator.readings.generate import noisy_certificate
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 
 
-def with_bar(tmp_path: Path, positions: int, uncertainty: str, repeatability: str = "included") -> Experiment:
+def with_bar(
+    tmp_path: Path, positions: int, uncertainty: str, repeatability: str = "included"
+) -> Experiment:
     """The quickstart without calibrated sides; a bar of 400 mm along x gives the scale."""
     before, _, after = QUICKSTART.partition("calibration:\n")
     rest = after[after.index("\n\n") :]
     before = before.replace(
-        "artefacts:\n", "artefacts:\n  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n"
+        "artefacts:\n",
+        "artefacts:\n  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n",
     )
     before = before.replace("  - {name: ", "  - {artefact: plate, name: ")
     # Offsets that were well known would be a scale, too.
     for name in ("right", "left", "back", "front"):
-        before = re.sub(rf"  {name}: (\[.*\])", rf"  {name}: {{offset: \1, standard_uncertainty: 0.5 mm}}", before)
+        before = re.sub(
+            rf"  {name}: (\[.*\])",
+            rf"  {name}: {{offset: \1, standard_uncertainty: 0.5 mm}}",
+            before,
+        )
     places = "".join(
-        f"  - {{name: bar {k}, artefact: bar, pose: {{origin: [300 mm, {200 + 50 * k} mm, 300 mm]}}, probes: [down]}}\n"
+        f"  - {{name: bar {k}, artefact: bar, pose: {{origin: [300 mm, {200 + 50 * k} mm, 300"
+        " mm]}, probes: [down]}\n"
         for k in range(positions)
     )
     known = (
@@ -45,7 +53,9 @@ def with_bar(tmp_path: Path, positions: int, uncertainty: str, repeatability: st
 
 @pytest.mark.parametrize("positions", [1, 2, 8])
 def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions: int) -> None:
-    """The scale cannot be known better than the one certified length, and far from its noise just as well."""
+    """The scale cannot be known better than the one certified length, and far from its noise just
+    as well.
+    """
     experiment = with_bar(tmp_path, positions, "20 um")
     found = predict(experiment)
     assert found.verdict.deficiency == 0
@@ -56,7 +66,9 @@ def test_no_number_of_positions_betters_a_certificate(tmp_path: Path, positions:
 
 
 def test_ignoring_the_repeatability_counts_each_position_anew(tmp_path: Path) -> None:
-    one, four = (predict(with_bar(tmp_path, k, "20 um", "ignored")).quantities["U5"].maximum for k in (1, 4))
+    one, four = (
+        predict(with_bar(tmp_path, k, "20 um", "ignored")).quantities["U5"].maximum for k in (1, 4)
+    )
     assert four == pytest.approx(one / 2, rel=0.01)
 
 
@@ -70,7 +82,9 @@ def test_a_certificate_has_one_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize("file", ["bar-bell", "bryan-gauge"])
 def test_a_certificate_that_differs_from_the_drawing_is_no_bias(tmp_path: Path, file: str) -> None:
     text = Path(f"designs/hurt_foss/{file}.yaml").read_text(encoding="utf-8").split("variants:")[0]
-    text = text.replace("pairs: all,", 'pairs: all, values: [{balls: ["1", "2"], distance: 500.05 mm}],')
+    text = text.replace(
+        "pairs: all,", 'pairs: all, values: [{balls: ["1", "2"], distance: 500.05 mm}],'
+    )
     text = text.replace("kind: radius,", "kind: radius, value: 300.05 mm,")
     (tmp_path / "e.yaml").write_text(text, encoding="utf-8")
     (experiment,) = load(tmp_path / "e.yaml")

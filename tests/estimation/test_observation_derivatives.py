@@ -30,10 +30,14 @@ STEP, RELATIVE = 1e-3, 1e-7
 @pytest.fixture(params=["linearised", "full"])
 def design(request: pytest.FixtureRequest) -> Design:
     balls = square(4)
-    built = plate_design(balls, six_positions(), corner_sides(balls), [0, 3, 5], repeatability=(2e-7, 3e-7, 5e-7))
+    built = plate_design(
+        balls, six_positions(), corner_sides(balls), [0, 3, 5], repeatability=(2e-7, 3e-7, 5e-7)
+    )
     full = request.param == "full"
     model = kinematic_model(ARRANGEMENTS["FB1"], 4, 3, (0, 0, 0), (1, 1, 1), full)
-    return replace(built, model=model, distances=replace(built.distances, dimensions=np.array([2, 3, 2, 3])))
+    return replace(
+        built, model=model, distances=replace(built.distances, dimensions=np.array([2, 3, 2, 3]))
+    )
 
 
 def perturbed(design: Design, seed: int = 3) -> State:
@@ -64,7 +68,9 @@ def test_readings(design: Design) -> None:
         found[i][:, columns[i][free]] = blocks.by_pose[i][:, free]
     assert_derivative(found[:, :, layout.poses], by_shared[:, :, layout.poses], RELATIVE)
 
-    by_ball = central_difference(lambda b: residual(zero, b.reshape(still.shape)), still.ravel(), STEP)
+    by_ball = central_difference(
+        lambda b: residual(zero, b.reshape(still.shape)), still.ravel(), STEP
+    )
     by_ball = by_ball.reshape(*blocks.residual.shape, *still.shape)
     own = by_ball[np.arange(len(chosen)), :, chosen.ball]
     assert_derivative(blocks.by_ball, own, RELATIVE)
@@ -110,5 +116,7 @@ def test_lengths(design: Design) -> None:
     state = perturbed(design)
     x = expected_readings(design, nominal_state(design), design.readings)
     _, derivative = length_rows(design, state, x)
-    expected = central_difference(lambda a: length_rows(design, replace(state, a=a), x)[0], state.a, STEP)
+    expected = central_difference(
+        lambda a: length_rows(design, replace(state, a=a), x)[0], state.a, STEP
+    )
     assert_derivative(derivative, expected, RELATIVE)

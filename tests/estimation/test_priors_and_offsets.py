@@ -1,4 +1,6 @@
-"""Prior information and probe offsets as parameters, against dense differences and by what they do."""
+"""Prior information and probe offsets as parameters, against dense differences and by what they
+do.
+"""
 
 from __future__ import annotations
 
@@ -38,8 +40,13 @@ priors:
   - {parameter: "y high: origin z", standard_uncertainty: 4 um}
 """
 UNKNOWN = (
-    TEXT.replace("right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}")
-    .replace("left: [-50 mm, 0 mm, 0 mm]", "left: {offset: [-50 mm, 0 mm, 0 mm], standard_uncertainty: 3 um}")
+    TEXT.replace(
+        "right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}"
+    )
+    .replace(
+        "left: [-50 mm, 0 mm, 0 mm]",
+        "left: {offset: [-50 mm, 0 mm, 0 mm], standard_uncertainty: 3 um}",
+    )
     .replace("back: [0 mm, 50 mm, 0 mm]", "back: {offset: [0 mm, 50 mm, 0 mm], unknown: true}")
     .replace("front: [0 mm, -50 mm, 0 mm]", "front: {offset: [0 mm, -50 mm, 0 mm], unknown: true}")
 )
@@ -47,8 +54,8 @@ SPHERE = (
     UNKNOWN.replace("artefacts:\n", "artefacts:\n  reference: {kind: sphere}\n")
     .replace(
         "positions:\n",
-        "positions:\n  - {name: qualification, artefact: reference, pose: {origin: [800 mm, 100 mm, 100 mm]}, "
-        "probes: [down, right, left, back, front], repeats: 3}\n",
+        "positions:\n  - {name: qualification, artefact: reference, pose: {origin: [800 mm, 100 mm,"
+        " 100 mm]}, probes: [down, right, left, back, front], repeats: 3}\n",
     )
     .replace("{name: z", "{artefact: plate, name: z")
     .replace("{name: x", "{artefact: plate, name: x")
@@ -69,7 +76,10 @@ def written(tmp_path: Path) -> Callable[[str], Path]:
 
 def with_bar(text: str) -> str:
     bar = "  bar: {kind: two_spheres, length: 400 mm, role: length_standard}\n"
-    place = "  - {name: bar, artefact: bar, pose: {origin: [300 mm, 300 mm, 300 mm]}, probes: [left, back]}\n"
+    place = (
+        "  - {name: bar, artefact: bar, pose: {origin: [300 mm, 300 mm, 300 mm]}, probes: [left,"
+        " back]}\n"
+    )
     known = "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 0.2 um}\n"
     text = text.replace("artefacts:\n", "artefacts:\n" + bar).replace(
         "\n# What is known of", place + "\n# What is known of"
@@ -93,17 +103,27 @@ def all_residuals(design: Design, state: State, x: np.ndarray) -> np.ndarray:
 
 def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path]) -> None:
     text = (
-        with_bar(SPHERE).replace("balls: [5, 5]", "balls: [3, 3]").replace("cal_coefficients: 5", "cal_coefficients: 3")
+        with_bar(SPHERE)
+        .replace("balls: [5, 5]", "balls: [3, 3]")
+        .replace("cal_coefficients: 5", "cal_coefficients: 3")
     )
-    design = lay_out(load(written(text.replace("n_coefficients: 5", "n_coefficients: 3") + PRIORS))[0])
+    design = lay_out(
+        load(written(text.replace("n_coefficients: 5", "n_coefficients: 3") + PRIORS))[0]
+    )
     layout = shared_layout(design)
     generator = np.random.default_rng(4)
     shared = 1e-3 * generator.standard_normal(len(layout))
-    balls = 1e-3 * generator.standard_normal(design.balls.shape) * design.is_plate[design.ball_artefact][:, None]
+    balls = (
+        1e-3
+        * generator.standard_normal(design.balls.shape)
+        * design.is_plate[design.ball_artefact][:, None]
+    )
     arguments = (layout.pose_columns, shared, balls, layout.model, layout.offset_columns)
     state = moved(design, nominal_state(design), *arguments)
     _, x = exact_readings(
-        replace(design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))),
+        replace(
+            design, readings=replace(design.readings, repeats=np.ones_like(design.readings.ball))
+        ),
         nominal_state(design),
     )
 
@@ -113,11 +133,21 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
     def residual(step: np.ndarray) -> np.ndarray:
         of_balls = np.zeros(design.balls.shape)
         of_balls[members] = step[count:].reshape(-1, 3)
-        there = moved(design, state, layout.pose_columns, step[:count], of_balls, layout.model, layout.offset_columns)
+        there = moved(
+            design,
+            state,
+            layout.pose_columns,
+            step[:count],
+            of_balls,
+            layout.model,
+            layout.offset_columns,
+        )
         return all_residuals(design, there, x)
 
     size = np.concatenate([np.minimum(layout.scale, 1.0), np.ones(3 * len(members))]) * 1e-4
-    columns = [(residual(s) - residual(-s)) / (2 * h) for s, h in zip(np.diag(size), size, strict=True)]
+    columns = [
+        (residual(s) - residual(-s)) / (2 * h) for s, h in zip(np.diag(size), size, strict=True)
+    ]
     dense = np.stack(columns, axis=1)
     at = linearise(design, state, x)
     now = residual(np.zeros(len(size)))
@@ -129,13 +159,17 @@ def test_the_factor_is_that_of_dense_differences(written: Callable[[str], Path])
 
 
 def test_a_prior_adds_what_the_readings_leave_open(written: Callable[[str], Path]) -> None:
-    """Six directions are open on 4 x 4 balls with seven coefficients; weak knowledge of the machine closes them."""
+    """Six directions are open on 4 x 4 balls with seven coefficients; weak knowledge of the machine
+    closes them.
+    """
     text = TEXT.replace("balls: [5, 5]", "balls: [4, 4]").replace(
         "position_coefficients: 5", "position_coefficients: 7"
     )
     assert check(load(written(text))[0]).verdict.deficiency == 6
     functions = [f"E{c}{a}" for a in "XYZ" for c in "XYZ"]
-    stated = "".join(f"  - {{parameter: {name}, standard_uncertainty: 20 um}}\n" for name in functions)
+    stated = "".join(
+        f"  - {{parameter: {name}, standard_uncertainty: 20 um}}\n" for name in functions
+    )
     found = check(load(written(f"{text}priors:\n{stated}"))[0]).verdict
     assert found.deficiency == 0
     assert found.observations == 6 * 16 * 3 + 4 * 16 * 3 + 4 + 51
@@ -144,7 +178,10 @@ def test_a_prior_adds_what_the_readings_leave_open(written: Callable[[str], Path
 def test_a_strict_prior_fixes_its_parameter(written: Callable[[str], Path], tmp_path: Path) -> None:
     experiment = load(
         written(
-            TEXT + PRIORS.replace("3 mrad, standard_uncertainty: 10 urad", "30 urad, standard_uncertainty: 0.001 urad")
+            TEXT
+            + PRIORS.replace(
+                "3 mrad, standard_uncertainty: 10 urad", "30 urad, standard_uncertainty: 0.001 urad"
+            )
         )
     )[0]
     design = lay_out(experiment)
@@ -162,12 +199,24 @@ def test_a_strict_prior_fixes_its_parameter(written: Callable[[str], Path], tmp_
 @pytest.mark.parametrize(
     ("prior", "message"),
     [
-        ("{parameter: EAZX, standard_uncertainty: 5 urad}", 'unknown parameter "EAZX"; did you mean "E'),
+        (
+            "{parameter: EAZX, standard_uncertainty: 5 urad}",
+            'unknown parameter "EAZX"; did you mean "E',
+        ),
         ("{parameter: EAX, standard_uncertainty: 5 um}", "priors[0].standard_uncertainty: "),
         ("{parameter: EAX, standard_uncertainty: 0 urad}", "must be above zero"),
-        ("{parameter: 'z lo: origin x', standard_uncertainty: 1 um}", 'did you mean "z low: origin x"?'),
-        ("{parameter: 'r1c1: x', standard_uncertainty: 1 um}", "state a calibration of kind: coordinates"),
-        ("{parameter: 'probe left: offset x', standard_uncertainty: 1 um}", "state the standard_uncertainty with the"),
+        (
+            "{parameter: 'z lo: origin x', standard_uncertainty: 1 um}",
+            'did you mean "z low: origin x"?',
+        ),
+        (
+            "{parameter: 'r1c1: x', standard_uncertainty: 1 um}",
+            "state a calibration of kind: coordinates",
+        ),
+        (
+            "{parameter: 'probe left: offset x', standard_uncertainty: 1 um}",
+            "state the standard_uncertainty with the",
+        ),
     ],
 )
 def test_messages(written: Callable[[str], Path], prior: str, message: str) -> None:
@@ -186,27 +235,48 @@ def test_a_held_pose_has_no_prior(written: Callable[[str], Path]) -> None:
     ("old", "new", "message"),
     [
         ("unknown: true}", "unknown: true, standard_uncertainty: 1 um}", "does not go with"),
-        ("unknown: true}", "unknown: true, reference: true}", "the offset of the reference is held"),
+        (
+            "unknown: true}",
+            "unknown: true, reference: true}",
+            "the offset of the reference is held",
+        ),
     ],
 )
-def test_messages_about_probes(written: Callable[[str], Path], old: str, new: str, message: str) -> None:
+def test_messages_about_probes(
+    written: Callable[[str], Path], old: str, new: str, message: str
+) -> None:
     with pytest.raises(ExperimentError, match=message):
         load(written(UNKNOWN.replace(old, new)))
 
 
 def test_unknown_offsets_need_the_sphere(written: Callable[[str], Path]) -> None:
-    """Without it the probes of each side move with the positions that they read; the verdict names them."""
-    without = check(load(written(UNKNOWN.replace(", standard_uncertainty: 3 um", ", unknown: true")))[0]).verdict
+    """Without it the probes of each side move with the positions that they read; the verdict names
+    them.
+    """
+    without = check(
+        load(written(UNKNOWN.replace(", standard_uncertainty: 3 um", ", unknown: true")))[0]
+    ).verdict
     assert without.deficiency == 6
-    assert {part.name for direction in without.null for part in direction.probes} == {"right", "left", "back", "front"}
+    assert {part.name for direction in without.null for part in direction.probes} == {
+        "right",
+        "left",
+        "back",
+        "front",
+    }
     assert any("offsets of probes: " in str(direction) for direction in without.null)
     assert check(load(written(SPHERE))[0]).verdict.deficiency == 0
 
 
-def test_offsets_cost_accuracy_and_qualification_gives_it_back(written: Callable[[str], Path]) -> None:
+def test_offsets_cost_accuracy_and_qualification_gives_it_back(
+    written: Callable[[str], Path],
+) -> None:
     known = predict(load("designs/quickstart.yaml")[0]).quantities["U6"].average
     qualified = predict(load(written(SPHERE))[0]).quantities["U6"].average
-    often = predict(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0]).quantities["U6"].average
+    often = (
+        predict(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0])
+        .quantities["U6"]
+        .average
+    )
     assert known < often < qualified
 
 
@@ -222,7 +292,9 @@ def test_offsets_come_back(written: Callable[[str], Path], tmp_path: Path) -> No
     )
     # The certificate of probe "left" must be right for exact data to fit exactly.
     priors = design.priors
-    design = replace(design, priors=replace(priors, value=truth.probes[priors.probe, priors.component]))
+    design = replace(
+        design, priors=replace(priors, value=truth.probes[priors.probe, priors.component])
+    )
     readings, x = exact_readings(design, truth)
     with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
         write_readings(stream, design, readings, x)
@@ -241,7 +313,11 @@ def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path
     experiment = load(written(SPHERE + PRIORS.replace("3 mrad, standard", "10 urad, standard")))[0]
     drawn = lay_out(experiment)
     freedom = drawn.observations - drawn.parameter_count
-    truth = replace(nominal_state(drawn), a=true_parameters(experiment.true_machine, drawn.model), probes=drawn.probes)
+    truth = replace(
+        nominal_state(drawn),
+        a=true_parameters(experiment.true_machine, drawn.model),
+        probes=drawn.probes,
+    )
     sums, deviations = [], []
     for seed in range(25):
         generator = np.random.default_rng(seed)

@@ -1,4 +1,6 @@
-"""A reading's own standard uncertainty: from the experiment file or the CSV to weights, noise and U1 to U6."""
+"""A reading's own standard uncertainty: from the experiment file or the CSV to weights, noise and
+U1 to U6.
+"""
 
 from __future__ import annotations
 
@@ -32,21 +34,30 @@ def averages(path: Path) -> np.ndarray:
 
 
 def test_every_position_as_the_machine(tmp_path: Path) -> None:
-    """Stating for every position what the machine has already changes nothing, stating the double doubles all."""
+    """Stating for every position what the machine has already changes nothing, stating the double
+    doubles all.
+    """
     stated = TEXT.replace("probes: [", "standard_uncertainty: 0.2 um, probes: [")
     plain = averages(Path("designs/quickstart.yaml"))
     np.testing.assert_allclose(averages(written(tmp_path, stated)), plain, rtol=1e-12)
-    doubled = stated.replace("0.2 um, probes", "0.4 um, probes").replace(CALIBRATION, "standard_uncertainty: 0.4 um #")
+    doubled = stated.replace("0.2 um, probes", "0.4 um, probes").replace(
+        CALIBRATION, "standard_uncertainty: 0.4 um #"
+    )
     np.testing.assert_allclose(averages(written(tmp_path, doubled)), 2 * plain, rtol=1e-10)
 
 
 def test_groups_of_readings_with_their_own(tmp_path: Path) -> None:
     old = "probes: [right, left]}\n  - {name: x high"
     assert old in TEXT
-    groups = "readings: [{probes: [right]}, {probes: [left], standard_uncertainty: [0.1 um, 0.2 um, 0.3 um]}]}"
+    groups = (
+        "readings: [{probes: [right]}, {probes: [left], standard_uncertainty: [0.1 um, 0.2 um, 0.3"
+        " um]}]}"
+    )
     design = lay_out(load(written(tmp_path, TEXT.replace(old, groups + "\n  - {name: x high")))[0])
     weights = reading_weights(design, design.readings)
-    left = (design.readings.position == 2) & (design.readings.probe == list(design.probe_names).index("left"))
+    left = (design.readings.position == 2) & (
+        design.readings.probe == list(design.probe_names).index("left")
+    )
     np.testing.assert_allclose(weights[left], np.tile([1e7, 5e6, 1 / 3e-7], (25, 1)))
     np.testing.assert_allclose(weights[~left], 5e6)
 
@@ -54,12 +65,17 @@ def test_groups_of_readings_with_their_own(tmp_path: Path) -> None:
 def test_as_many_repeats_as_the_uncertainty_is_smaller(tmp_path: Path) -> None:
     repeated = written(tmp_path, TEXT.replace("probes: [down]", "repeats: 4, probes: [down]"))
     by_repeats = averages(repeated)
-    stated = written(tmp_path, TEXT.replace("probes: [down]", "standard_uncertainty: 0.1 um, probes: [down]"))
+    stated = written(
+        tmp_path, TEXT.replace("probes: [down]", "standard_uncertainty: 0.1 um, probes: [down]")
+    )
     np.testing.assert_allclose(averages(stated), by_repeats, rtol=1e-10)
 
 
 def test_noise_has_the_stated_size(tmp_path: Path) -> None:
-    path = written(tmp_path, TEXT.replace("probes: [back, front]", "standard_uncertainty: 2 um, probes: [back, front]"))
+    path = written(
+        tmp_path,
+        TEXT.replace("probes: [back, front]", "standard_uncertainty: 2 um, probes: [back, front]"),
+    )
     design = lay_out(load(path)[0])
     state = nominal_state(design)
     readings, x = noisy_readings(design, state, np.random.default_rng(2))
@@ -80,13 +96,18 @@ def test_a_column_of_the_csv(tmp_path: Path) -> None:
     header, *rows = path.read_text(encoding="utf-8").splitlines()
 
     def with_column(values: list[str], name: str = "u_um") -> Path:
-        lines = [f"{header},{name}", *(f"{row},{value}" for row, value in zip(rows, values, strict=True))]
+        lines = [
+            f"{header},{name}",
+            *(f"{row},{value}" for row, value in zip(rows, values, strict=True)),
+        ]
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
 
     same = fit(experiment, read_readings(with_column(["0.0002"] * 250, "u_mm"), design), "given")
     for symbol in SYMBOLS:
-        assert same.quantities[symbol].average == pytest.approx(plain.quantities[symbol].average, rel=1e-12)
+        assert same.quantities[symbol].average == pytest.approx(
+            plain.quantities[symbol].average, rel=1e-12
+        )
     # A reading that is off weighs nothing if its uncertainty says so.
     cells = rows[30].split(",")
     rows[30] = ",".join([*cells[:3], str(float(cells[3]) + 1.0), *cells[4:]])
@@ -95,7 +116,9 @@ def test_a_column_of_the_csv(tmp_path: Path) -> None:
     unharmed = fit(experiment, read_readings(with_column(values), design), "given")
     np.testing.assert_allclose(unharmed.solution.state.a, plain.solution.state.a, rtol=0, atol=2e-6)
     values[30] = "0"
-    with pytest.raises(ExperimentError, match=r"r.csv:32:1: a standard uncertainty must be above zero"):
+    with pytest.raises(
+        ExperimentError, match=r"r.csv:32:1: a standard uncertainty must be above zero"
+    ):
         read_readings(with_column(values), design)
 
 
@@ -108,7 +131,10 @@ def test_a_column_of_the_csv(tmp_path: Path) -> None:
     ],
 )
 def test_messages(tmp_path: Path, stated: str, line: str) -> None:
-    path = written(tmp_path, TEXT.replace("probes: [down]}", f"probes: [down], standard_uncertainty: {stated}}}"))
+    path = written(
+        tmp_path,
+        TEXT.replace("probes: [down]}", f"probes: [down], standard_uncertainty: {stated}}}"),
+    )
     with pytest.raises(ExperimentError) as caught:
         load(path)
     paths = {message.path for message in caught.value.messages}

@@ -1,16 +1,25 @@
-"""The first-order equations of a reversal: what they give, what they neglect, and the full estimate beside them."""
+"""The first-order equations of a reversal: what they give, what they neglect, and the full estimate
+beside them.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.estimation.reversal import Reversal, UndeterminedError, reverse, turn_between
+from ballplate.simulator.estimation.reversal import (
+    Reversal,
+    UndeterminedError,
+    reverse,
+    turn_between,
+)
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 
 ALPHA, GAMMA = 8e-6, -5e-6
-PLATE = np.array([(0.0, 0.0), (0.30, 0.0), (0.31, 0.12), (0.02, 0.25), (0.15, 0.11), (0.07, 0.20), (0.22, 0.04)])
+PLATE = np.array(
+    [(0.0, 0.0), (0.30, 0.0), (0.31, 0.12), (0.02, 0.25), (0.15, 0.11), (0.07, 0.20), (0.22, 0.04)]
+)
 AXES = PlateAxes(0, 1, 0)
 METRICS = {
     "x": np.array([[1 + GAMMA, -ALPHA], [0, 1]]),
@@ -19,8 +28,12 @@ METRICS = {
 }
 
 
-def readings(beta: float, scale: str = "x", offset: tuple[float, float] = (0.0, 0.0), tilt: float = 0.3) -> list[Array]:
-    """Exact readings of the plate in both positions, the second turned clockwise by 90 degrees + beta."""
+def readings(
+    beta: float, scale: str = "x", offset: tuple[float, float] = (0.0, 0.0), tilt: float = 0.3
+) -> list[Array]:
+    """Exact readings of the plate in both positions, the second turned clockwise by 90 degrees +
+    beta.
+    """
     found = []
     for angle, shift in ((tilt, offset), (tilt - np.pi / 2 - beta, (0.0, 0.0))):
         c, s = np.cos(angle), np.sin(angle)
@@ -45,25 +58,34 @@ def test_exact_readings_give_their_parameters(scale: Scale, offsets: bool) -> No
 
 
 def test_the_share_of_gamma_changes_the_plate_alone() -> None:
-    """Appendix B: the parameters are the same whichever axis takes the scale difference; the sizes are not."""
+    """Appendix B: the parameters are the same whichever axis takes the scale difference; the sizes
+    are not.
+    """
     first, second = readings(2e-5)
-    found: dict[Scale, Reversal] = {scale: reverse(first, second, scale) for scale in ("x", "y", "split", "none")}
+    found: dict[Scale, Reversal] = {
+        scale: reverse(first, second, scale) for scale in ("x", "y", "split", "none")
+    }
     assert len({(one.alpha, one.beta, one.gamma, one.sigma) for one in found.values()}) == 1
     sides = {scale: in_plate_axes(one.coordinates, AXES)[0][1, 0] for scale, one in found.items()}
     assert sides["x"] == pytest.approx(0.3, abs=1e-9)
     assert sides["y"] / sides["x"] == pytest.approx(1 + GAMMA, abs=1e-9)
     assert sides["split"] / sides["x"] == pytest.approx(1 + GAMMA / 2, abs=1e-9)
-    # Neither scale corrected: here the side lies at 0.3 rad to x, and each scale acts along its own axis.
+    # Neither scale corrected: here the side lies at 0.3 rad to x, and each scale acts along its own
+    # axis.
     assert sides["none"] / sides["x"] == pytest.approx(1 + GAMMA * np.cos(0.3) ** 2, abs=2e-9)
 
 
 @pytest.mark.parametrize("beta", [1e-4, 1e-3, 1e-2])
 def test_what_is_neglected_is_told(beta: float) -> None:
-    """It grows with the square of beta, bounds what comes out wrong, and is what the exact readings leave behind."""
+    """It grows with the square of beta, bounds what comes out wrong, and is what the exact readings
+    leave behind.
+    """
     first, second = readings(beta)
     found = reverse(first, second, "x")
     arms = np.sqrt(((second - second.mean(axis=0)) ** 2).sum(axis=1))
-    np.testing.assert_allclose(np.sqrt((found.neglected**2).sum(axis=1)), beta**2 / 2 * arms, rtol=0.3, atol=1e-11)
+    np.testing.assert_allclose(
+        np.sqrt((found.neglected**2).sum(axis=1)), beta**2 / 2 * arms, rtol=0.3, atol=1e-11
+    )
     noise = np.random.default_rng(3).normal(0.0, 1e-7, (200, 2, *PLATE.shape))
     noisy = [reverse(first + a, second + b, "x") for a, b in noise]
     for name, true in (("alpha", ALPHA), ("gamma", GAMMA)):
@@ -86,7 +108,9 @@ def test_scatter_is_that_of_the_readings_at_any_angle(beta: float) -> None:
     assert sides[1, 0] == pytest.approx(0.3, abs=1e-11)
     noise = np.random.default_rng(1).normal(0.0, 1e-6, (100, 2, *PLATE.shape))
     found = [reverse(first + a, second + b, "x") for a, b in noise]
-    assert np.sqrt(np.mean([one.scatter**2 for one in found])) == pytest.approx(1e-6, rel=4 / np.sqrt(2 * 9 * 100))
+    assert np.sqrt(np.mean([one.scatter**2 for one in found])) == pytest.approx(
+        1e-6, rel=4 / np.sqrt(2 * 9 * 100)
+    )
     assert min(one.single for one in found) > (1e-3 if abs(beta) > 0.1 else 1e-8)
 
 

@@ -23,7 +23,9 @@ ALL = np.array(list(combinations(range(16), 2)))
 
 def small() -> Design:
     balls = grid(4)
-    design = plate_design(balls, six_positions(), corner_sides(balls), repeatability=(2e-7, 3e-7, 4e-7))
+    design = plate_design(
+        balls, six_positions(), corner_sides(balls), repeatability=(2e-7, 3e-7, 4e-7)
+    )
     return replace(design, model=kinematic_model(ARRANGEMENTS["MB2"], 3, 3, (0, 0, 0), (1, 1, 1)))
 
 
@@ -45,15 +47,21 @@ def test_exact_readings_give_the_truth_back(estimator: RivalName, across: bool) 
     np.testing.assert_allclose(found.a, truth.a, rtol=0, atol=1e-12)
 
 
-def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chosen: np.ndarray, across: bool) -> float:
+def objective(
+    design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chosen: np.ndarray, across: bool
+) -> float:
     """What the estimator minimises, term by term."""
     readings = design.readings
     corrected = x + design.model.error(x, a, design.probes[readings.probe])
     rough = x + design.probes[readings.probe]
-    places = sorted({(int(k), int(p)) for k, p in zip(readings.position, readings.probe, strict=True)})
+    places = sorted(
+        {(int(k), int(p)) for k, p in zip(readings.position, readings.probe, strict=True)}
+    )
     row = {
         (int(b), int(k), int(p)): i
-        for i, (b, k, p) in enumerate(zip(readings.ball, readings.position, readings.probe, strict=True))
+        for i, (b, k, p) in enumerate(
+            zip(readings.ball, readings.position, readings.probe, strict=True)
+        )
     }
     known = {
         tuple(sorted((int(i), int(j)))): (value, u)
@@ -102,7 +110,9 @@ def objective(design: Design, x: np.ndarray, estimator: str, a: np.ndarray, chos
 
 @pytest.mark.parametrize("across", [False, True])
 @pytest.mark.parametrize("estimator", get_args(RivalName))
-def test_the_objective_is_the_one_stated_and_at_its_minimum(estimator: RivalName, across: bool) -> None:
+def test_the_objective_is_the_one_stated_and_at_its_minimum(
+    estimator: RivalName, across: bool
+) -> None:
     design, x = observed(small())
     seen = design.readings.ball % 7 != design.readings.position
     design, x = replace(design, readings=design.readings.select(seen)), x[seen]
@@ -113,14 +123,19 @@ def test_the_objective_is_the_one_stated_and_at_its_minimum(estimator: RivalName
     for k in range(0, len(found.a), 4):
         step = np.zeros(len(found.a))
         step[k] = 1e-7
-        above, below = (objective(design, x, estimator, found.a + s, chosen, across) - least for s in (step, -step))
+        above, below = (
+            objective(design, x, estimator, found.a + s, chosen, across) - least
+            for s in (step, -step)
+        )
         assert above > 0 and below > 0 and above == pytest.approx(below, rel=0.02)
 
 
 @pytest.mark.parametrize("estimator", get_args(RivalName))
 def test_without_a_calibrated_distance_the_scale_is_open(estimator: RivalName) -> None:
     design = small()
-    design = replace(design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values())))
+    design = replace(
+        design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
+    )
     truth = replace(truth_of(design), a=np.zeros(len(design.model.parameters)), balls=design.balls)
     readings, x = exact_readings(design, truth)
     found = rival_estimate(replace(design, readings=readings), x, ALL, estimator)
@@ -135,7 +150,9 @@ def test_repeated_readings_are_combined() -> None:
     smaller = replace(design, repeatability=design.repeatability / np.sqrt(2))
     a, b = rival_estimate(twice, np.repeat(x, 2, axis=0), ALL), rival_estimate(smaller, x, ALL)
     np.testing.assert_allclose(a.a, b.a, rtol=0, atol=1e-14)
-    assert a.iterations[-1].sum_of_squares == pytest.approx(b.iterations[-1].sum_of_squares, rel=1e-9)
+    assert a.iterations[-1].sum_of_squares == pytest.approx(
+        b.iterations[-1].sum_of_squares, rel=1e-9
+    )
 
 
 def test_braced_pairs() -> None:
@@ -146,4 +163,7 @@ def test_braced_pairs() -> None:
     assert len(found) == 20 + 20 + 16 + 6
     names = {frozenset((layout.names[i], layout.names[j])) for i, j in found}
     assert frozenset(("r2c1", "r1c2")) in names and frozenset(("r1c1", "r2c2")) not in names
-    assert "braced" not in SquareSettings.model_construct(kind="square", balls=5, size=0.75).layout().pair_sets
+    assert (
+        "braced"
+        not in SquareSettings.model_construct(kind="square", balls=5, size=0.75).layout().pair_sets
+    )

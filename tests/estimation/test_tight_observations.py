@@ -1,4 +1,6 @@
-"""What is known all but exactly beside what is known hardly: ranks that never fall, and uncertainties to 60 digits."""
+"""What is known all but exactly beside what is known hardly: ranks that never fall, and
+uncertainties to 60 digits.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ def with_known(design: Design, known: Known) -> Design:
             row = reported[draw.choice(np.flatnonzero(reported.any(axis=1)))]
         else:
             # Entries of many sizes, but none that is all but rounding beside another.
-            row = draw.standard_normal(reported.shape[1]) * 10.0 ** draw.integers(-5, 1, reported.shape[1])
+            row = draw.standard_normal(reported.shape[1]) * 10.0 ** draw.integers(
+                -5, 1, reported.shape[1]
+            )
         return _with_prior(design, -1, -1, row, u)
     if known.kind == "pose":
         free = np.argwhere(~design.held)
@@ -104,7 +108,9 @@ def with_known(design: Design, known: Known) -> Design:
     )
 
 
-def _with_prior(design: Design, position: int, component: int, row: Real, uncertainty: float) -> Design:
+def _with_prior(
+    design: Design, position: int, component: int, row: Real, uncertainty: float
+) -> Design:
     old = design.priors
     value = design.origins[position, component] if position >= 0 and component < 3 else 0.0
     return replace(
@@ -149,7 +155,12 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
         pose = (int(known.position[k]), int(known.component[k]))
         if pose in problem.free_poses:
             priors[k, 3 * len(problem.plate_balls) + problem.free_poses.index(pose)] = 1.0
-    stated = [uncertainty.ravel(), design.distances.uncertainty, design.coordinates.uncertainty, known.uncertainty]
+    stated = [
+        uncertainty.ravel(),
+        design.distances.uncertainty,
+        design.coordinates.uncertainty,
+        known.uncertainty,
+    ]
     return problem, np.concatenate([rows, priors]), np.concatenate(stated)
 
 
@@ -161,7 +172,10 @@ def deficiency_of(rows: Real) -> int:
 
 KINDS = ["coefficient", "combination", "pose", "reading", "distance", "coordinate"]
 things = st.builds(
-    Known, st.sampled_from(KINDS), st.integers(0, 10**6), st.integers(-18, 0).map(lambda power: 10.0**power)
+    Known,
+    st.sampled_from(KINDS),
+    st.integers(0, 10**6),
+    st.integers(-18, 0).map(lambda power: 10.0**power),
 )
 
 
@@ -174,7 +188,9 @@ designs = st.tuples(
 
 @given(designs, st.lists(things, min_size=1, max_size=4))
 @settings(max_examples=15, deadline=None)
-def test_knowing_more_never_lowers_the_rank(what: tuple[list[int], str, float], more: list[Known]) -> None:
+def test_knowing_more_never_lowers_the_rank(
+    what: tuple[list[int], str, float], more: list[Known]
+) -> None:
     """Whatever is added, and however exact it is; the deficiency is that of the dense rows, too."""
     assert_never_lower(what, more)
 
@@ -201,7 +217,9 @@ def assert_never_lower(what: tuple[list[int], str, float], more: list[Known]) ->
 
 
 def exact_uncertainties(design: Design) -> dict[str, Real]:
-    """U1 to U6 from normal equations in `DIGITS` digits; what is undetermined is held, which changes nothing else."""
+    """U1 to U6 from normal equations in `DIGITS` digits; what is undetermined is held, which
+    changes nothing else.
+    """
     problem, rows, stated = unweighted(design)
     size = np.sqrt((rows**2).sum(axis=1))
     open_ = dense.spread(rows[size > 0] / size[size > 0, None]).null
@@ -221,7 +239,9 @@ def exact_uncertainties(design: Design) -> dict[str, Real]:
 
 
 def _exact(values: Real) -> Any:
-    return np.array([[mpmath.mpf(value) for value in row] for row in values.tolist()], object).reshape(values.shape)
+    return np.array(
+        [[mpmath.mpf(value) for value in row] for row in values.tolist()], object
+    ).reshape(values.shape)
 
 
 def _cholesky(matrix: Any) -> Any:
@@ -247,18 +267,39 @@ ORDINARY = (3, 6)
 
 TIGHT = [
     ("a coefficient", (0, 1, 2, 3, 4, 5), "sides", 2e-7, [Known("coefficient", 5, 1e-15)]),
-    ("two priors", (0, 1, 2, 3, 4, 5), "sides", 2e-7, [Known("coefficient", 5, 1e-18), Known("combination", 1, 1e-15)]),
-    ("pm at mm", (0, 1, 2, 3, 4, 5), "sides", 1e-3, [Known("combination", 2, 1e-12), Known("pose", 3, 1e-12)]),
+    (
+        "two priors",
+        (0, 1, 2, 3, 4, 5),
+        "sides",
+        2e-7,
+        [Known("coefficient", 5, 1e-18), Known("combination", 1, 1e-15)],
+    ),
+    (
+        "pm at mm",
+        (0, 1, 2, 3, 4, 5),
+        "sides",
+        1e-3,
+        [Known("combination", 2, 1e-12), Known("pose", 3, 1e-12)],
+    ),
     ("readings", (0, 2, 4), "one", 2e-7, [Known("reading", k, 1e-16) for k in range(4)]),
     ("distances", (0, 1, 2, 4), "none", 2e-7, [Known("distance", k, 1e-14) for k in range(5)]),
     ("coordinates", (0, 2, 4), "all", 1e-3, [Known("coordinate", k, 1e-15) for k in range(5)]),
-    ("everything", (0, 1, 2, 4), "sides", 2e-7, [Known(kind, 7, 10.0 ** -(9 + 2 * i)) for i, kind in enumerate(KINDS)]),
+    (
+        "everything",
+        (0, 1, 2, 4),
+        "sides",
+        2e-7,
+        [Known(kind, 7, 10.0 ** -(9 + 2 * i)) for i, kind in enumerate(KINDS)],
+    ),
 ]
 
 
 @pytest.mark.parametrize(
     ("positions", "certificate", "repeatability", "more"),
-    [pytest.param(*one[1:], id=one[0], marks=[] if k in ORDINARY else pytest.mark.long) for k, one in enumerate(TIGHT)],
+    [
+        pytest.param(*one[1:], id=one[0], marks=[] if k in ORDINARY else pytest.mark.long)
+        for k, one in enumerate(TIGHT)
+    ],
 )
 def test_every_uncertainty_beside_what_is_known_all_but_exactly(
     positions: tuple[int, ...], certificate: str, repeatability: float, more: list[Known]
@@ -282,6 +323,9 @@ def test_every_uncertainty_beside_what_is_known_all_but_exactly(
         theirs = expected[symbol]
         np.testing.assert_array_equal(np.isnan(values), np.isnan(theirs))
         known_ = ~np.isnan(values)
-        # What is known to 1e-15 m is a difference of what is known to 1e-6: its own digits are beyond double precision.
+        # What is known to 1e-15 m is a difference of what is known to 1e-6: its own digits are
+        # beyond double precision.
         atol = 1e-14 * np.nanmax(theirs, initial=0.0)
-        np.testing.assert_allclose(values[known_], theirs[known_], rtol=1e-9, atol=atol, err_msg=symbol)
+        np.testing.assert_allclose(
+            values[known_], theirs[known_], rtol=1e-9, atol=atol, err_msg=symbol
+        )

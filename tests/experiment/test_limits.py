@@ -1,4 +1,6 @@
-"""Files that ask for more than there is room or time for, or that hold what is no text: what is said, and soon."""
+"""Files that ask for more than there is room or time for, or that hold what is no text: what is
+said, and soon.
+"""
 
 from __future__ import annotations
 
@@ -52,52 +54,78 @@ def replaced(old: str, new: str) -> str:
             "corner: {x: 0 mm, y: 0 mm}}",
             "corner: {x: 0 mm, y: 0 mm}, readings: &r [{repeats: 10000}, {repeats: 10000}]}\n"
             + "\n".join(
-                f"  - {{name: p{k}, plane: z, level: 0 mm, corner: {{x: 0 mm, y: 0 mm}}, readings: *r}}"
+                f"  - {{name: p{k}, plane: z, level: 0 mm, corner: {{x: 0 mm, y: 0 mm}}, readings:"
+                " *r}"
                 for k in range(20)
             ),
-            "8:82: positions[11].readings[0]: there are 2070000 readings up to here, repeats counted; at most 2000000 "
-            "are possible: read fewer balls, or less often",
+            (
+                "8:82: positions[11].readings[0]: there are 2070000 readings up to here, repeats"
+                " counted; at most 2000000 are possible: read fewer balls, or less often"
+            ),
         ),
         (
             "[3, 3]",
             "[200, 200]",
-            "10:30: calibration[0].pairs: distances tie 40000 balls together, at most 3000 are possible; calibrate "
-            "fewer distances, such as corner sides, or co-ordinates",
+            (
+                "10:30: calibration[0].pairs: distances tie 40000 balls together, at most 3000 are"
+                " possible; calibrate fewer distances, such as corner sides, or co-ordinates"
+            ),
         ),
         (
             "title: good",
             "title: good\nevaluation: {points: {random: 40001}}",
-            "2:31: evaluation.points.random: the number 40001 is out of range; give one at most 40000",
+            (
+                "2:31: evaluation.points.random: the number 40001 is out of range; give one at most"
+                " 40000"
+            ),
         ),
         (
             "title: good",
-            "title: good\nvariants: {" + ", ".join(f"v{k}: {{title: a}}" for k in range(1001)) + "}",
+            "title: good\nvariants: {"
+            + ", ".join(f"v{k}: {{title: a}}" for k in range(1001))
+            + "}",
             "2:11: variants: 1001 variants are too many; at most 1000 are possible",
         ),
         (
             "title: good",
             "title: good\npriors:\n" + "  - {parameter: EXX, standard_uncertainty: 1 um}\n" * 1251,
-            "1253:5: priors[1250]: there are 5004 priors up to here, coefficients counted; at most 5000 are possible",
+            (
+                "1253:5: priors[1250]: there are 5004 priors up to here, coefficients counted; at"
+                " most 5000 are possible"
+            ),
         ),
         (
             "  - {name: low,",
-            "\n".join(f"  - {{name: p{k}, plane: z, level: 0 mm, corner: {{x: 0 mm, y: 0 mm}}}}" for k in range(580))
+            "\n".join(
+                f"  - {{name: p{k}, plane: z, level: 0 mm, corner: {{x: 0 mm, y: 0 mm}}}}"
+                for k in range(580)
+            )
             + "\n  - {name: low,",
-            "7:1: positions: 581 poses, 69 machine errors and 0 probe offsets make 3555 parameters besides the balls; "
-            "at most 3500 are possible: leave positions out, or give the machine fewer coefficients",
+            (
+                "7:1: positions: 581 poses, 69 machine errors and 0 probe offsets make 3555"
+                " parameters besides the balls; at most 3500 are possible: leave positions out, or"
+                " give the machine fewer coefficients"
+            ),
         ),
         (
             "plate: {kind: grid",
-            "a: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n"
-            "  b: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n"
-            "  c: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n  plate: {kind: grid",
-            "8:6: artefacts.c: there are 120000 balls up to here; at most 100000 of all artefacts are possible",
+            (
+                "a: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n"
+                "  b: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n"
+                "  c: {kind: grid, balls: [200, 200], size: [1 m, 1 m]}\n  plate: {kind: grid"
+            ),
+            (
+                "8:6: artefacts.c: there are 120000 balls up to here; at most 100000 of all"
+                " artefacts are possible"
+            ),
         ),
         (
             "error_model: {kind: kinematic}",
             "error_model: {kind: empirical, terms: {centres: [8, 8, 8]}}",
-            "3:39: error_model.terms: these functions are too much alike to be told apart; give fewer centres or a "
-            "smaller constant",
+            (
+                "3:39: error_model.terms: these functions are too much alike to be told apart; give"
+                " fewer centres or a smaller constant"
+            ),
         ),
     ],
 )
@@ -112,10 +140,13 @@ def test_too_much(tmp_path: Path, old: str, new: str, line: str) -> None:
 def test_gauges_of_too_many_lengths(tmp_path: Path, count: int, repeats: int) -> None:
     gauge = "  gauge: {kind: bryan_gauge, radius: 300 mm, directions: {random: 5000}}\npositions:\n"
     places = (
-        f"  - {{name: {k}, artefact: gauge, repeats: {repeats}, pose: {{origin: [500 mm, 500 mm, 100 mm]}}}}"
+        f"  - {{name: {k}, artefact: gauge, repeats: {repeats}, pose: {{origin: [500 mm, 500 mm,"
+        " 100 mm]}}"
         for k in range(count)
     )
-    text = replaced("positions:", gauge + "\n".join(places)).replace("name: low,", "name: low, artefact: plate,")
+    text = replaced("positions:", gauge + "\n".join(places)).replace(
+        "name: low,", "name: low, artefact: plate,"
+    )
     text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
     assert refusals(tmp_path, text) == [
         "8:1: positions: Bryan gauges are read 25000 times; at most 20000 lengths are possible"
@@ -123,17 +154,21 @@ def test_gauges_of_too_many_lengths(tmp_path: Path, count: int, repeats: int) ->
 
 
 def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
-    bar = "  bar: {kind: grid, balls: [20, 20], size: [500 mm, 500 mm], role: length_standard}\npositions:"
+    bar = (
+        "  bar: {kind: grid, balls: [20, 20], size: [500 mm, 500 mm], role:"
+        " length_standard}\npositions:"
+    )
     text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
     text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
     text = text.replace(
         "calibration:",
-        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\ncalibration:\n"
-        "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 1 um}",
+        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0"
+        " mm}}\ncalibration:\n  - {kind: distances, artefact: bar, pairs: all,"
+        " standard_uncertainty: 1 um}",
     )
     assert refusals(tmp_path, text) == [
-        '12:45: calibration[0].pairs: 79800 distances of "bar", read 1 times, are too many; at most 20000 lengths are '
-        "possible"
+        '12:45: calibration[0].pairs: 79800 distances of "bar", read 1 times, are too many; at most'
+        " 20000 lengths are possible"
     ]
 
 
@@ -141,37 +176,47 @@ def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Three thousand are possible; as many between balls of their own are no difficulty."""
-    bar = "  bar: {kind: grid, balls: [10, 8], size: [450 mm, 450 mm], role: length_standard}\npositions:"
+    bar = (
+        "  bar: {kind: grid, balls: [10, 8], size: [450 mm, 450 mm], role:"
+        " length_standard}\npositions:"
+    )
     text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
     text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
     text = text.replace(
         "calibration:",
-        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\ncalibration:\n"
-        "  - {kind: distances, artefact: bar, pairs: all, standard_uncertainty: 1 um}",
+        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0"
+        " mm}}\ncalibration:\n  - {kind: distances, artefact: bar, pairs: all,"
+        " standard_uncertainty: 1 um}",
     )
     assert refusals(tmp_path, text) == [
-        '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most 3000 such are possible: '
-        "calibrate fewer of them"
+        '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most 3000'
+        " such are possible: calibrate fewer of them"
     ]
     (tmp_path / "e.yaml").write_text(text.replace("[10, 8]", "[11, 7]"))
     assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 2926
     monkeypatch.setattr("ballplate.simulator.experiment.checks.MOST_JOINT_LENGTHS", 2)
     text = text.replace("[10, 8]", "[2, 3]")
-    (tmp_path / "e.yaml").write_text(text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r2c1, r2c2], [r3c1, r3c2]]"))
+    (tmp_path / "e.yaml").write_text(
+        text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r2c1, r2c2], [r3c1, r3c2]]")
+    )
     assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 3
     joint = text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r1c2, r2c2], [r3c1, r3c2]]")
     assert "have balls in common; at most 2 such" in refusals(tmp_path, joint)[0]
 
 
 def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path) -> None:
-    text = replaced("{kind: kinematic}", "{kind: kinematic, position_coefficients: 25, rotation_coefficients: 25}")
+    text = replaced(
+        "{kind: kinematic}",
+        "{kind: kinematic, position_coefficients: 25, rotation_coefficients: 25}",
+    )
     (line,) = refusals(tmp_path, text + "evaluation: {points: {random: 40000}}\n")
     (tmp_path / "e.yaml").write_text(text)
     errors = len(lay_out(load(tmp_path / "e.yaml")[0]).model.parameters)
     most = 50_000_000 // (3 * errors)
-    assert line == (
-        f"11:22: evaluation.points: 40000 points with {errors} machine errors have {120_000 * errors} derivatives; at "
-        f"most {most} points are possible with so many errors"
+    assert (
+        line == f"11:22: evaluation.points: 40000 points with {errors} machine errors have"
+        f" {120_000 * errors} derivatives; at most {most} points are possible with so many"
+        " errors"
     )
     (tmp_path / "e.yaml").write_text(f"{text}evaluation: {{points: {{random: {most}}}}}\n")
     assert len(load(tmp_path / "e.yaml")[0].evaluation.points) == most
@@ -180,7 +225,9 @@ def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path
 @pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
 def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
     (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))
-    assert line.endswith("is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m")
+    assert line.endswith(
+        "is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m"
+    )
 
 
 def test_the_slope_of_an_uncertainty_that_nothing_has(tmp_path: Path) -> None:
@@ -195,7 +242,9 @@ def test_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
     assert len(lines) <= 2 * MOST_MESSAGES
     balls = f"corner: {{x: 0 mm, y: 0 mm}}, balls: [{', '.join(f'b{k}' for k in range(60_000))}]}}"
     lines = refusals(tmp_path, replaced("corner: {x: 0 mm, y: 0 mm}}", balls))
-    assert len(lines) == MOST_MESSAGES + 1 and lines[-1].endswith(": more than 1000 errors; mend these first")
+    assert len(lines) == MOST_MESSAGES + 1 and lines[-1].endswith(
+        ": more than 1000 errors; mend these first"
+    )
     lines = refusals(tmp_path, "a: [" + "~, " * 60_000 + "]")
     assert len(lines) == MOST_MESSAGES + 1
     lines = refusals(tmp_path, "a: [" + "*a, " * 60_000 + "]")
@@ -204,13 +253,19 @@ def test_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
 
 def test_a_table_of_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
     (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\n" + "a,b,c\n" * 100_000)
-    text = replaced("{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: balls.csv}")
-    assert refusals(tmp_path, text)[-1].endswith("balls.csv:502:1: more than 1000 errors; mend these first")
+    text = replaced(
+        "{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: balls.csv}"
+    )
+    assert refusals(tmp_path, text)[-1].endswith(
+        "balls.csv:502:1: more than 1000 errors; mend these first"
+    )
 
 
 def test_tables_of_a_million_columns(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("x_mm," * 10**6 + "\n1,2\n")
-    text = replaced("{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: t.csv}")
+    text = replaced(
+        "{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: t.csv}"
+    )
     text += "true_machine: {kind: curves, files: [t.csv]}\n"
     lines = refusals(tmp_path, text)
     assert lines == [
@@ -222,7 +277,10 @@ def test_tables_of_a_million_columns(tmp_path: Path) -> None:
 def test_names_with_ends_of_lines_and_control_characters(tmp_path: Path) -> None:
     text = replaced("name: low,", r'name: low, artefact: "a\n\e[31m\u2028b",')
     (line,) = refusals(tmp_path, text)
-    assert line == r'8:27: positions[0].artefact: unknown artefact "a\x0a\x1b[31m\u2028b"; known: plate'
+    assert (
+        line
+        == r'8:27: positions[0].artefact: unknown artefact "a\x0a\x1b[31m\u2028b"; known: plate'
+    )
     (line,) = refusals(tmp_path, replaced("name: low,", r'name: low, "a\nb": 1,'))
     assert line.startswith(r"8:17: positions[0][a\x0ab]: unknown key")
     (line,) = refusals(tmp_path, replaced("title: good", r'title: "a\tb"'))
@@ -254,7 +312,10 @@ def _loop(path: Path) -> None:
     [
         (_device, "this is a device; name a file"),
         (os.mkfifo, "this is a pipe, to which nobody may write; name a file"),
-        (_loop, "cannot be read (Too many levels of symbolic links); check its name and permissions"),
+        (
+            _loop,
+            "cannot be read (Too many levels of symbolic links); check its name and permissions",
+        ),
     ],
 )
 def test_what_is_no_file(tmp_path: Path, make: Callable[[Path], None], text: str) -> None:
@@ -274,14 +335,18 @@ def test_many_balls_at_one_place() -> None:
 
 def test_certified_coordinates_of_many_balls(tmp_path: Path) -> None:
     """Frame, estimate and synthetic artefact of 10,000 balls need no matrix over all of them."""
-    text = replaced("[3, 3]", "[100, 100]").replace("distances, pairs: corner sides", "coordinates, balls: all")
+    text = replaced("[3, 3]", "[100, 100]").replace(
+        "distances, pairs: corner sides", "coordinates, balls: all"
+    )
     (tmp_path / "e.yaml").write_text(text)
     design = lay_out(load(tmp_path / "e.yaml")[0])
     off = true_artefacts(design, np.random.default_rng(1)) - design.balls
     assert 0.99 < off.std() / 0.2e-6 < 1.01 and abs(off.mean()) < 0.01e-6
 
 
-def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_distances_are_absorbed_some_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     text = replaced("[3, 3]", "[14, 14]").replace("corner sides", "neighbours")
     (tmp_path / "e.yaml").write_text(text)
     design = lay_out(load(tmp_path / "e.yaml")[0])
@@ -300,10 +365,14 @@ def test_many_distances_are_absorbed_some_at_a_time(tmp_path: Path, monkeypatch:
             one.root.T @ one.root, plain.root.T @ plain.root, atol=1e-7 * abs(plain.root).max() ** 2
         )
         whole = one.kept_root.T @ one.kept_root
-        np.testing.assert_allclose(whole, plain.kept_root.T @ plain.kept_root, atol=1e-12 * abs(whole).max())
+        np.testing.assert_allclose(
+            whole, plain.kept_root.T @ plain.kept_root, atol=1e-12 * abs(whole).max()
+        )
 
 
-def test_variants_that_are_too_large_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_variants_that_are_too_large_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each has 9 balls, reads them with one probe, and has 4 calibrated distances and 20 points."""
     each, most = 9 + 9 + 4 + 20, 3
     text = f"{GOOD}evaluation: {{points: {{random: 20, seed: 1}}, probe: down}}\nvariants:\n"
@@ -314,9 +383,10 @@ def test_variants_that_are_too_large_together(tmp_path: Path, monkeypatch: pytes
     assert len(load(path)) == most
     (line,) = refusals(tmp_path, text + "".join(names))
     place = f"{text.count(chr(10)) + most + 1}:7: variants.v{most}"
-    assert line == (
-        f"{place}: the variants up to here have {(most + 1) * each} balls, balls read, calibrated values, priors and "
-        f"evaluation points; at most {most * each} are possible: put some of the variants into a file of their own"
+    assert (
+        line == f"{place}: the variants up to here have {(most + 1) * each} balls, balls read,"
+        f" calibrated values, priors and evaluation points; at most {most * each} are possible:"
+        " put some of the variants into a file of their own"
     )
     # A single experiment has the other limits alone.
     monkeypatch.setattr(modules["ballplate.simulator.experiment.load"], "MOST_OF_ALL", each - 1)

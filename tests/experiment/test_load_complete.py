@@ -5,7 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.simulator.experiment import CoordinateCalibration, DistanceCalibration, Experiment, load
+from ballplate.simulator.experiment import (
+    CoordinateCalibration,
+    DistanceCalibration,
+    Experiment,
+    load,
+)
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.inputs.yamltree import Mapping, read_tree, walk
@@ -105,8 +110,12 @@ def experiment_of(folder: Path, text: str) -> Experiment:
     path = folder / "design.yaml"
     path.write_text(text, encoding="utf-8")
     (folder / "balls.csv").write_text("ball,x_mm,y_mm\n# a comment\np,0,0\nq,10.5,0\n")
-    (folder / "distances.csv").write_text("ball_1,ball_2,distance_mm\nr3c3,r1c1,707.107\nr1c1,r1c2,250.0001\n")
-    (folder / "certificate.csv").write_text("ball,x_mm,y_mm,z_um\nr1c1,0.0001,0,0.3\nr3c3,500.0001,500,0.4\n")
+    (folder / "distances.csv").write_text(
+        "ball_1,ball_2,distance_mm\nr3c3,r1c1,707.107\nr1c1,r1c2,250.0001\n"
+    )
+    (folder / "certificate.csv").write_text(
+        "ball,x_mm,y_mm,z_um\nr1c1,0.0001,0,0.3\nr3c3,500.0001,500,0.4\n"
+    )
     (experiment,) = load(path)
     return experiment
 
@@ -122,7 +131,12 @@ def plane(tmp_path: Path) -> Experiment:
 
 
 def test_the_file_uses_every_key(complete: Experiment) -> None:
-    used = {key for _, node in walk(read_tree(complete.source)) if isinstance(node, Mapping) for key in node.items}
+    used = {
+        key
+        for _, node in walk(read_tree(complete.source))
+        if isinstance(node, Mapping)
+        for key in node.items
+    }
     # Pools have tests of their own.
     assert set(ExperimentSettings.model_fields) - used == {"variants", "pool"}
     for key in (
@@ -141,7 +155,12 @@ def test_the_file_uses_every_key(complete: Experiment) -> None:
 
 def test_heading(complete: Experiment) -> None:
     assert (complete.title, complete.description) == ("Every key", "at least once")
-    assert (complete.name, complete.label, complete.seed, complete.sigma) == (None, "design", 7, "given")
+    assert (complete.name, complete.label, complete.seed, complete.sigma) == (
+        None,
+        "design",
+        7,
+        "given",
+    )
     assert complete.target_accuracy == Target(LengthFunction(5e-7, 1e-6), 2.0)
     assert complete.expected_rank_deficiency == 0
     assert (complete.error_model.kind, complete.true_machine.kind) == ("kinematic", "zero")
@@ -224,7 +243,9 @@ def test_evaluation_points_are_inside_and_repeatable(complete: Experiment, tmp_p
 def test_evaluation_points_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("z_mm,x_mm,y_mm\n3,1,2\n")
     text = COMPLETE.replace("{random: 200, seed: 1}", "{file: points.csv}")
-    np.testing.assert_array_equal(experiment_of(tmp_path, text).evaluation.points, [[0.001, 0.002, 0.003]])
+    np.testing.assert_array_equal(
+        experiment_of(tmp_path, text).evaluation.points, [[0.001, 0.002, 0.003]]
+    )
 
 
 def test_plane_experiment_with_defaults(plane: Experiment) -> None:
@@ -242,7 +263,9 @@ def test_plane_experiment_with_defaults(plane: Experiment) -> None:
     np.testing.assert_allclose(second.pose.origin, [0.55, 0.05])
     np.testing.assert_array_equal(third.pose.origin, [0.55, 0.0])
     distances, coordinates = plane.calibration
-    assert isinstance(distances, DistanceCalibration) and isinstance(coordinates, CoordinateCalibration)
+    assert isinstance(distances, DistanceCalibration) and isinstance(
+        coordinates, CoordinateCalibration
+    )
     assert distances.dimensions == 2
     assert coordinates.axes == (0, 1) and coordinates.values.shape == (48, 2)
 

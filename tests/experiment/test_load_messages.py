@@ -345,7 +345,9 @@ def test_the_good_files_are_good(tmp_path: Path) -> None:
         assert len(load(tmp_path / "e.yaml")) == 1
 
 
-@pytest.mark.parametrize(("old", "new", "lines"), SECTIONS + MACHINE + ARTEFACTS + POSITIONS + CALIBRATION)
+@pytest.mark.parametrize(
+    ("old", "new", "lines"), SECTIONS + MACHINE + ARTEFACTS + POSITIONS + CALIBRATION
+)
 def test_broken_files(tmp_path: Path, old: str, new: str, lines: list[str]) -> None:
     assert GOOD.count(old) >= 1
     assert refusals(tmp_path, GOOD.replace(old, new, 1)) == [f"e.yaml:{line}" for line in lines]
@@ -357,8 +359,14 @@ def test_broken_plane_files(tmp_path: Path, old: str, new: str, lines: list[str]
 
 
 def test_errors_of_all_sections_at_once_by_line(tmp_path: Path) -> None:
-    text = GOOD.replace("0.2 um", "0.2", 1).replace("kind: grid", "kind: gird").replace("plane: z", "plane: w", 1)
-    text = text.replace("pairs: all", "pairs: al").replace("artefact: bar, plane", "artefact: baz, plane")
+    text = (
+        GOOD.replace("0.2 um", "0.2", 1)
+        .replace("kind: grid", "kind: gird")
+        .replace("plane: z", "plane: w", 1)
+    )
+    text = text.replace("pairs: all", "pairs: al").replace(
+        "artefact: bar, plane", "artefact: baz, plane"
+    )
     lines = refusals(tmp_path, text)
     assert [line.split(": ")[1] for line in lines] == [
         "machine.repeatability",
@@ -373,26 +381,42 @@ def test_tables_are_reported_at_their_own_lines(tmp_path: Path) -> None:
     (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,five\nr1c1,r9c9,-1\n")
     text = GOOD.replace(SIDES, f"{SIDES}, values: d.csv").replace("title: good", "title: 1")
     assert refusals(tmp_path, text) == [
-        "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (what the experiment is, in a line)",
+        (
+            "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (what the"
+            " experiment is, in a line)"
+        ),
         'd.csv:2:11: "five" is not a number; write for example "500.0003"',
     ]
-    (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,500\nr1c1,r9c9,-1\nr1c3,r1c1,5\n")
+    (tmp_path / "d.csv").write_text(
+        "ball_1,ball_2,distance_mm\nr1c1,r1c3,500\nr1c1,r9c9,-1\nr1c3,r1c1,5\n"
+    )
     assert refusals(tmp_path, text)[1:] == [
         "d.csv:3:1: calibration[0].values: a distance must be above zero; correct it",
-        'd.csv:3:1: calibration[0].values: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, '
-        "r3c1, r3c2 and 1 more",
-        "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's drawing; "
-        "correct the one or the other",
-        'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice; remove one of the two',
+        (
+            'd.csv:3:1: calibration[0].values: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1,'
+            " r2c2, r2c3, r3c1, r3c2 and 1 more"
+        ),
+        (
+            "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's"
+            " drawing; correct the one or the other"
+        ),
+        (
+            'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice;'
+            " remove one of the two"
+        ),
     ]
 
 
 def test_a_certificate_lacks_balls(tmp_path: Path) -> None:
     (tmp_path / "c.csv").write_text("ball,x_mm,y_mm,z_mm\nr1c1,0,0,0\nr1c3,500,0,0\n")
     old = "kind: distances, artefact: plate, " + SIDES
-    new = "kind: coordinates, artefact: plate, balls: corners, standard_uncertainty: 1 um, values: c.csv"
+    new = (
+        "kind: coordinates, artefact: plate, balls: corners, standard_uncertainty: 1 um, values:"
+        " c.csv"
+    )
     assert refusals(tmp_path, GOOD.replace(old, new)) == [
-        "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or leave them out of balls"
+        "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or leave"
+        " them out of balls"
     ]
 
 
@@ -420,10 +444,14 @@ def test_messages_are_data() -> None:
 FRAGMENTS = ["5", "x", "[]", "{}", "[[1 mm]]", "{x: 1 mm}", "~", "true", "-1 mm", ".nan", "[a, {b: 1}]",
              "{kind: grid}",
              "{kind: balls}", "{kind: [1]}", "0 mm"]  # fmt: skip
-WORDS = sorted({word for word in GOOD.replace("{", " ").replace("}", " ").split() if word.endswith(",")})
+WORDS = sorted(
+    {word for word in GOOD.replace("{", " ").replace("}", " ").split() if word.endswith(",")}
+)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None
+)
 @given(st.data())
 def test_no_mistake_breaks_the_loader(tmp_path: Path, data: st.DataObject) -> None:
     text = GOOD
@@ -447,14 +475,21 @@ SECTION_VALUES = st.recursive(
     ),
     lambda below: st.one_of(
         st.lists(below, max_size=3),
-        st.dictionaries(st.sampled_from(["kind", "x", "balls", "name", "artefact", "pairs"]), below, max_size=3),
+        st.dictionaries(
+            st.sampled_from(["kind", "x", "balls", "name", "artefact", "pairs"]), below, max_size=3
+        ),
     ),
     max_leaves=8,
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
-@given(st.sampled_from([line.split(":")[0] for line in GOOD.split("\n") if line[:1].isalpha()]), SECTION_VALUES)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None
+)
+@given(
+    st.sampled_from([line.split(":")[0] for line in GOOD.split("\n") if line[:1].isalpha()]),
+    SECTION_VALUES,
+)
 def test_no_section_breaks_the_loader(tmp_path: Path, section: str, value: object) -> None:
     lines, kept = GOOD.split("\n"), []
     inside = False
@@ -471,7 +506,9 @@ def test_no_section_breaks_the_loader(tmp_path: Path, section: str, value: objec
 def test_too_many_balls_tied_by_distances(tmp_path: Path) -> None:
     path = tmp_path / "many.yaml"
     text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
-    path.write_text(text.replace("[5, 5]", "[60, 60]").replace("corner sides ", "neighbours "), encoding="utf-8")
+    path.write_text(
+        text.replace("[5, 5]", "[60, 60]").replace("corner sides ", "neighbours "), encoding="utf-8"
+    )
     with pytest.raises(ExperimentError) as caught:
         load(path)
     assert [message.path for message in caught.value.messages] == ["calibration[0].pairs"]

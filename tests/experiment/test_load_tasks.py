@@ -30,8 +30,16 @@ def test_defaults_are_those_of_the_evaluation_and_of_the_file(tmp_path: Path) ->
     (tmp_path / "good.yaml").write_text(TEXT, encoding="utf-8")
     found = load(tmp_path / "good.yaml")[0].evaluation
     assert found.points.shape == (0, 3)
-    assert [task.probes for task in found.tasks] == [("side", "side"), ("down", "down"), ("down", "side")]
-    assert [task.target.stated.constant for task in found.tasks if task.target] == [1e-6, 0.2e-6, 1e-6]
+    assert [task.probes for task in found.tasks] == [
+        ("side", "side"),
+        ("down", "down"),
+        ("down", "side"),
+    ]
+    assert [task.target.stated.constant for task in found.tasks if task.target] == [
+        1e-6,
+        0.2e-6,
+        1e-6,
+    ]
     np.testing.assert_array_equal(found.tasks[0].points, [[0, 0, 0], [1, 0, 0]])
 
 

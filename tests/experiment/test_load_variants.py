@@ -43,8 +43,12 @@ variants:
 """
     )
     lines = refusals(tmp_path, text)
-    assert lines[0].startswith("e.yaml:12:5: variants.A[positions[0].level]: is part of the same place as")
-    assert lines[1].startswith("e.yaml:15:5: variants.B[positions[0].level]: is part of the same place as")
+    assert lines[0].startswith(
+        "e.yaml:12:5: variants.A[positions[0].level]: is part of the same place as"
+    )
+    assert lines[1].startswith(
+        "e.yaml:15:5: variants.B[positions[0].level]: is part of the same place as"
+    )
 
 
 @pytest.mark.parametrize("value", ["true", '"7"', "7.0", "1e0"])
@@ -90,16 +94,23 @@ def test_the_base_need_not_be_complete(tmp_path: Path) -> None:
     assert only.error_model.kind == "kinematic"
     lines = refusals(tmp_path, text + "variants: {A: {error_model: {kind: kinematic}}, B: {}}\n")
     about = "the errors of the machine that are estimated"
-    assert lines == [f'e.yaml:1:1: error_model: missing; add "error_model" ({about}) (in variant B)']
+    assert lines == [
+        f'e.yaml:1:1: error_model: missing; add "error_model" ({about}) (in variant B)'
+    ]
 
 
 def test_messages_stand_at_the_line_of_the_variant(tmp_path: Path) -> None:
     text = BASE + "variants:\n  A: {}\n  B:\n    positions[low].level: 5\n    seed: x\n"
     assert refusals(tmp_path, text) == [
-        'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 um" (in variant B)',
-        'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
-        "readings; default 1) "
-        "(in variant B)",
+        (
+            'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 um"'
+            " (in variant B)"
+        ),
+        (
+            'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
+            "readings; default 1) "
+            "(in variant B)"
+        ),
     ]
 
 

@@ -1,4 +1,6 @@
-"""Machine files: what they say arrives in metres and radians, and everything that is wrong is told at once."""
+"""Machine files: what they say arrives in metres and radians, and everything that is wrong is told
+at once.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,12 @@ import pytest
 from ballplate.simulator.experiment import ExperimentError, load
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.curves import Points
-from ballplate.simulator.machines.description import AxisTemperature, PowerSeries, Squareness, random_part
+from ballplate.simulator.machines.description import (
+    AxisTemperature,
+    PowerSeries,
+    Squareness,
+    random_part,
+)
 from ballplate.volumetric.volumetric_errors import Volumetric
 
 MACHINE = """\
@@ -58,7 +65,11 @@ def test_everything_arrives(tmp_path: Path) -> None:
     found = pickle.loads(pickle.dumps(load_machine(written(tmp_path))))
     assert (found.arrangement_name, found.arrangement.probe_side) == ("MH2", ("x", "z", "y"))
     assert (found.lower, found.upper) == ((-0.1, 0.0, 0.0), (1.8, 1.2, 1.2))
-    assert (found.reference, found.probe, found.probing) == ((0.0, 0.1, 0.0), (0.0, 0.0, -0.1), 1e-6)
+    assert (found.reference, found.probe, found.probing) == (
+        (0.0, 0.1, 0.0),
+        (0.0, 0.0, -0.1),
+        1e-6,
+    )
     assert dict(found.droop) == {"phi1": 2e-6, "phi2": -3e-6}
     assert dict(found.temperature) == {"x": AxisTemperature(11e-6, -1.5, 0.1)}
     first, second = found.squareness
@@ -70,12 +81,24 @@ def test_everything_arrives(tmp_path: Path) -> None:
     assert eyx.shape == Points((-0.1, 0.9, 1.8), (0.0, 3e-6, -1e-6))
     assert isinstance(eyx.deviation, Points)
     np.testing.assert_allclose(eyx.deviation.values, [0.5e-6, 0.75e-6, 1e-6])
-    assert (eyx.line, eyx.probe, eyx.criterion) == ((0.0, 0.4, 0.25), (0.0, 0.0, -0.05), "minimum zone")
-    assert (ebx.name, ebx.shape, ebx.deviation, ebx.criterion) == ("EBX", None, 2e-6, "least squares")
+    assert (eyx.line, eyx.probe, eyx.criterion) == (
+        (0.0, 0.4, 0.25),
+        (0.0, 0.0, -0.05),
+        "minimum zone",
+    )
+    assert (ebx.name, ebx.shape, ebx.deviation, ebx.criterion) == (
+        "EBX",
+        None,
+        2e-6,
+        "least squares",
+    )
 
 
 def test_what_may_be_left_out(tmp_path: Path) -> None:
-    text = "title: plain\narrangement: {probe_side: [x, z], workpiece_side: [y]}\nvolume: [1 m, 1 m, 1 m]\n"
+    text = (
+        "title: plain\narrangement: {probe_side: [x, z], workpiece_side: [y]}\nvolume: [1 m, 1 m, 1"
+        " m]\n"
+    )
     found = load_machine(written(tmp_path, text))
     assert found.reference == found.lower == (0.0, 0.0, 0.0)
     assert not found.errors and not found.squareness and found.criterion == "end points"
@@ -107,16 +130,31 @@ probing: 0 um
         "m.yaml:5:68: errors.EXX.sigmas: expected one of: 1, 2, 3; found the number 4",
         "m.yaml:6:15: errors.EYX.file: none.csv: there is no such file",
         'm.yaml:7:3: errors.EYQ: unknown key; did you mean "EZY"?',
-        "m.yaml:8:8: errors.EBX: a polynomial and a file cannot both be the error; leave one of them out",
-        "m.yaml:8:46: errors.EBX.file: eyx.csv: the file should have EBX alone, but has EYX, EYX_bandwidth",
+        (
+            "m.yaml:8:8: errors.EBX: a polynomial and a file cannot both be the error; leave one of"
+            " them out"
+        ),
+        (
+            "m.yaml:8:46: errors.EBX.file: eyx.csv: the file should have EBX alone, but has EYX,"
+            " EYX_bandwidth"
+        ),
         'm.yaml:9:8: errors.EZX: "line" has no meaning here; write # line: … into the file',
         "m.yaml:9:15: errors.EZX.file: eyx.csv: the file should have EZX alone",
-        "m.yaml:10:8: errors.EAX: nothing is stated; give a polynomial, a file, or the bandwidth of a random error",
+        (
+            "m.yaml:10:8: errors.EAX: nothing is stated; give a polynomial, a file, or the"
+            " bandwidth of a random error"
+        ),
         "m.yaml:11:35: errors.EYY.straightness: unknown key",
-        'm.yaml:12:20: squareness.EC0Y: "12" has no unit; write for example "12 arcsec" or "12 deg"',
+        (
+            'm.yaml:12:20: squareness.EC0Y: "12" has no unit; write for example "12 arcsec" or "12'
+            ' deg"'
+        ),
         'm.yaml:12:24: squareness.EB0Y: unknown key; did you mean "EC0Y"?',
         'm.yaml:13:30: temperature.x.deviation: "1.5" has no unit; write for example "1.5 degC"',
-        'm.yaml:13:46: temperature.x.expansion: "11 um/m" is a ratio; a thermal expansion is expected',
+        (
+            'm.yaml:13:46: temperature.x.expansion: "11 um/m" is a ratio; a thermal expansion is'
+            " expected"
+        ),
         'm.yaml:14:1: drop: unknown key; did you mean "droop"?',
         'm.yaml:15:10: probing: "0 um" must be above zero; give a small one, such as 1 nm',
     ]
@@ -129,30 +167,69 @@ probing: 0 um
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("MH2", "MB1", "m.yaml:13:1: droop: only the arm of MH1, MH2 droops; leave it out, or name one of them"),
+        (
+            "MH2",
+            "MB1",
+            (
+                "m.yaml:13:1: droop: only the arm of MH1, MH2 droops; leave it out, or name one of"
+                " them"
+            ),
+        ),
         (
             "x: [-100 mm, 1800 mm]",
             "x: [1800 mm, -100 mm]",
             "m.yaml:3:13: volume.x: ends at -100 mm, not above its",
         ),
-        ("y: [0 mm, 1200 mm]", "y: [1 m, 1 m]", "m.yaml:3:36: volume.y: ends where it begins, at 1000 mm; give an end"),
-        (", z: [0 mm, 1200 mm]}", "}", "m.yaml:3:9: volume.z: missing; a machine file has three axes"),
+        (
+            "y: [0 mm, 1200 mm]",
+            "y: [1 m, 1 m]",
+            "m.yaml:3:36: volume.y: ends where it begins, at 1000 mm; give an end",
+        ),
+        (
+            ", z: [0 mm, 1200 mm]}",
+            "}",
+            "m.yaml:3:9: volume.z: missing; a machine file has three axes",
+        ),
         (
             "[0 mm, 100 mm, 0 mm]",
             "[0 mm, 2 m, 0 mm]",
             "m.yaml:4:18: reference_point: y = 2000 mm is outside the volume",
         ),
-        ("line: {z: 250 mm}", "line: {x: 1 mm}", "m.yaml:8:78: errors.EXX.line.x: the line runs along x; leave it out"),
-        ("line: {z: 250 mm}", "line: {z: 9 m}", "m.yaml:8:77: errors.EXX.line: z = 9000 mm is outside the volume"),
-        ("[0 um, 12 um, -3 um]", f"[{', '.join(['1 um'] * 12)}]", "m.yaml:8:21: errors.EXX.polynomial: has 12 entries"),
-        ("csv, sigmas", "csv, bandwidth: 1 um, sigmas", "m.yaml:9:35: errors.EYX.bandwidth: the file has a bandwidth"),
-        ("at: [100 mm", "at: [-1 m", "m.yaml:11:57: squareness.EB0Z.at: x = -1000 mm is outside the volume"),
+        (
+            "line: {z: 250 mm}",
+            "line: {x: 1 mm}",
+            "m.yaml:8:78: errors.EXX.line.x: the line runs along x; leave it out",
+        ),
+        (
+            "line: {z: 250 mm}",
+            "line: {z: 9 m}",
+            "m.yaml:8:77: errors.EXX.line: z = 9000 mm is outside the volume",
+        ),
+        (
+            "[0 um, 12 um, -3 um]",
+            f"[{', '.join(['1 um'] * 12)}]",
+            "m.yaml:8:21: errors.EXX.polynomial: has 12 entries",
+        ),
+        (
+            "csv, sigmas",
+            "csv, bandwidth: 1 um, sigmas",
+            "m.yaml:9:35: errors.EYX.bandwidth: the file has a bandwidth",
+        ),
+        (
+            "at: [100 mm",
+            "at: [-1 m",
+            "m.yaml:11:57: squareness.EB0Z.at: x = -1000 mm is outside the volume",
+        ),
         (
             "title: moving",
             "positions: []\ntitle: moving",
             "m.yaml:1:1: this is an experiment or a sweep; name a machine",
         ),
-        ("probing: 1 um", "probing: 1 um\nprobing: 2 um", 'm.yaml:15:1: the key "probing" stands already in line 14'),
+        (
+            "probing: 1 um",
+            "probing: 1 um\nprobing: 2 um",
+            'm.yaml:15:1: the key "probing" stands already in line 14',
+        ),
         ("probing: 1 um", "probing:", "m.yaml:14:9: probing: empty; give a value, or leave it out"),
     ],
 )
@@ -166,44 +243,103 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
 @pytest.mark.parametrize(
     ("old", "new", "messages"),
     [
-        ("y = 400 mm, z", "y = 400 mm, y", ["eyx.csv:2:9: y is given twice; leave one of them out"]),
-        ("y = 400 mm", "y = 400", ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm" or "400 um"']),
+        (
+            "y = 400 mm, z",
+            "y = 400 mm, y",
+            ["eyx.csv:2:9: y is given twice; leave one of them out"],
+        ),
+        (
+            "y = 400 mm",
+            "y = 400",
+            ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm" or "400 um"'],
+        ),
         ("y = 400 mm", "x = 400 mm", ["eyx.csv:2:9: the line runs along x; leave it out"]),
         ("y = 400 mm", "y = 1,5 mm", ['eyx.csv:2:9: "1,5" has a decimal comma; write 1.5']),
-        ("0 mm, 0 mm, -50 mm", "0 mm, 0 mm, -0,5 mm", ['eyx.csv:4:10: "0,5" has a decimal comma; write 0.5']),
-        ("y = 400 mm", "at the front", ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y']),
-        ("y = 400 mm", "y = 4 m", ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"]),
-        ("# line:", "# lines:", ['eyx.csv:2:3: unknown "lines:"; did you mean "line:"? If not, reword the comment']),
+        (
+            "0 mm, 0 mm, -50 mm",
+            "0 mm, 0 mm, -0,5 mm",
+            ['eyx.csv:4:10: "0,5" has a decimal comma; write 0.5'],
+        ),
+        (
+            "y = 400 mm",
+            "at the front",
+            ['eyx.csv:2:9: "at the front" is no position of an axis; write for example y'],
+        ),
+        (
+            "y = 400 mm",
+            "y = 4 m",
+            ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"],
+        ),
+        (
+            "# line:",
+            "# lines:",
+            ['eyx.csv:2:3: unknown "lines:"; did you mean "line:"? If not, reword the comment'],
+        ),
         ("# line:", "#LINE:", ['eyx.csv:2:2: unknown "LINE:"; did you mean "line:"?']),
         ("# line:", "# Line at:", ['eyx.csv:2:3: unknown "Line at:"; did you mean "line:"?']),
-        ("# line:", "# line", ['eyx.csv:2:3: unknown "line y = 400 mm, z = 250 mm"; did you mean "line:"?']),
+        (
+            "# line:",
+            "# line",
+            ['eyx.csv:2:3: unknown "line y = 400 mm, z = 250 mm"; did you mean "line:"?'],
+        ),
         ("# line: y =", "# line = y:", ['eyx.csv:2:3: unknown "line = y:"; did you mean "line:"?']),
-        ("# straightness:", "# straigthness:", ['eyx.csv:3:3: unknown "straigthness:"; did you mean "straightness:"?']),
+        (
+            "# straightness:",
+            "# straigthness:",
+            ['eyx.csv:3:3: unknown "straigthness:"; did you mean "straightness:"?'],
+        ),
         (
             "# straightness:",
             "# straightness",
             ['eyx.csv:3:3: unknown "straightness minimum zone"; did you'],
         ),
         ("# probe:", "# Offset:", ['eyx.csv:4:3: unknown "Offset:"; did you mean "probe:"?']),
-        ("# measured: last year", "# straightness of X in Y, measured along the granite: very fine", []),
+        (
+            "# measured: last year",
+            "# straightness of X in Y, measured along the granite: very fine",
+            [],
+        ),
         ("# measured: last year", "# file: 2021", []),
         ("# straightness", "# line", ['eyx.csv:3:3: "line:" stands already in line 2; remove one']),
-        ("minimum zone", "minimal zone", ['eyx.csv:3:17: unknown criterion "minimal zone"; did you mean "minimum']),
-        ("0 mm, 0 mm, -50 mm", "0 mm, -50", ["eyx.csv:4:10: has 2 co-ordinates; give three, such as"]),
+        (
+            "minimum zone",
+            "minimal zone",
+            ['eyx.csv:3:17: unknown criterion "minimal zone"; did you mean "minimum'],
+        ),
+        (
+            "0 mm, 0 mm, -50 mm",
+            "0 mm, -50",
+            ["eyx.csv:4:10: has 2 co-ordinates; give three, such as"],
+        ),
         (
             "# probe",
             "# straightedge: table\n# probe",
             ["m.yaml:9:15: errors.EYX.file: the x axis moves no table; leave"],
         ),
-        ("# probe", "# straightedge: box\n# probe", ['eyx.csv:4:17: unknown place "box"; write table, or leave']),
+        (
+            "# probe",
+            "# straightedge: box\n# probe",
+            ['eyx.csv:4:17: unknown place "box"; write table, or leave'],
+        ),
         ("900,3,1500", "900,three,15,00", ["eyx.csv:6:1: 4 columns instead of 3"]),
         ("1500", "-1500", ["m.yaml:9:15: errors.EYX.file: eyx.csv: a bandwidth is below zero"]),
         ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write it with its unit']),
         # The last point but a wide spacing away from the end of the axis, and a little beyond it.
         ("1800,", "1650,", []),
         ("1800,", "1890,", []),
-        ("1800,", "950,", ["eyx.csv:8:1: the table ends at 950 mm, but the axis goes from -100 mm to 1800 mm; give"]),
-        ("-100,", "-200,", ["eyx.csv:7:1: the table begins at -200 mm, but the axis goes from -100 mm to 1800 mm"]),
+        (
+            "1800,",
+            "950,",
+            [
+                "eyx.csv:8:1: the table ends at 950 mm, but the axis goes from -100 mm to 1800 mm;"
+                " give"
+            ],
+        ),
+        (
+            "-100,",
+            "-200,",
+            ["eyx.csv:7:1: the table begins at -200 mm, but the axis goes from -100 mm to 1800 mm"],
+        ),
         (
             "position_mm",
             "position_m",
@@ -214,7 +350,9 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         ),
     ],
 )
-def test_what_is_wrong_with_a_table(tmp_path: Path, old: str, new: str, messages: list[str]) -> None:
+def test_what_is_wrong_with_a_table(
+    tmp_path: Path, old: str, new: str, messages: list[str]
+) -> None:
     assert old in TABLE
     if not messages:
         load_machine(written(tmp_path, table=TABLE.replace(old, new)))
@@ -226,13 +364,19 @@ def test_what_is_wrong_with_a_table(tmp_path: Path, old: str, new: str, messages
 
 
 def test_reversed_ends_are_told_with_everything_else(tmp_path: Path) -> None:
-    text = MACHINE.replace("x: [-100 mm, 1800 mm]", "x: [1800 mm, -100 mm]").replace("probing: 1 um", "probing: 1")
+    text = MACHINE.replace("x: [-100 mm, 1800 mm]", "x: [1800 mm, -100 mm]").replace(
+        "probing: 1 um", "probing: 1"
+    )
     text = text.replace("z: [0 mm, 1200 mm]", "z: [1200 mm, 0 mm]")
     lines = told(written(tmp_path, text, TABLE.replace("y = 400 mm", "y = 400")))
     places = ["m.yaml:3:13", "m.yaml:3:56", "m.yaml:14:10", "eyx.csv:2:9"]
     assert sorted(line.partition(": ")[0] for line in lines) == sorted(places), lines
     # Mistakes that only a whole machine can have.
-    text = text.replace("probing: 1", "probing: 1 um").replace("MH2", "MB1").replace("line: {z: 250", "line: {z: 2500")
+    text = (
+        text.replace("probing: 1", "probing: 1 um")
+        .replace("MH2", "MB1")
+        .replace("line: {z: 250", "line: {z: 2500")
+    )
     lines = told(written(tmp_path, text, TABLE.replace("1800,", "180,")))
     places = ["m.yaml:3:13", "m.yaml:3:56", "m.yaml:8:77", "m.yaml:13:1", "eyx.csv:6:1"]
     assert sorted(line.partition(": ")[0] for line in lines) == sorted(places), lines
@@ -281,19 +425,31 @@ def test_an_experiment_with_a_machine_file(tmp_path: Path) -> None:
     ("old", "new", "random"),
     [
         ("errors:", "errors:\n  EZX: {bandwidth: 1 um}", ("bandwidth of EZX",)),
-        ("errors:", "squareness: {EC0Y: {value: 1 urad, bandwidth: 1 urad}}\nerrors:", ("bandwidth of EC0Y",)),
+        (
+            "errors:",
+            "squareness: {EC0Y: {value: 1 urad, bandwidth: 1 urad}}\nerrors:",
+            ("bandwidth of EC0Y",),
+        ),
         ("errors:", "probing: 1 um\nerrors:", ("probing",)),
         (
             "errors:",
-            "temperature: {y: {deviation: 0 degC, expansion: 11 um/m/degC, standard_uncertainty: 0.1 degC}}\nerrors:",
+            (
+                "temperature: {y: {deviation: 0 degC, expansion: 11 um/m/degC,"
+                " standard_uncertainty: 0.1 degC}}\nerrors:"
+            ),
             ("uncertain temperature of y",),
         ),
         ("errors:", "errors:\n  EYX: {polynomial: [0 um, 0 um, 1 um]}", ()),
     ],
 )
-def test_every_random_part_is_told(tmp_path: Path, old: str, new: str, random: tuple[str, ...]) -> None:
+def test_every_random_part_is_told(
+    tmp_path: Path, old: str, new: str, random: tuple[str, ...]
+) -> None:
     """Whatever adds to the deviation at some point is named, and nothing is where there is none."""
-    bare = "title: m\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors:\n  EXX: {polynomial: [0 um, 1 um]}\n"
+    bare = (
+        "title: m\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors:\n  EXX: {polynomial: [0 um, 1"
+        " um]}\n"
+    )
     (tmp_path / "m.yaml").write_text(bare.replace(old, new))
     machine = load_machine(tmp_path / "m.yaml")
     assert random_part(machine) == random
@@ -312,13 +468,19 @@ def test_mistakes_of_a_machine_file_are_told_with_the_experiment(tmp_path: Path)
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("x: [0 mm, 1 m]", "x: [0 mm, 3 m]", "e.yaml:4:37: true_machine.file: its volume goes from -100 mm to 1800 mm"),
+        (
+            "x: [0 mm, 1 m]",
+            "x: [0 mm, 3 m]",
+            "e.yaml:4:37: true_machine.file: its volume goes from -100 mm to 1800 mm",
+        ),
         ("m.yaml, random", "n.yaml, random", "e.yaml:4:37: true_machine.file:"),
         (", random_part: omitted", "", "e.yaml:4:37: true_machine.file: has a random part"),
         ("m.yaml}\ntrue", "n.yaml}\ntrue", "e.yaml:3:36: error_model.file:"),
     ],
 )
-def test_what_is_wrong_with_the_use_of_a_machine_file(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_what_is_wrong_with_the_use_of_a_machine_file(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
     written(tmp_path)
     with pytest.raises(ExperimentError) as caught:
         load(experiment(tmp_path, EXPERIMENT.replace(old, new)))
@@ -327,6 +489,13 @@ def test_what_is_wrong_with_the_use_of_a_machine_file(tmp_path: Path, old: str, 
 
 
 def test_a_machine_that_states_nothing_to_be_estimated(tmp_path: Path) -> None:
-    written(tmp_path, "title: random\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors: {EXX: {bandwidth: 1 um}}\n")
-    with pytest.raises(ExperimentError, match=r"e.yaml:3:36: error_model.file: m.yaml states no error that could be"):
+    written(
+        tmp_path,
+        "title: random\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors: {EXX: {bandwidth: 1"
+        " um}}\n",
+    )
+    with pytest.raises(
+        ExperimentError,
+        match=r"e.yaml:3:36: error_model.file: m.yaml states no error that could be",
+    ):
         load(experiment(tmp_path))

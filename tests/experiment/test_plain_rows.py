@@ -1,4 +1,6 @@
-"""Tables read by the quick way are what exact arithmetic and the careful way make of them, to the last bit."""
+"""Tables read by the quick way are what exact arithmetic and the careful way make of them, to the
+last bit.
+"""
 
 from __future__ import annotations
 
@@ -38,10 +40,17 @@ def test_plain_numbers_are_the_nearest_ones(number: str, unit: str) -> None:
     exact = Fraction(Decimal(number)) * LENGTH_UNITS[unit]
     if unit == "in" or (exact and not Fraction(1, 10**18) <= abs(exact) <= 10**6):
         # Right at the limits the fraction and the float nearest to it may lie on different sides.
-        assert found is None or abs(abs(exact) / 10**6 - 1) < 1e-15 or abs(abs(exact) * 10**18 - 1) < 1e-15
+        assert (
+            found is None
+            or abs(abs(exact) / 10**6 - 1) < 1e-15
+            or abs(abs(exact) * 10**18 - 1) < 1e-15
+        )
     else:
         assert found is not None
-        assert (found, math.copysign(1.0, found)) == (float(exact), math.copysign(1.0, float(exact)))
+        assert (found, math.copysign(1.0, found)) == (
+            float(exact),
+            math.copysign(1.0, float(exact)),
+        )
 
 
 def _read(path: Path, unit: str, lines: list[str]) -> tuple[tuple[Row, ...], list[Message]]:
@@ -56,7 +65,9 @@ def _read(path: Path, unit: str, lines: list[str]) -> tuple[tuple[Row, ...], lis
 @pytest.mark.parametrize("unit", ["mm", "um", "in", "m"])
 @pytest.mark.parametrize("cell", CELLS)
 @pytest.mark.parametrize("name", ["r1c1", " spaced ", "'=1+1", ""])
-def test_quoted_rows_are_the_same_as_plain_ones(tmp_path: Path, unit: str, cell: str, name: str) -> None:
+def test_quoted_rows_are_the_same_as_plain_ones(
+    tmp_path: Path, unit: str, cell: str, name: str
+) -> None:
     """A row with a quotation mark goes the careful way."""
     path = tmp_path / "t.csv"
     plain, of_plain = _read(path, unit, [f"{name}, {cell} ,2.5", f"b,1,{cell}"])

@@ -1,4 +1,6 @@
-"""Pools of candidates: what is generated, what is dropped, how long it takes, and what is said about mistakes."""
+"""Pools of candidates: what is generated, what is dropped, how long it takes, and what is said
+about mistakes.
+"""
 
 from __future__ import annotations
 
@@ -121,10 +123,15 @@ def test_limits_are_of_indices(tmp_path: Path) -> None:
     pool = pool_of(tmp_path, GOOD)
     assert pool.must == (0,)
     assert pool.at_most == (AtMost((0, 8), 1), AtMost((4, 5, 6, 7), 1))
-    text = replaced(LIMITS, "  limits: {keep: all, at_most: [{of: {name: some z*, probe: down}, count: 0}]}\n")
+    text = replaced(
+        LIMITS, "  limits: {keep: all, at_most: [{of: {name: some z*, probe: down}, count: 0}]}\n"
+    )
     pool = pool_of(tmp_path, text)
     assert pool.must == (0,) and pool.at_most == (AtMost((1, 2, 3), 0),)
-    text = replaced("at_most: [{of: {plane: x}, count: 1}]", "at_most: [{of: {group: bar, artefact: bar}, count: 1}]")
+    text = replaced(
+        "at_most: [{of: {plane: x}, count: 1}]",
+        "at_most: [{of: {group: bar, artefact: bar}, count: 1}]",
+    )
     assert pool_of(tmp_path, text).at_most[-1] == AtMost((8,), 1)
 
 
@@ -133,7 +140,12 @@ def test_times(tmp_path: Path) -> None:
         "probes: [down]}\n    - {name: gauge",
         "probes: [down], repeats: 2, times: {reading: 1 min}}\n    - {name: gauge",
     )
-    pool = named(pool_of(tmp_path, replaced(SOME_PROBES, "probes: [down, right]\n      times: {set_up: 0 s}", text)))
+    pool = named(
+        pool_of(
+            tmp_path,
+            replaced(SOME_PROBES, "probes: [down, right]\n      times: {set_up: 0 s}", text),
+        )
+    )
     assert pool["low"].seconds == 600 + 9 * 15
     assert pool["some z 600 mm at 0, 0 mm"].seconds == 18 * 15 + 120
     assert pool["bar"].seconds == 600 + 4 * 60
@@ -141,12 +153,18 @@ def test_times(tmp_path: Path) -> None:
     whole = "times: {set_up: 1 min, reading: 1 s, probe_change: 5 s, plane_change: 7 s}"
     changes = pool_of(tmp_path, replaced("times: {set_up: 10 min}", whole)).changes
     assert (changes.probe, changes.plane) == (5.0, 7.0)
-    assert pool_of(tmp_path, replaced("  times: {set_up: 10 min}\n", "")).candidates[0].seconds == 1200 + 9 * 15
+    assert (
+        pool_of(tmp_path, replaced("  times: {set_up: 10 min}\n", "")).candidates[0].seconds
+        == 1200 + 9 * 15
+    )
 
 
 def test_settings_of_candidates_are_those_of_a_file(tmp_path: Path) -> None:
     pool = named(
-        pool_of(tmp_path, replaced(SOME_PROBES, f"{SOME_PROBES}\n      quarter_turns: [1]\n      balls: corners"))
+        pool_of(
+            tmp_path,
+            replaced(SOME_PROBES, f"{SOME_PROBES}\n      quarter_turns: [1]\n      balls: corners"),
+        )
     )
     assert pool["some x 600 mm at 400, 100 mm"].settings == {
         "name": "some x 600 mm at 400, 100 mm",
@@ -178,9 +196,16 @@ def test_two_dimensions(tmp_path: Path) -> None:
         "about 250, 500 mm turn 1 all balls",
     ]
     assert len(names) == len(set(names)) == 12
-    assert "probes" not in experiment.pool.candidates[0].settings and experiment.pool.candidates[0].plane == ""
+    assert (
+        "probes" not in experiment.pool.candidates[0].settings
+        and experiment.pool.candidates[0].plane == ""
+    )
     (line,) = messages(tmp_path, PLANE)
-    assert line == "1:1: positions: missing; add positions, or choose some from the pool with: ballplate plan FILE"
+    assert (
+        line
+        == "1:1: positions: missing; add positions, or choose some from the pool with: ballplate"
+        " plan FILE"
+    )
 
 
 @pytest.mark.parametrize("name", ["plate-pool", "campaign"])
@@ -197,7 +222,11 @@ def test_what_is_there_can_be_read_and_stands_there_once(name: str) -> None:
         for group in one.item.readings:
             assert excess(balls[group.ball_indices], experiment.machine.volume)[0].max() < 1e-9
         # The set of balls with their places and probes tells positions apart.
-        key = (one.item.artefact, np.rint(balls * 1e6).tobytes(), frozenset(one.item.readings[0].probes))
+        key = (
+            one.item.artefact,
+            np.rint(balls * 1e6).tobytes(),
+            frozenset(one.item.readings[0].probes),
+        )
         assert key not in seen
         seen.add(key)
 
@@ -211,11 +240,15 @@ def test_a_large_pool_loads_soon() -> None:
 
 
 def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
-    text = replaced(SOME_CORNERS, "corners: {x: [0 mm, 600 mm], y: [300 mm, 600 mm], z: [50 mm, 500 mm, 600 mm]}")
+    text = replaced(
+        SOME_CORNERS,
+        "corners: {x: [0 mm, 600 mm], y: [300 mm, 600 mm], z: [50 mm, 500 mm, 600 mm]}",
+    )
     text = replaced("reach: {right: {x: [0 mm, 1 m]}}", "reach: {right: {x: [100 mm, 1 m]}}", text)
     pool = pool_of(tmp_path, text)
-    # z: of 2 x 2 places only x = 0 mm fits 500 mm, and y from 300 and 600 mm fits 400 mm. x: the turned rectangle is
-    # 500 mm along y, which fits from 300 mm only, and 400 mm along z; the lower level is out of reach.
+    # z: of 2 x 2 places only x = 0 mm fits 500 mm, and y from 300 and 600 mm fits 400 mm. x: the
+    # turned rectangle is 500 mm along y, which fits from 300 mm only, and 400 mm along z; the lower
+    # level is out of reach.
     left = [one for one in pool.candidates if one.group == "some"]
     assert len([one for one in left if one.plane == "z"]) == 4
     assert len([one for one in left if one.plane == "x"]) == 3
@@ -223,40 +256,64 @@ def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
     text = replaced("reach: {right", "edge: 45 mm\n    reach: {right", text)
     text = replaced("corner: {x: 0 mm, y: 0 mm}", "corner: {x: 45 mm, y: 45 mm}", text)
     # Only above z = 45 mm, and no nearer than that to the other end.
-    pool = pool_of(tmp_path, replaced("x: [0 mm, 600 mm], y: [300", "x: [0 mm, 50 mm], y: [300", text))
+    pool = pool_of(
+        tmp_path, replaced("x: [0 mm, 600 mm], y: [300", "x: [0 mm, 50 mm], y: [300", text)
+    )
     assert pool.dropped["edge outside the volume"] == 4 + 2 * 2
 
 
 def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path: Path) -> None:
-    """By the positions of a file, one by one: a candidate is left just where the same position is accepted."""
+    """By the positions of a file, one by one: a candidate is left just where the same position is
+    accepted.
+    """
     levels = [0.0, 0.04, 0.06, 0.5, 0.94, 0.96, 1.0]
     listed = ", ".join(length_text(one) for one in levels)
     text = replaced("right: [-50 mm, 0 mm, 0 mm]", "right: [50 mm, 0 mm, 0 mm]")
     text = replaced("levels: [0 mm, 600 mm]", f"levels: [{listed}]", text)
     text = replaced(
-        "      probes: {z: [[down]], x: [right]}\n", "      probes: {z: [down], x: [[right], [right, down]]}\n", text
+        "      probes: {z: [[down]], x: [right]}\n",
+        "      probes: {z: [down], x: [[right], [right, down]]}\n",
+        text,
     )
     text = replaced("    reach: {right: {x: [0 mm, 1 m]}}\n", "", text)
     found = {
-        (one.plane, one.settings["level"], tuple(one.settings["probes"]), str(one.settings["corner"]))
+        (
+            one.plane,
+            one.settings["level"],
+            tuple(one.settings["probes"]),
+            str(one.settings["corner"]),
+        )
         for one in pool_of(tmp_path, text).candidates
         if one.group == "some"
     }
     expected = set()
     for plane, probes in (("z", ["down"]), ("x", ["right"]), ("x", ["right", "down"])):
         for level in levels:
-            for first, second in ((0.0, 0.0), (0.0, 0.4)) if plane == "z" else ((0.0, 0.1), (0.4, 0.1)):
+            for first, second in (
+                ((0.0, 0.0), (0.0, 0.4)) if plane == "z" else ((0.0, 0.1), (0.4, 0.1))
+            ):
                 axes = "xy" if plane == "z" else "yz"
-                corner = {axis: length_text(at) for axis, at in zip(axes, (first, second), strict=True)}
-                drawn = f"{{name: low, artefact: plate, plane: {plane}, level: {length_text(level)}, "
-                drawn += f"corner: {{{axes[0]}: {length_text(first)}, {axes[1]}: {length_text(second)}}}, "
+                corner = {
+                    axis: length_text(at) for axis, at in zip(axes, (first, second), strict=True)
+                }
+                drawn = (
+                    f"{{name: low, artefact: plate, plane: {plane}, level: {length_text(level)}, "
+                )
+                drawn += (
+                    f"corner: {{{axes[0]}: {length_text(first)}, {axes[1]}:"
+                    f" {length_text(second)}}}, "
+                )
                 drawn += f"probes: [{', '.join(probes)}]}}"
                 alone = text[: text.index("pool:")]
                 start = alone.index("{name: low")
                 alone = alone[:start] + drawn + alone[alone.index("\n", start) :]
                 path = tmp_path / "alone.yaml"
                 path.write_text(
-                    "\n".join(line for line in alone.splitlines() if "kind: bryan" not in line and "two_s" not in line)
+                    "\n".join(
+                        line
+                        for line in alone.splitlines()
+                        if "kind: bryan" not in line and "two_s" not in line
+                    )
                 )
                 try:
                     load(path)
@@ -275,19 +332,26 @@ def test_lengths_are_written_exactly(length: float) -> None:
 
 
 def test_a_range_has_its_ends_and_numbers_one_would_write(tmp_path: Path) -> None:
-    pool = pool_of(tmp_path, replaced("levels: [0 mm, 600 mm]", "levels: {from: 1 in, to: 0.7 m, count: 4}"))
+    pool = pool_of(
+        tmp_path, replaced("levels: [0 mm, 600 mm]", "levels: {from: 1 in, to: 0.7 m, count: 4}")
+    )
     levels = sorted({one.settings["level"] for one in pool.candidates if one.group == "some"})
     assert levels == ["25.4 mm", "250.266666667 mm", "475.133333333 mm", "700 mm"]
     for one in pool.candidates:
         if one.group == "some":
             assert isinstance(one.item, Position)
-            assert one.item.pose.origin["xyz".index(one.plane)] == parse_length(one.settings["level"])
+            assert one.item.pose.origin["xyz".index(one.plane)] == parse_length(
+                one.settings["level"]
+            )
 
 
 def test_without_planning_what_only_the_pool_places_is_left_out(tmp_path: Path) -> None:
     experiment = experiment_of(tmp_path, GOOD, planning=False)
     assert experiment.pool is None and list(experiment.artefacts) == ["plate"]
-    assert check(experiment).verdict.deficiency == check(placed_only(experiment_of(tmp_path, GOOD))).verdict.deficiency
+    assert (
+        check(experiment).verdict.deficiency
+        == check(placed_only(experiment_of(tmp_path, GOOD))).verdict.deficiency
+    )
     alone = GOOD[: GOOD.index("pool:")] + "seed: 1\n"
     lines = messages(tmp_path, alone)
     assert lines == [
@@ -299,38 +363,55 @@ def test_without_planning_what_only_the_pool_places_is_left_out(tmp_path: Path) 
 def test_candidates_may_read_what_no_position_reads(tmp_path: Path) -> None:
     text = replaced("y: 0 mm}, probes: [down]}", "y: 0 mm}, probes: [down], balls: [r1c1]}")
     assert experiment_of(tmp_path, text).pool is not None
-    assert messages(tmp_path, text)[0].startswith("6:3: artefacts.plate: no position reads balls r1c2")
+    assert messages(tmp_path, text)[0].startswith(
+        "6:3: artefacts.plate: no position reads balls r1c2"
+    )
     text = replaced(SOME_PROBES, f"{SOME_PROBES}\n      balls: [r1c1, r2c2]", text)
-    assert messages(tmp_path, text, planning=True)[0].startswith("6:3: artefacts.plate: no position reads balls r1c2")
+    assert messages(tmp_path, text, planning=True)[0].startswith(
+        "6:3: artefacts.plate: no position reads balls r1c2"
+    )
 
 
 def test_priors_may_be_about_candidates(tmp_path: Path) -> None:
     text = replaced(
-        "seed: 1", "priors: [{parameter: 'some z 600 mm at 0, 0 mm: origin x', standard_uncertainty: 1 mm}]"
+        "seed: 1",
+        "priors: [{parameter: 'some z 600 mm at 0, 0 mm: origin x', standard_uncertainty: 1 mm}]",
     )
-    assert [one.position for one in experiment_of(tmp_path, text).priors] == ["some z 600 mm at 0, 0 mm"]
+    assert [one.position for one in experiment_of(tmp_path, text).priors] == [
+        "some z 600 mm at 0, 0 mm"
+    ]
     assert experiment_of(tmp_path, text, planning=False).priors == ()
 
 
 def test_two_certificates_of_one_gauge_exclude_each_other(tmp_path: Path) -> None:
     more = "    - {name: NAME, kind: radius, artefact: gauge, standard_uncertainty: 1 um}\n"
-    text = GOOD.replace("  limits:\n", more.replace("NAME", "a") + more.replace("NAME", "b") + "  limits:\n")
+    text = GOOD.replace(
+        "  limits:\n", more.replace("NAME", "a") + more.replace("NAME", "b") + "  limits:\n"
+    )
     pool = pool_of(tmp_path, text)
     assert pool.at_most[0] == AtMost((11, 12), 1)
-    text = text.replace("pool:\n", "  - {kind: radius, artefact: gauge, standard_uncertainty: 1 um}\npool:\n")
+    text = text.replace(
+        "pool:\n", "  - {kind: radius, artefact: gauge, standard_uncertainty: 1 um}\npool:\n"
+    )
     assert [line.split(": ", 1)[1] for line in messages(tmp_path, text, planning=True)] == [
-        f'pool.calibration[{k}]: the radius of "gauge" stands in calibration[1] already; remove one of the two'
+        f'pool.calibration[{k}]: the radius of "gauge" stands in calibration[1] already; remove one'
+        " of the two"
         for k in (1, 2)
     ]
 
 
 def test_variants_reach_into_the_pool(tmp_path: Path) -> None:
     path = tmp_path / "e.yaml"
-    path.write_text(GOOD + "variants:\n  a: {'pool.candidates[some].levels': [0 mm]}\n  b: {'pool.limits.keep': all}\n")
+    path.write_text(
+        GOOD + "variants:\n  a: {'pool.candidates[some].levels': [0 mm]}\n  b: {'pool.limits.keep':"
+        " all}\n"
+    )
     first, second = load(path, planning=True)
     assert first.pool is not None and second.pool is not None
     assert len(second.pool.candidates) - len(first.pool.candidates) == 4
-    path.write_text(GOOD + "variants:\n  a: {'pool.limits.keep': [bar]}\n  b: {'pool.limits.keep[0]': nobody}\n")
+    path.write_text(
+        GOOD + "variants:\n  a: {'pool.limits.keep': [bar]}\n  b: {'pool.limits.keep[0]': nobody}\n"
+    )
     with pytest.raises(ExperimentError, match=r'unknown candidate "nobody"; .* \(in variant b\)'):
         load(path)
 
@@ -406,7 +487,9 @@ def test_mistakes(old: str, new: str, lines: list[str], tmp_path: Path) -> None:
 def test_a_pool_that_is_empty(tmp_path: Path) -> None:
     text = replaced("x: [250 mm, 400 mm], y: 500 mm", "x: [250 mm, 0 mm], y: 0 mm", PLANE)
     (line,) = messages(tmp_path, replaced(", [r1c2]", "", text), planning=True)
-    assert line == "6:3: pool.candidates: no candidate is left: 8 outside the volume; widen the pool"
+    assert (
+        line == "6:3: pool.candidates: no candidate is left: 8 outside the volume; widen the pool"
+    )
     text = PLANE[: PLANE.index("  candidates:")] + "  times: {set_up: 1 min}\n"
     (line,) = messages(tmp_path, text, planning=True)
     assert line == "5:1: pool.candidates: there is no candidate; add some, or positions"
@@ -416,4 +499,6 @@ def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
     text = replaced("balls: [3, 3]", "balls: [200, 200]")
     text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 0.9 m, count: 40}", text)
     (line,) = messages(tmp_path, text)
-    assert line.startswith("16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most")
+    assert line.startswith(
+        "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
+    )

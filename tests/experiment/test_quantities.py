@@ -70,7 +70,9 @@ def test_any_length_is_rounded_once(number: object, unit: str) -> None:
         return
     metres = Fraction(str(number)) * LENGTH_UNITS[unit]
     if metres and not SMALLEST <= abs(metres) <= LARGEST:
-        with pytest.raises(QuantityError, match="beyond what can be computed with; write 0, or a length of"):
+        with pytest.raises(
+            QuantityError, match="beyond what can be computed with; write 0, or a length of"
+        ):
             parse_length(f"{number} {unit}")
         return
     assert parse_length(f"{number} {unit}") == float(metres)
@@ -89,7 +91,13 @@ def test_length_functions_are_read_again(constant: float, divisor: float) -> Non
 
 @given(st.text(max_size=30))
 def test_no_text_breaks_the_parsers(text: str) -> None:
-    for parse in (parse_length, parse_angle, parse_ratio, parse_positive_length, parse_length_function):
+    for parse in (
+        parse_length,
+        parse_angle,
+        parse_ratio,
+        parse_positive_length,
+        parse_length_function,
+    ):
         try:
             parse(text)
         except QuantityError as error:
@@ -105,7 +113,9 @@ def test_length_function_at_lengths() -> None:
 
 
 @given(st.integers(1, 10**7), st.integers(1, 10**5), st.sampled_from([0.0, 0.3, 2.0]))
-def test_the_forms_of_a_growing_length_are_the_same(nanometres: int, divisor: int, length: float) -> None:
+def test_the_forms_of_a_growing_length_are_the_same(
+    nanometres: int, divisor: int, length: float
+) -> None:
     # (A + L/K) um with L in mm grows by 1000/K um for each metre.
     by_hand = 1e-9 * nanometres + 1e-3 / divisor * length
     constant = f"{nanometres / 1000}"
@@ -129,8 +139,11 @@ def test_a_data_sheet_is_not_read_in_metres(divisor: str) -> None:
     with pytest.raises(QuantityError) as caught:
         parse_length_function(f"0.9 um + L/{divisor}")
     told = str(caught.value)
-    assert f"grows by {1e3 / float(divisor):.4g} mm per metre of length, since L is in metres" in told
-    # What is advised is what the data sheet means: at one metre 1000 / divisor micrometres more than at none.
+    assert (
+        f"grows by {1e3 / float(divisor):.4g} mm per metre of length, since L is in metres" in told
+    )
+    # What is advised is what the data sheet means: at one metre 1000 / divisor micrometres more
+    # than at none.
     advised = parse_length_function(told.split('write "')[1].removesuffix('"'))
     assert float(advised.at(1.0) - advised.at(0.0)) == pytest.approx(1e-6 * 1000 / float(divisor))
     assert advised.constant == 9e-7
@@ -144,7 +157,10 @@ def test_a_data_sheet_is_not_read_in_metres(divisor: str) -> None:
         (1e-6, '"1e-06" has no unit; write for example "1e-06 mm" or "1e-06 um"'),
         ("750 mn", '"750 mn" has the unknown unit "mn"; did you mean "m'),
         ("1 MM", '"1 MM" has the unknown unit "MM"; did you mean "mm"?'),
-        ("1 parsecs", '"1 parsecs" has the unknown unit "parsecs"; known: m, dm, cm, mm, um, nm, pm, in'),
+        (
+            "1 parsecs",
+            '"1 parsecs" has the unknown unit "parsecs"; known: m, dm, cm, mm, um, nm, pm, in',
+        ),
         ("5 deg", '"5 deg" is an angle; a length is expected, for example "750 mm"'),
         ("0,2 mm", '"0,2 mm" has a decimal comma; write a decimal point, for example "0.2 mm"'),
         ("long", '"long" is not a length; write for example "750 mm"'),
@@ -169,13 +185,28 @@ def test_messages_of_lengths(value: object, message: str) -> None:
         ("-1 um", '"-1 um" must be above zero; write for example "0.2 um"'),
         (
             "L/1000",
-            '"L/1000" is not a length that grows with L; write for example "0.5 um + L/1000000", with L in metres, '
-            '"0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L in mm"',
+            (
+                '"L/1000" is not a length that grows with L; write for example "0.5 um +'
+                ' L/1000000", with L in metres, "0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L'
+                ' in mm"'
+            ),
         ),
-        ("-1 um + L/1000", '"-1 um + L/1000" has a negative part; write for example "0.5 um + L/1000000"'),
-        ("1 um + -2 ppm", '"1 um + -2 ppm" has a negative part; write for example "0.5 um + L/1000000"'),
-        ("1 um + 100 ppm", '"1 um + 100 ppm" grows by 0.1 mm per metre of length; give less than 100 um/m'),
-        ("1 um + L/10", '"1 um + L/10" grows by 100 mm per metre of length; give less than 100 um/m'),
+        (
+            "-1 um + L/1000",
+            '"-1 um + L/1000" has a negative part; write for example "0.5 um + L/1000000"',
+        ),
+        (
+            "1 um + -2 ppm",
+            '"1 um + -2 ppm" has a negative part; write for example "0.5 um + L/1000000"',
+        ),
+        (
+            "1 um + 100 ppm",
+            '"1 um + 100 ppm" grows by 0.1 mm per metre of length; give less than 100 um/m',
+        ),
+        (
+            "1 um + L/10",
+            '"1 um + L/10" grows by 100 mm per metre of length; give less than 100 um/m',
+        ),
         ("1 um + 2 mm", '"2 mm" is a length; a ratio is expected, for example "5 ppm"'),
         ("0 um + 0 ppm", '"0 um + 0 ppm" must be above zero; give a small one, such as 1 nm'),
         (
@@ -184,7 +215,10 @@ def test_messages_of_lengths(value: object, message: str) -> None:
         ),
         (
             "1 um + L/0",
-            '"1 um + L/0" has a negative part or divides by zero; write for example "0.5 um + L/1000000"',
+            (
+                '"1 um + L/0" has a negative part or divides by zero; write for example "0.5 um +'
+                ' L/1000000"'
+            ),
         ),
         ("0.5 + L/1000", '"0.5" has no unit; write for example "0.5 mm" or "0.5 um"'),
     ],

@@ -106,8 +106,12 @@ def test_variants_take_any_value_and_may_complete_the_file() -> None:
     assert variants["type"] == "object"
     assert variants["additionalProperties"]["additionalProperties"] is True
     assert {"required": ["variants"]} in written["anyOf"]
-    assert {"required": ["title", "machine", "error_model", "artefacts", "positions"]} in written["anyOf"]
-    assert {"required": ["title", "machine", "error_model", "artefacts", "pool"]} in written["anyOf"]
+    assert {"required": ["title", "machine", "error_model", "artefacts", "positions"]} in written[
+        "anyOf"
+    ]
+    assert {"required": ["title", "machine", "error_model", "artefacts", "pool"]} in written[
+        "anyOf"
+    ]
 
 
 def test_defaults_can_be_written_in_a_file() -> None:

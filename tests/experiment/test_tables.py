@@ -13,7 +13,9 @@ def table(tmp_path: Path) -> Path:
 
 
 def test_units_quotes_and_comments(table: Path) -> None:
-    table.write_text('# certificate\nx_mm,"ball",y_µm\n\n0.3, a ,1\n-1e3,"b, ""c""",2\n', encoding="utf-8")
+    table.write_text(
+        '# certificate\nx_mm,"ball",y_µm\n\n0.3, a ,1\n-1e3,"b, ""c""",2\n', encoding="utf-8"
+    )
     rows = read_table(table, ["ball"], ["x", "y"], ["z"])
     assert [row.texts for row in rows] == [("a",), ('b, "c"',)]
     assert [row.lengths for row in rows] == [(0.0003, 1e-6, 0.0), (-1.0, 2e-6, 0.0)]

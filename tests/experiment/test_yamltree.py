@@ -5,7 +5,14 @@ from pathlib import Path
 
 import pytest
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.yamltree import DEEPEST, mark_of, parse_tree, read_tree, resolve_scalar, to_python
+from ballplate.simulator.inputs.yamltree import (
+    DEEPEST,
+    mark_of,
+    parse_tree,
+    read_tree,
+    resolve_scalar,
+    to_python,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -83,10 +90,16 @@ def test_aliases_stand_where_they_are_used() -> None:
 @pytest.mark.parametrize(
     ("text", "lines"),
     [
-        ("a: 1\nb: 2\na: 3\n", ['f:3:1: the key "a" stands already in line 1; remove one of the two']),
+        (
+            "a: 1\nb: 2\na: 3\n",
+            ['f:3:1: the key "a" stands already in line 1; remove one of the two'],
+        ),
         (
             "a: {b: 1}\n<<: {c: 1}\n",
-            ["f:2:1: merge keys (<<) are not read; repeat the keys, or use an alias for a whole value"],
+            [
+                "f:2:1: merge keys (<<) are not read; repeat the keys, or use an alias for a whole"
+                " value"
+            ],
         ),
         ("? [a]\n: 1\n", ["f:1:3: a key must be a single word or text; write key: value"]),
         ('"": 1\n', ["f:1:1: an empty key; write a name before the colon"]),
@@ -99,29 +112,38 @@ def test_aliases_stand_where_they_are_used() -> None:
         ),
         ("a: *b\n", ["f:1:4: nothing is anchored as &b; write the value out"]),
         ("a: &b 1\nc: *d\n", ["f:2:4: nothing is anchored as &d; known: &b"]),
-        ("a: &b [*b]\n", ["f:1:8: the alias *b stands inside what it refers to; write the value out"]),
+        (
+            "a: &b [*b]\n",
+            ["f:1:8: the alias *b stands inside what it refers to; write the value out"],
+        ),
         (
             "a: 1\n---\nb: 1\n",
-            ["f:2:1: a second document begins here; write one experiment per file, or use variants"],
+            [
+                "f:2:1: a second document begins here; write one experiment per file, or use"
+                " variants"
+            ],
         ),
         ("a:\n\tb: 1\n", ["f:2:1: not valid YAML: a tab; indent with spaces"]),
         (
             "a: [1, 2\nb: 3\n",
-            ["f:1:4: not valid YAML: a list in brackets is never closed or lacks a comma; write [a, b]"],
+            [
+                "f:1:4: not valid YAML: a list in brackets is never closed or lacks a comma; write"
+                " [a, b]"
+            ],
         ),
         (
             "a: {b: 1\n",
             [
-                "f:1:4: not valid YAML: a mapping in braces is never closed or lacks a comma; write {a: 1, b: 2}, "
-                "quotes about a text with brackets"
+                "f:1:4: not valid YAML: a mapping in braces is never closed or lacks a comma; write"
+                " {a: 1, b: 2}, quotes about a text with brackets"
             ],
         ),
         ("x: 1\na: 'b\n", ["f:2:4: not valid YAML: a quotation mark is never closed; close it"]),
         (
             "a: b: c\n",
             [
-                "f:1:5: not valid YAML: a second “: ” in one line; put a text that contains it in quotes, "
-                "and check the indentation"
+                "f:1:5: not valid YAML: a second “: ” in one line; put a text that contains it in"
+                " quotes, and check the indentation"
             ],
         ),
         (
@@ -129,8 +151,14 @@ def test_aliases_stand_where_they_are_used() -> None:
             ["f:1:4: not valid YAML: a text cannot begin with this character; put it in quotes"],
         ),
         ("a: µ\x07\n", ["f:1:5: the control character U+0007 is not allowed; remove it"]),
-        ("a: " + "9" * 400, ["f:1:4: a number with more than 300 digits; write it with an exponent"]),
-        ("a: " + "[" * 5000, [f"f:1:{4 + DEEPEST - 1}: nested more than {DEEPEST} deep; check the brackets"]),
+        (
+            "a: " + "9" * 400,
+            ["f:1:4: a number with more than 300 digits; write it with an exponent"],
+        ),
+        (
+            "a: " + "[" * 5000,
+            [f"f:1:{4 + DEEPEST - 1}: nested more than {DEEPEST} deep; check the brackets"],
+        ),
     ],
 )
 def test_refusals(text: str, lines: list[str]) -> None:
@@ -139,7 +167,9 @@ def test_refusals(text: str, lines: list[str]) -> None:
 
 @pytest.mark.parametrize("text", ["", "# only a comment\n", "---\n", "~\n"])
 def test_empty_files(text: str) -> None:
-    expected = "f: the file is empty; write at least title, machine, error_model, artefacts and positions"
+    expected = (
+        "f: the file is empty; write at least title, machine, error_model, artefacts and positions"
+    )
     assert refusals(text) == [expected]
 
 
@@ -147,7 +177,9 @@ def test_alias_bomb() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i + 1}: &a{i + 1} [{', '.join([f'*a{i}'] * 10)}]" for i in range(40)]
     (refusal,) = refusals("\n".join(lines))
-    assert refusal.endswith("more than 500000 values, aliases counted in full; put long lists in a CSV file")
+    assert refusal.endswith(
+        "more than 500000 values, aliases counted in full; put long lists in a CSV file"
+    )
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
@@ -160,7 +192,10 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     latin.write_bytes("a: 1\nb: µm".encode("latin-1"))
     assert refusal(missing) == f"{missing}: there is no such file; check the name and the folder"
     assert refusal(tmp_path) == f"{tmp_path}: this is a folder; name a file in it"
-    assert refusal(latin) == f"{latin}:2:4: byte 0xb5 is not UTF-8; save the file with the encoding UTF-8"
+    assert (
+        refusal(latin)
+        == f"{latin}:2:4: byte 0xb5 is not UTF-8; save the file with the encoding UTF-8"
+    )
 
 
 def test_byte_order_mark_is_skipped(tmp_path: Path) -> None:

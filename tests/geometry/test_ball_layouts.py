@@ -59,7 +59,9 @@ def test_square_has_only_its_outline(per_side: int) -> None:
     assert on_edge.all()
     steps = square.coordinates[pairs(square, "neighbours")]
     assert len(steps) == 4 * (per_side - 1)
-    np.testing.assert_allclose(np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1), 0.5 / (per_side - 1))
+    np.testing.assert_allclose(
+        np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1), 0.5 / (per_side - 1)
+    )
     assert len(corners(square)) == 4
 
 
@@ -74,7 +76,9 @@ def test_two_spheres() -> None:
 def test_listed_balls() -> None:
     numbered = layout(kind="balls", coordinates=(("1 mm", "2 mm"), ("3 mm", "4 mm", "5 mm")))
     assert numbered.names == ("1", "2")
-    np.testing.assert_array_equal(numbered.coordinates, [[0.001, 0.002, 0.0], [0.003, 0.004, 0.005]])
+    np.testing.assert_array_equal(
+        numbered.coordinates, [[0.001, 0.002, 0.0], [0.003, 0.004, 0.005]]
+    )
     by_name = layout(kind="balls", coordinates={"a": ("1 mm", "2 mm")})
     assert by_name.names == ("a",)
     assert len(pairs(by_name, "all")) == 0
@@ -82,14 +86,18 @@ def test_listed_balls() -> None:
 
 def test_sets_that_are_not_defined() -> None:
     balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm")))
-    with pytest.raises(ValueError, match='"neighbours" is not defined .* choose from: all, or list pairs'):
+    with pytest.raises(
+        ValueError, match='"neighbours" is not defined .* choose from: all, or list pairs'
+    ):
         pairs(balls, "neighbours")
     with pytest.raises(ValueError, match='"corners" is not defined .* list the balls'):
         corners(balls)
 
 
 def test_coincident_balls() -> None:
-    balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm"), ("0 mm", "0.1 nm")))
+    balls = layout(
+        kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm"), ("0 mm", "0.1 nm"))
+    )
     assert coincident_balls(balls) == [(0, 2)]
 
 

@@ -17,7 +17,9 @@ from ballplate.simulator.geometry.positions import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-PLATE = GridSettings.model_validate({"kind": "grid", "balls": (3, 2), "size": ("600 mm", "200 mm")}).layout()
+PLATE = GridSettings.model_validate(
+    {"kind": "grid", "balls": (3, 2), "size": ("600 mm", "200 mm")}
+).layout()
 planes: st.SearchStrategy[Axis] = st.sampled_from(("x", "y", "z"))
 
 
@@ -38,7 +40,9 @@ def test_turned_rectangle_is_where_it_should_be(plane: Axis, turns: int, anchor:
     balls = ball_coordinates(pose, PLATE)
     axes = [AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane]]
     lower, upper = balls[:, axes].min(axis=0), balls[:, axes].max(axis=0)
-    np.testing.assert_allclose(lower if anchor == "corner" else (lower + upper) / 2, [0.3, 0.4], atol=1e-15)
+    np.testing.assert_allclose(
+        lower if anchor == "corner" else (lower + upper) / 2, [0.3, 0.4], atol=1e-15
+    )
     np.testing.assert_allclose(upper - lower, [0.6, 0.2] if turns % 2 == 0 else [0.2, 0.6])
     np.testing.assert_array_equal(balls[:, AXIS_INDEX[plane]], 0.5)
 
@@ -71,4 +75,6 @@ def test_free_placement() -> None:
 def test_balls_listed_away_from_their_origin() -> None:
     layout = BallLayout(("a", "b"), np.array([[1.0, 1.0, 0.01], [1.5, 1.25, 0.0]]))
     pose = nominal_pose(PlanePlacement("z", 0.1, "corner", (0.0, 0.0), 1), layout, 3)
-    np.testing.assert_allclose(ball_coordinates(pose, layout), [[0.25, 0.0, 0.11], [0.0, 0.5, 0.1]], atol=1e-15)
+    np.testing.assert_allclose(
+        ball_coordinates(pose, layout), [[0.25, 0.0, 0.11], [0.0, 0.5, 0.1]], atol=1e-15
+    )

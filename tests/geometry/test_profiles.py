@@ -37,7 +37,9 @@ def test_a_line_joins_a_circle_at_their_boundary(backwards: bool) -> None:
     assert (whole - edge if backwards else edge) == pytest.approx(0.02, rel=1e-12)
     normals = profile.normals[own][::step]
     np.testing.assert_allclose(normals[:2], [[1.0, 0.0]] * 2, atol=1e-12)
-    np.testing.assert_allclose(normals[2], [np.cos(np.radians(4)), np.sin(np.radians(4))], atol=1e-12)
+    np.testing.assert_allclose(
+        normals[2], [np.cos(np.radians(4)), np.sin(np.radians(4))], atol=1e-12
+    )
 
 
 def test_a_measured_point_may_be_the_boundary() -> None:
@@ -47,7 +49,9 @@ def test_a_measured_point_may_be_the_boundary() -> None:
         profile, own, at = along(places, labels, dome(np.array([0.0, 80.0])))
         assert own.tolist() == list(range(6)) and at.tolist() == [2, 5]
         assert profile.features == ((0, 2), (2, 5))
-        np.testing.assert_allclose(np.diff(profile.lengths)[2:], RADIUS * np.radians([20, 30, 30]), rtol=1e-12)
+        np.testing.assert_allclose(
+            np.diff(profile.lengths)[2:], RADIUS * np.radians([20, 30, 30]), rtol=1e-12
+        )
 
 
 def test_labels_part_features_at_a_corner() -> None:

@@ -29,7 +29,12 @@ FAMILIES: dict[str, Basis] = {
     "no interior knot": Spline(3),
     "periodic": Spline(4, (0.3, 0.5, 0.5), ends="periodic"),
 }
-CONSTRAINED: tuple[Ends, ...] = ("zero slope at start", "zero slope at end", "zero slopes", "periodic")
+CONSTRAINED: tuple[Ends, ...] = (
+    "zero slope at start",
+    "zero slope at end",
+    "zero slopes",
+    "periodic",
+)
 families = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 ENDS = np.array([0.0, 1.0])
 T = np.linspace(0.0, 1.0, 41)
@@ -74,7 +79,10 @@ def test_whole_family_is_independent(family: Basis) -> None:
     whole = whole_values(family, T)
     assert np.linalg.matrix_rank(whole) == whole.shape[1] == family.size + 1
     # What vanishes at 0 is in the span of t and the interior functions.
-    rest = family.values(T) - whole[:, 1:] @ np.linalg.lstsq(whole[:, 1:], family.values(T), rcond=None)[0]
+    rest = (
+        family.values(T)
+        - whole[:, 1:] @ np.linalg.lstsq(whole[:, 1:], family.values(T), rcond=None)[0]
+    )
     np.testing.assert_allclose(rest, 0.0, atol=1e-13)
 
 
@@ -87,10 +95,14 @@ def test_quoted_form_gives_the_same_functions(family: Basis) -> None:
         (family.quoted_whole(), whole_values(family, t)),
     ):
         assert len(set(quoted.names)) == len(quoted.names) == len(quoted.matrix)
-        np.testing.assert_allclose(written_out(family, quoted.names, t) @ quoted.matrix, values, atol=1e-12)
+        np.testing.assert_allclose(
+            written_out(family, quoted.names, t) @ quoted.matrix, values, atol=1e-12
+        )
 
 
-@pytest.mark.parametrize(("order", "knots"), [(1, ()), (4, (0.0,)), (4, (0.6, 0.5)), (3, (0.5, 0.5, 0.5)), (4, (1.2,))])
+@pytest.mark.parametrize(
+    ("order", "knots"), [(1, ()), (4, (0.0,)), (4, (0.6, 0.5)), (3, (0.5, 0.5, 0.5)), (4, (1.2,))]
+)
 def test_impossible_splines_are_refused(order: int, knots: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="order|knot"):
         Spline(order, knots)
@@ -122,7 +134,9 @@ def constrained(draw: st.DrawFn) -> Spline:
 def test_constrained_ends_hold_for_every_function_and_for_no_fewer(basis: Spline) -> None:
     """The span is the null space of the conditions on all B-splines, found densely."""
     order = basis.order
-    all_ = BSpline([0.0] * order + list(basis.knots) + [1.0] * order, np.eye(basis.count), order - 1)
+    all_ = BSpline(
+        [0.0] * order + list(basis.knots) + [1.0] * order, np.eye(basis.count), order - 1
+    )
 
     def jump(k: int) -> np.ndarray:
         return np.asarray(all_(1.0, nu=k) - all_(0.0, nu=k))

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Basis, Monomial, Polynomial, Spline
-from ballplate.simulator.machines.conversion import NotContainedError, along_axes, containing, linear_map
+from ballplate.simulator.machines.conversion import (
+    NotContainedError,
+    along_axes,
+    containing,
+    linear_map,
+)
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import kinematic_model, kinematic_model_of
 from ballplate.simulator.machines.terms import quadratic, sums
@@ -29,13 +34,17 @@ def places(count: int) -> tuple[np.ndarray, np.ndarray]:
         (Spline(4, (0.5, 0.5), ends="zero slopes"), Spline(4, (0.3,), ends="periodic")),
     ],
 )
-def test_an_empirical_model_contains_every_kinematic_one(name: str, position: Basis, rotation: Basis) -> None:
+def test_an_empirical_model_contains_every_kinematic_one(
+    name: str, position: Basis, rotation: Basis
+) -> None:
     kinematic = kinematic_model_of(ARRANGEMENTS[name], position, rotation, LOWER, UPPER)
     empirical = containing(kinematic)
     matrix = linear_map(kinematic, empirical)
     a = 1e-5 * np.random.default_rng(1).standard_normal(len(kinematic.parameters))
     x, p = places(40)
-    np.testing.assert_allclose(empirical.error(x, matrix @ a, p), kinematic.error(x, a, p), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        empirical.error(x, matrix @ a, p), kinematic.error(x, a, p), rtol=0, atol=1e-14
+    )
     held = 9 if not kinematic.arrangement.workpiece_side else 6
     assert 6 * len(empirical.terms.names) - len(empirical.parameters) >= held
 
@@ -68,7 +77,9 @@ def test_along_the_axes_the_kinematic_model_has_the_same_errors(name: str) -> No
     for axis in range(3):
         x = np.array(LOWER) + t * (np.array(UPPER) - LOWER) * np.eye(3)[axis]
         p = np.broadcast_to([0.02, 0.03, -0.05], x.shape)
-        np.testing.assert_allclose(kinematic.error(x, found, p), empirical.error(x, a, p), atol=deviation + 1e-15)
+        np.testing.assert_allclose(
+            kinematic.error(x, found, p), empirical.error(x, a, p), atol=deviation + 1e-15
+        )
     # Off the axes they differ: section 2.3.
     x, p = places(20)
     assert np.abs(kinematic.error(x, found, p) - empirical.error(x, a, p)).max() > 1e-6

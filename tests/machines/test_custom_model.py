@@ -103,20 +103,38 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     file.write_text(EXPERIMENT.replace("MODEL", "straight"), encoding="utf-8")
     assert check(load(file)[0]).verdict.deficiency == 0
     file.write_text(EXPERIMENT.replace("MODEL", "straigth"), encoding="utf-8")
-    assert 'no entry point "straigth"' in refusal(file) and 'did you mean "straight"?' in refusal(file)
+    assert 'no entry point "straigth"' in refusal(file) and 'did you mean "straight"?' in refusal(
+        file
+    )
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("import numpy as np", "import nonsense_nobody_has", "cannot be imported: ModuleNotFoundError"),
+        (
+            "import numpy as np",
+            "import nonsense_nobody_has",
+            "cannot be imported: ModuleNotFoundError",
+        ),
         ("def build(", "def built(", 'has no "build"; did you mean "built"?'),
-        ("    return Straight(", "    raise SystemExit('no')\n    return Straight(", "SystemExit: no"),
-        ("    return Straight(", "    return (1 / 0) or Straight(", "ZeroDivisionError: division by zero (my_model"),
+        (
+            "    return Straight(",
+            "    raise SystemExit('no')\n    return Straight(",
+            "SystemExit: no",
+        ),
+        (
+            "    return Straight(",
+            "    return (1 / 0) or Straight(",
+            "ZeroDivisionError: division by zero (my_model",
+        ),
         ("def build(lower, upper, scales=True)", "def build(lower)", "has failed: TypeError"),
         ("def reported(self)", "def report(self)", "has no reported"),
         ("dimension = 3", "dimension = 2", "dimension is 2, but machine.volume has 3"),
-        ('"squareness xy", "squareness xz"', '"squareness xz", "squareness xz"', "names must differ"),
+        (
+            '"squareness xy", "squareness xz"',
+            '"squareness xz", "squareness xz"',
+            "names must differ",
+        ),
         ('"rad", name', '"urad", name', 'the unit of "squareness xy" is "urad"'),
         ("name, span)", "name, 0.0)", "the effect of"),
         ("a) + p", "a)", "error(x, 0, p) is not p"),
@@ -137,7 +155,9 @@ def test_what_is_wrong_with_a_model_is_said(tmp_path: Path, old: str, new: str, 
 
 
 def test_options_that_are_quantities_arrive_in_si_units(tmp_path: Path) -> None:
-    source = GOOD.replace("scales=True):", "scales=True, pitch=0.0):\n    assert pitch == 0.2, pitch")
+    source = GOOD.replace(
+        "scales=True):", "scales=True, pitch=0.0):\n    assert pitch == 0.2, pitch"
+    )
     assert source != GOOD
     file, _ = written(tmp_path, source, ", options: {pitch: 200 mm}")
     assert check(load(file)[0]).verdict.deficiency == 0
@@ -161,7 +181,9 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("former", ["simulator.machines.protocol", "analysis.study"])
 def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, former: str) -> None:
     """In a process of its own, which does not find the folders of a checkout as packages."""
-    file, _ = written(tmp_path, GOOD.replace("from ballplate.models import", f"from {former} import"))
+    file, _ = written(
+        tmp_path, GOOD.replace("from ballplate.models import", f"from {former} import")
+    )
     command = [sys.executable, "-m", "ballplate", "check", file.name]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 3
@@ -171,11 +193,15 @@ def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, fo
 
 def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
     file, module = written(tmp_path, GOOD)
-    text = file.read_text(encoding="utf-8").replace(f"{{kind: python, object: {module}:build}}", "{kind: kinematic}")
+    text = file.read_text(encoding="utf-8").replace(
+        f"{{kind: python, object: {module}:build}}", "{kind: kinematic}"
+    )
     own = f"error_model: {{kind: python, object: {module}:build}}"
     file.write_text(text.replace("5 urad}}", f"5 urad}}, {own}}}"), encoding="utf-8")
     load(file)
-    file.write_text(text.replace("5 urad}}", f"5 urad}}, {own.replace('build', 'buidl')}}}"), encoding="utf-8")
+    file.write_text(
+        text.replace("5 urad}}", f"5 urad}}, {own.replace('build', 'buidl')}}}"), encoding="utf-8"
+    )
     assert ": true_machine.error_model.object: " in refusal(file)
 
 
@@ -193,5 +219,8 @@ def test_priors_about_a_model_of_ones_own(tmp_path: Path) -> None:
     file.write_text(file.read_text(encoding="utf-8") + prior, encoding="utf-8")
     (experiment,) = load(file)
     assert [one.name for one in experiment.priors] == ["squareness xz"]
-    file.write_text(file.read_text(encoding="utf-8").replace("squareness xz, s", "squarness xz, s"), encoding="utf-8")
+    file.write_text(
+        file.read_text(encoding="utf-8").replace("squareness xz, s", "squarness xz, s"),
+        encoding="utf-8",
+    )
     assert 'unknown parameter "squarness xz"; did you mean "squareness xz"?' in refusal(file)

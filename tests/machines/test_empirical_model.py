@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
-from ballplate.simulator.machines.empirical import FRAME, FUNCTIONS, EmpiricalModel, FrameError, empirical_model
+from ballplate.simulator.machines.empirical import (
+    FRAME,
+    FUNCTIONS,
+    EmpiricalModel,
+    FrameError,
+    empirical_model,
+)
 from ballplate.simulator.machines.terms import Radial, Terms, quadratic, sums, tensor
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
@@ -57,7 +63,9 @@ def test_the_frame_is_held(terms: Terms) -> None:
     a = np.random.default_rng(2).standard_normal(len(model.parameters))
     lower, upper = np.array(LOWER), np.array(UPPER)
     for name, corner in FRAME:
-        value = model.functions((lower + (upper - lower) * corner)[None], a)[0, list(FUNCTIONS).index(name)]
+        value = model.functions((lower + (upper - lower) * corner)[None], a)[
+            0, list(FUNCTIONS).index(name)
+        ]
         assert abs(value) < 1e-11, (name, corner)
     # Nothing else is held: with the frame's conditions the free terms span all that meets them.
     free = empirical_model(terms, LOWER, UPPER, frame=())
@@ -73,8 +81,12 @@ def test_quoted_form_gives_the_same_functions(terms: Terms) -> None:
         np.testing.assert_array_equal(quoted.matrix, np.eye(len(terms.names)))
         return
     x, y, z = t.T
-    written = [eval(name.replace("^", "**"), {"x": x, "y": y, "z": z}) + 0 * x for name in quoted.names]
-    np.testing.assert_allclose(np.stack(written, axis=1) @ quoted.matrix, terms.values(t), atol=1e-12)
+    written = [
+        eval(name.replace("^", "**"), {"x": x, "y": y, "z": z}) + 0 * x for name in quoted.names
+    ]
+    np.testing.assert_allclose(
+        np.stack(written, axis=1) @ quoted.matrix, terms.values(t), atol=1e-12
+    )
 
 
 def test_quadratics_are_those_of_the_report() -> None:

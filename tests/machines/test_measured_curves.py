@@ -1,4 +1,6 @@
-"""True machines with measured error curves: they pass through their points, and wrong files are told."""
+"""True machines with measured error curves: they pass through their points, and wrong files are
+told.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,10 @@ artefacts: {plate: {kind: grid, balls: [3, 3], size: [600 mm, 600 mm]}}
 positions: [{name: low, plane: z, level: 100 mm, corner: {x: 100 mm, y: 100 mm}}]
 """
 # Out of order, in mixed units, not zero at the lower end, and short of the upper one.
-X = "position_mm,EXX_um,EAX_arcsec,EYX_nm\n# a comment\n300,1,2,-500\n-200,0.5,0,0\n100,-1,1,250\n\n700,2,0.5,100\n"
+X = (
+    "position_mm,EXX_um,EAX_arcsec,EYX_nm\n# a"
+    " comment\n300,1,2,-500\n-200,0.5,0,0\n100,-1,1,250\n\n700,2,0.5,100\n"
+)
 Y = "position_m,EYY_um\n0,0\n1,4\n"
 ARCSEC = np.pi / 180 / 3600
 
@@ -50,9 +55,15 @@ def test_curves_pass_through_their_points_as_they_are(tmp_path: Path, interpolat
     down = np.broadcast_to([0.0, 0.0, -0.1], x.shape)
     roll = np.array([0, 1, 2, 0.5]) * ARCSEC
     straightness = np.array([0, 0.25e-6, -0.5e-6, 0.1e-6])
-    expected = np.stack([np.array([0.5, -1, 1, 2]) * 1e-6, straightness + 0.1 * roll, np.full(4, -0.1)], axis=1)
-    np.testing.assert_allclose(machine.model.error(x, machine.a, down), expected, rtol=0, atol=1e-18)
-    beyond = machine.model.error(np.array([[0.8, 0.0, 0.0], [-0.3, 0.0, 0.0]]), machine.a, np.zeros((2, 3)))
+    expected = np.stack(
+        [np.array([0.5, -1, 1, 2]) * 1e-6, straightness + 0.1 * roll, np.full(4, -0.1)], axis=1
+    )
+    np.testing.assert_allclose(
+        machine.model.error(x, machine.a, down), expected, rtol=0, atol=1e-18
+    )
+    beyond = machine.model.error(
+        np.array([[0.8, 0.0, 0.0], [-0.3, 0.0, 0.0]]), machine.a, np.zeros((2, 3))
+    )
     np.testing.assert_allclose(beyond[:, 0], [2e-6, 0.5e-6], rtol=0, atol=1e-18)
 
 
@@ -74,7 +85,9 @@ def test_readings_of_a_measured_machine(tmp_path: Path) -> None:
     readings, x = exact_readings(on_truth, truth)
     p = design.probes[readings.probe]
     corrected = x + on_truth.model.error(x, truth.a, p)
-    np.testing.assert_allclose(corrected, design.balls[readings.ball] + [0.1, 0.1, 0.1], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        corrected, design.balls[readings.ball] + [0.1, 0.1, 0.1], rtol=0, atol=1e-15
+    )
     assert np.abs(x + p - corrected).max() > 1e-6
 
 

@@ -11,7 +11,11 @@ from ballplate.simulator.machines.description import fitted_volumetric, true_vol
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.framing import FramedModel
 from ballplate.simulator.machines.joined import JoinedModel
-from ballplate.simulator.machines.kinematic import carried_vectors, kinematic_model, kinematic_model_of
+from ballplate.simulator.machines.kinematic import (
+    carried_vectors,
+    kinematic_model,
+    kinematic_model_of,
+)
 from ballplate.simulator.machines.metric import MetricModel
 from ballplate.simulator.machines.protocol import ErrorModel, HasLines
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
@@ -25,7 +29,9 @@ LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
 
 MODELS: dict[str, ErrorModel] = {
     **{
-        f"{name} {'full' if full else 'linearised'}": kinematic_model(arrangement, 5, 4, LOWER, UPPER, full)
+        f"{name} {'full' if full else 'linearised'}": kinematic_model(
+            arrangement, 5, 4, LOWER, UPPER, full
+        )
         for name, arrangement in ARRANGEMENTS.items()
         for full in (False, True)
     },
@@ -42,7 +48,9 @@ MODELS: dict[str, ErrorModel] = {
         for full in (False, True)
     },
     **{
-        f"empirical {name} {'full' if full else 'linearised'}": empirical_model(terms, LOWER, UPPER, full)
+        f"empirical {name} {'full' if full else 'linearised'}": empirical_model(
+            terms, LOWER, UPPER, full
+        )
         for name, terms in {
             "sums of polynomials": sums(Polynomial(4)),
             "sums of splines": sums(Spline(4, (0.5,))),
@@ -54,10 +62,15 @@ MODELS: dict[str, ErrorModel] = {
         for full in (False, True)
     },
     "joined": JoinedModel(
-        kinematic_model(ARRANGEMENTS["MB2"], 3, 3, LOWER, UPPER), empirical_model(quadratic(), LOWER, UPPER, True)
+        kinematic_model(ARRANGEMENTS["MB2"], 3, 3, LOWER, UPPER),
+        empirical_model(quadratic(), LOWER, UPPER, True),
     ),
-    "volumetric stated": true_volumetric(load_machine("designs/park/machines/measured-errors.yaml")).model,
-    "volumetric with droop": true_volumetric(load_machine("designs/park/machines/gec-like.yaml")).model,
+    "volumetric stated": (
+        true_volumetric(load_machine("designs/park/machines/measured-errors.yaml")).model
+    ),
+    "volumetric with droop": (
+        true_volumetric(load_machine("designs/park/machines/gec-like.yaml")).model
+    ),
     "volumetric in another frame": FramedModel(
         true_volumetric(load_machine("designs/park/machines/npl-like.yaml")).model, LOWER
     ),
@@ -68,7 +81,10 @@ MODELS: dict[str, ErrorModel] = {
         for name in ("measured-errors", "gec-like", "npl-like")
     },
     **{f"metric {scale}": MetricModel(scale) for scale in ("none", "x", "y", "split")},
-    **{f"spatial metric {scales}": SpatialMetricModel(scales, LOWER, UPPER) for scales in (True, False)},
+    **{
+        f"spatial metric {scales}": SpatialMetricModel(scales, LOWER, UPPER)
+        for scales in (True, False)
+    },
 }
 
 models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -78,14 +94,20 @@ def draw(model: ErrorModel, seed: int, size: float) -> tuple[np.ndarray, np.ndar
     generator = np.random.default_rng(seed)
     d = model.dimension
     x = generator.uniform(LOWER[:d], UPPER[:d], (6, d))
-    return x, size * generator.standard_normal(len(model.parameters)), 0.1 * generator.standard_normal((6, d))
+    return (
+        x,
+        size * generator.standard_normal(len(model.parameters)),
+        0.1 * generator.standard_normal((6, d)),
+    )
 
 
 @models
 @pytest.mark.parametrize("size", [0.0, 1e-5, 1e-2])
 def test_jacobian_is_the_derivative_of_the_error(model: ErrorModel, size: float) -> None:
     x, a, p = draw(model, 1, size)
-    assert_derivative(model.jacobian(x, a, p), complex_step(lambda b: model.error(x, b, p), a), 1e-13)
+    assert_derivative(
+        model.jacobian(x, a, p), complex_step(lambda b: model.error(x, b, p), a), 1e-13
+    )
 
 
 @models
@@ -151,7 +173,9 @@ def test_reported_monomials_give_the_same_curve() -> None:
     for function in model.functions:
         own = [k for k, n in enumerate(model.reported().names) if n.startswith(function.name)]
         curve = sum(values[k] * t ** (power + 1) for power, k in enumerate(own))
-        np.testing.assert_allclose(curve, function.basis.values(t) @ a[model.slices[function.name]], atol=1e-11)
+        np.testing.assert_allclose(
+            curve, function.basis.values(t) @ a[model.slices[function.name]], atol=1e-11
+        )
 
 
 def test_carried_vectors_of_a_moving_table() -> None:
@@ -173,4 +197,6 @@ def test_metric_scales_share_the_difference() -> None:
     point, p = np.array([[2.0, 3.0]]), np.zeros((1, 2))
     for scale, expected in (("x", (-2e-5, 0.0)), ("y", (0.0, 3e-5)), ("split", (-1e-5, 1.5e-5))):
         model = MetricModel(scale)  # type: ignore[arg-type]
-        np.testing.assert_allclose(model.error(point, np.array([0.0, 1e-5]), p)[0], expected, atol=1e-9)
+        np.testing.assert_allclose(
+            model.error(point, np.array([0.0, 1e-5]), p)[0], expected, atol=1e-9
+        )

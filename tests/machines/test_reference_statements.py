@@ -1,4 +1,6 @@
-"""What the reference says of the error models, each statement against something written down independently."""
+"""What the reference says of the error models, each statement against something written down
+independently.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,11 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial, Spline
 from ballplate.simulator.machines.empirical import empirical_model
-from ballplate.simulator.machines.kinematic import KinematicModel, kinematic_model, kinematic_model_of
+from ballplate.simulator.machines.kinematic import (
+    KinematicModel,
+    kinematic_model,
+    kinematic_model_of,
+)
 from ballplate.simulator.machines.metric import MetricModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
@@ -50,7 +56,9 @@ def test_multiquadrics_contain_linear_polynomials_and_no_more() -> None:
     t = GENERATOR.random((50, 3))
 
     def off(function: object) -> float:
-        at_centres, wanted = (np.array([function(*place) for place in places]) for places in (terms.centres, t))  # type: ignore[operator]
+        at_centres, wanted = (
+            np.array([function(*place) for place in places]) for places in (terms.centres, t)
+        )  # type: ignore[operator]
         return float(np.abs(terms.values(t) @ at_centres - wanted).max())
 
     assert off(lambda x, y, z: 2.0 - x + 3.0 * y + 0.5 * z) < 1e-12
@@ -79,7 +87,9 @@ def test_splines_are_quoted_by_their_coefficients() -> None:
         own = [k for k, parameter in enumerate(model.parameters) if parameter.function == function]
         assert np.abs(values - model.lines(function, t)[0].basis @ a[own]).max() < 1e-13
     empirical = empirical_model(sums(Spline(4, (0.5,))), LOWER, UPPER)
-    assert list(empirical.reported().names) == [parameter.name for parameter in empirical.parameters]
+    assert list(empirical.reported().names) == [
+        parameter.name for parameter in empirical.parameters
+    ]
 
 
 def test_the_own_basis_of_functions_that_are_zero_at_both_ends() -> None:
@@ -88,7 +98,11 @@ def test_the_own_basis_of_functions_that_are_zero_at_both_ends() -> None:
     s = 2.0 * t - 1.0
     expected = np.stack([t * (1 - t), t * (1 - t) * s, t * (1 - t) * (2 * s**2 - 1)], axis=1)
     assert np.abs(model.lines("EYX", t)[0].basis - expected).max() < 1e-15
-    assert [p.name for p in model.parameters if p.function == "EYX"] == ["EYX[1]", "EYX[2]", "EYX[3]"]
+    assert [p.name for p in model.parameters if p.function == "EYX"] == [
+        "EYX[1]",
+        "EYX[2]",
+        "EYX[3]",
+    ]
 
 
 def test_rotation_matrices_of_both_sides() -> None:
@@ -164,7 +178,9 @@ def test_as_much_of_the_first_pose_is_held_as_the_certificate_leaves_open(
 
 
 def test_priors_of_poses_free_nothing(tmp_path: Path) -> None:
-    certificate = "calibration: [{kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}]\n"
+    certificate = (
+        "calibration: [{kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}]\n"
+    )
     prior = "priors: [{{parameter: '{}: origin x', standard_uncertainty: 1 um}}]\n"
     (experiment,) = load(written(tmp_path, certificate + prior.format("two")))
     assert lay_out(experiment).held.sum(axis=1).tolist() == [6, 0, 0]
@@ -186,7 +202,9 @@ def test_u2_leaves_offsets_out(tmp_path: Path) -> None:
 def test_a_prior_may_say_t_for_its_first_power(tmp_path: Path) -> None:
     rows = []
     for name in ("EXX t", "EXX t^1"):
-        (experiment,) = load(written(tmp_path, f"priors: [{{parameter: {name}, standard_uncertainty: 1 um}}]\n"))
+        (experiment,) = load(
+            written(tmp_path, f"priors: [{{parameter: {name}, standard_uncertainty: 1 um}}]\n")
+        )
         (prior,) = experiment.priors
         assert prior.name == "EXX t^1"
         rows.append(prior.by_model)

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 points = st.integers(3, 9).flatmap(
     lambda n: st.tuples(
-        st.lists(st.floats(0.01, 1.0), min_size=n, max_size=n), st.lists(st.floats(-5e-6, 5e-6), min_size=n, max_size=n)
+        st.lists(st.floats(0.01, 1.0), min_size=n, max_size=n),
+        st.lists(st.floats(-5e-6, 5e-6), min_size=n, max_size=n),
     )
 )
 
@@ -29,7 +30,8 @@ def narrowest(t: np.ndarray, y: np.ndarray) -> float:
     return float(min(widths))
 
 
-# Found by the search: a point almost on another one's level, which the solver's usual tolerance passes over.
+# Found by the search: a point almost on another one's level, which the solver's usual tolerance
+# passes over.
 @example(([1.0] * 7, [2.0791914768435884e-06, 3.5560969828674295e-06, 1e-12, 3.6041486960862267e-06,
                       9.474049520320464e-07, 0.0, 0.0]))  # fmt: skip
 @given(points)
@@ -45,7 +47,9 @@ def test_minimum_zone_is_the_narrowest_strip(drawn: tuple[list[float], list[floa
 def test_least_squares_is_that_of_polyfit(drawn: tuple[list[float], list[float]]) -> None:
     t, y = np.cumsum(drawn[0]), np.array(drawn[1])
     intercept, slope = reference_line(t, y, "least squares")
-    np.testing.assert_allclose(intercept + slope * t, np.polyval(np.polyfit(t, y, 1), t), atol=1e-15)
+    np.testing.assert_allclose(
+        intercept + slope * t, np.polyval(np.polyfit(t, y, 1), t), atol=1e-15
+    )
 
 
 def test_end_points_are_met() -> None:

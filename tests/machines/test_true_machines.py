@@ -7,7 +7,11 @@ import pytest
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.metric import MetricModel
-from ballplate.simulator.machines.true_machine_settings import CoefficientSettings, RandomSettings, ZeroSettings
+from ballplate.simulator.machines.true_machine_settings import (
+    CoefficientSettings,
+    RandomSettings,
+    ZeroSettings,
+)
 from ballplate.simulator.machines.truth import TruthError, true_machine, true_parameters
 
 MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
@@ -26,14 +30,20 @@ def test_monomial_coefficients() -> None:
     a = true_parameters(settings, MODEL)
     x = np.array([[0.5, 0.0, 0.0]])
     np.testing.assert_allclose(MODEL.error(x, a, ORIGIN), [[0.75e-6, 0.25e-6, 0.0]], atol=1e-18)
-    np.testing.assert_allclose(MODEL.error(x, a, np.array([[0, 0, 0.1]])), [[0.75e-6, 0.15e-6, 0.1]], atol=1e-18)
+    np.testing.assert_allclose(
+        MODEL.error(x, a, np.array([[0, 0, 0.1]])), [[0.75e-6, 0.15e-6, 0.1]], atol=1e-18
+    )
 
 
 def test_own_coefficients() -> None:
     a = true_parameters(CoefficientSettings(kind="coefficients", values={"EXX[2]": "3 um"}), MODEL)
     assert a[1] == 3e-6 and np.count_nonzero(a) == 1
-    metric = CoefficientSettings(kind="coefficients", values={"alpha": "5 urad", "gamma": "13.7 ppm"})
-    np.testing.assert_allclose(true_parameters(metric, MetricModel("x")), [5e-6, 13.7e-6], rtol=1e-15)
+    metric = CoefficientSettings(
+        kind="coefficients", values={"alpha": "5 urad", "gamma": "13.7 ppm"}
+    )
+    np.testing.assert_allclose(
+        true_parameters(metric, MetricModel("x")), [5e-6, 13.7e-6], rtol=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -52,7 +62,9 @@ def test_wrong_coefficients_are_named(name: str, value: str, words: str) -> None
 
 
 def test_random_errors_have_the_stated_size_and_seed() -> None:
-    settings = RandomSettings.model_validate({"kind": "random", "position": "2 um", "rotation": "3 urad", "seed": 5})
+    settings = RandomSettings.model_validate(
+        {"kind": "random", "position": "2 um", "rotation": "3 urad", "seed": 5}
+    )
     a = true_parameters(settings, MODEL)
     np.testing.assert_array_equal(a, true_parameters(settings, MODEL))
     t = np.linspace(0, 1, 2001)
@@ -90,7 +102,9 @@ def test_stated_errors_of_another_model() -> None:
     )
     machine = true_machine(settings, MODEL, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     x, p = np.array([[0.3, 0.5, 0.2]]), np.array([[0.0, 0.0, -0.1]])
-    np.testing.assert_allclose(machine.model.error(x, machine.a, p), p + [[0.75e-6, 0.04e-6, 0.0]], atol=1e-18)
+    np.testing.assert_allclose(
+        machine.model.error(x, machine.a, p), p + [[0.75e-6, 0.04e-6, 0.0]], atol=1e-18
+    )
 
 
 def test_the_true_machine_is_of_the_estimated_model_by_default() -> None:

@@ -1,4 +1,6 @@
-"""Volumetric errors: closed forms, errors measured on other lines, random parts against Monte Carlo."""
+"""Volumetric errors: closed forms, errors measured on other lines, random parts against Monte
+Carlo.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,12 @@ def test_diagonals_of_squareness_have_their_closed_form() -> None:
     square = (Squareness("EC0Y", alpha), Squareness("EB0Z", -beta1), Squareness("EA0Z", beta2))
     found = Volumetric(machine(squareness=square)).diagonals()
     for k, (start, end) in enumerate(
-        [((0, 0, 0), (1, 1, 1)), ((1, 0, 0), (0, 1, 1)), ((0, 1, 0), (1, 0, 1)), ((0, 0, 1), (1, 1, 0))]
+        [
+            ((0, 0, 0), (1, 1, 1)),
+            ((1, 0, 0), (0, 1, 1)),
+            ((0, 1, 0), (1, 0, 1)),
+            ((0, 0, 1), (1, 1, 0)),
+        ]
     ):
         x, y, z = (np.array(end) - start) * SIZE
         turned = np.linalg.norm([x - beta1 * z, y - alpha * x - beta2 * z, z])
@@ -73,11 +80,14 @@ def test_a_square_machine_that_expands_evenly_has_no_error_but_its_scale() -> No
     described = machine(temperature=temperature, reference=(0.3, 0.2, 0.1))
     found = Volumetric(described).diagonals()
     np.testing.assert_allclose(found.error, 25e-6 * np.linalg.norm(SIZE), rtol=0, atol=1e-15)
-    np.testing.assert_allclose(Volumetric(described).systematic(np.array([[0.3, 0.2, 0.1]])), 0.0, atol=1e-20)
+    np.testing.assert_allclose(
+        Volumetric(described).systematic(np.array([[0.3, 0.2, 0.1]])), 0.0, atol=1e-20
+    )
 
 
 def test_errors_along_a_line_have_their_closed_form() -> None:
-    # The x axis of MB2 carries y, z and the probe: a pitch 40 t^2 urad shows at z + zp in X, at x not at all.
+    # The x axis of MB2 carries y, z and the probe: a pitch 40 t^2 urad shows at z + zp in X, at x
+    # not at all.
     errors = (
         ParametricError("EXX", PowerSeries((0.0, 3e-6, 4e-6))),
         ParametricError("EBX", PowerSeries((0.0, 0.0, 40e-6))),
@@ -88,7 +98,12 @@ def test_errors_along_a_line_have_their_closed_form() -> None:
     t = np.linspace(0.0, 1.0, 9)
     pitch = 40e-6 * t**2
     expected = np.stack(
-        [3e-6 * t + 4e-6 * t**2 + pitch * (0.7 - 0.2), 0.0 * t, 8e-6 * t * (1.0 - t) - pitch * 0.05], axis=1
+        [
+            3e-6 * t + 4e-6 * t**2 + pitch * (0.7 - 0.2),
+            0.0 * t,
+            8e-6 * t * (1.0 - t) - pitch * 0.05,
+        ],
+        axis=1,
     )
     # To rounding of the probe's offset, to which errors are added.
     np.testing.assert_allclose(built.systematic(points), expected, rtol=0, atol=5e-17)
@@ -97,7 +112,10 @@ def test_errors_along_a_line_have_their_closed_form() -> None:
 def test_errors_are_zero_at_the_reference_point_wherever_it_is() -> None:
     names = [f"E{kind}{axis}" for axis in "XYZ" for kind in "XYZABC"]
     generator = np.random.default_rng(2)
-    errors = tuple(ParametricError(name, PowerSeries(tuple(generator.normal(0, 1e-5, 4).tolist()))) for name in names)
+    errors = tuple(
+        ParametricError(name, PowerSeries(tuple(generator.normal(0, 1e-5, 4).tolist())))
+        for name in names
+    )
     reference = (0.7, 0.5, 0.2)
     for name in ARRANGEMENTS:
         for criterion in ("end points", "least squares", "minimum zone"):
@@ -105,29 +123,39 @@ def test_errors_are_zero_at_the_reference_point_wherever_it_is() -> None:
                 ParametricError(one.name, one.shape, criterion=criterion)  # type: ignore[arg-type]
                 for one in errors
             )
-            built = Volumetric(machine(name, errors=told, reference=reference, probe=(0.1, 0.2, -0.3)))
+            built = Volumetric(
+                machine(name, errors=told, reference=reference, probe=(0.1, 0.2, -0.3))
+            )
             np.testing.assert_allclose(built.systematic(np.array([reference])), 0.0, atol=1e-20)
 
 
-# Smooth errors of all kinds, straightness errors zero at both ends, rotations and positioning errors at the first.
+# Smooth errors of all kinds, straightness errors zero at both ends, rotations and positioning
+# errors at the first.
 @pytest.mark.parametrize("criterion", ["end points", "least squares", "minimum zone"])
 def test_a_straight_table_that_is_shorter_than_its_axis_is_no_error(criterion: Criterion) -> None:
     table = Points((0.02, 0.6, 1.75), (2e-6, 60e-6, 175e-6))
     roll = ParametricError("EAX", Points((0.02, 1.75), (1e-6, 1e-6)))
     eyx = ParametricError("EYX", table, line=(0.0, 0.0, 0.5), criterion=criterion)
-    found = Volumetric(machine(errors=(roll, eyx))).systematic(np.linspace((0, 0, 0), (1.8, 0, 0), 181))
+    found = Volumetric(machine(errors=(roll, eyx))).systematic(
+        np.linspace((0, 0, 0), (1.8, 0, 0), 181)
+    )
     np.testing.assert_allclose(found, 0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize(("name", "error"), [("MH1", "EXX"), ("MH2", "EYY")])
-def test_droop_that_was_measured_with_a_positioning_error_counts_once(name: str, error: str) -> None:
+def test_droop_that_was_measured_with_a_positioning_error_counts_once(
+    name: str, error: str
+) -> None:
     axis = AXES.index(error[2].lower())
     line = (0.1, 0.2, 0.4)
     reference = (0.3, 0.1, 0.15)
     droop = 10e-6 * (np.array([0.0, SIZE[axis]]) - reference[axis]) * (0.4 - 0.15)
     measured = PowerSeries((0.0, float(droop[1] - droop[0])))
     described = machine(
-        name, errors=(ParametricError(error, measured, line),), droop={"phi1": 10e-6}, reference=reference
+        name,
+        errors=(ParametricError(error, measured, line),),
+        droop={"phi1": 10e-6},
+        reference=reference,
     )
     points = np.array([line, line])
     points[:, axis] = 0.0, SIZE[axis]
@@ -143,26 +171,37 @@ def true_functions(seed: int) -> dict[str, Callable[[float], float]]:
             for component in AXES:
                 a, b, c = (generator.normal(0, 1e-5, 3)).tolist()
                 if kind == "d" and component != axis:
-                    found[f"{kind}{component}_{axis}"] = lambda t, a=a, b=b: t * (1 - t) * (a + b * t)
+                    found[f"{kind}{component}_{axis}"] = lambda t, a=a, b=b: (
+                        t * (1 - t) * (a + b * t)
+                    )
                 else:
-                    found[f"{kind}{component}_{axis}"] = lambda t, a=a, b=b, c=c: a * t + b * t**2 + c * t**3
+                    found[f"{kind}{component}_{axis}"] = lambda t, a=a, b=b, c=c: (
+                        a * t + b * t**2 + c * t**3
+                    )
     return found
 
 
-def values_at(functions: dict[str, Callable[[float], float]], position: np.ndarray) -> dict[str, float]:
-    return {name: one(position[AXES.index(name[3])] / SIZE[AXES.index(name[3])]) for name, one in functions.items()}
+def values_at(
+    functions: dict[str, Callable[[float], float]], position: np.ndarray
+) -> dict[str, float]:
+    return {
+        name: one(position[AXES.index(name[3])] / SIZE[AXES.index(name[3])])
+        for name, one in functions.items()
+    }
 
 
 TABLES = [name for name, one in ARRANGEMENTS.items() if one.workpiece_side]
 
 
 @pytest.mark.parametrize(
-    ("name", "straightedge"), [*((name, False) for name in ARRANGEMENTS), *((name, True) for name in TABLES)]
+    ("name", "straightedge"),
+    [*((name, False) for name in ARRANGEMENTS), *((name, True) for name in TABLES)],
 )
 def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(
     name: str, straightedge: bool, tmp_path: Path
 ) -> None:
-    """Rigid bodies are measured on lines all over the volume, with a reflector off the probe; the tables give the map.
+    """Rigid bodies are measured on lines all over the volume, with a reflector off the probe; the
+    tables give the map.
 
     Of a table that moves a point fixed to it is measured, or the tip along a straightedge on it.
     """
@@ -192,33 +231,56 @@ def test_errors_measured_on_other_lines_give_the_errors_of_rigid_bodies(
         if straightedge and key[3] in chain[1] and component != k:
             head.append("# straightedge: table")
         rows = [
-            f"{1000 * x!r},{1e6 * value!r}" for x, value in zip(positions.tolist(), map(float, values), strict=True)
+            f"{1000 * x!r},{1e6 * value!r}"
+            for x, value in zip(positions.tolist(), map(float, values), strict=True)
         ]
         text = "\n".join([*(head if key[0] == "d" else []), f"position_mm,{iso}_{unit}", *rows])
-        (tmp_path / f"{iso}.csv").write_text(text.replace("np.float64(", "").replace(")", ""), encoding="utf-8")
+        (tmp_path / f"{iso}.csv").write_text(
+            text.replace("np.float64(", "").replace(")", ""), encoding="utf-8"
+        )
         lines.append(f"  {iso}: {{file: {iso}.csv}}")
-    lines += [f"title: {name}", f"arrangement: {name}", "interpolation: cubic", "probe: [20 mm, -30 mm, -100 mm]"]
+    lines += [
+        f"title: {name}",
+        f"arrangement: {name}",
+        "interpolation: cubic",
+        "probe: [20 mm, -30 mm, -100 mm]",
+    ]
     lines += [f"volume: [{', '.join(f'{1000 * x} mm' for x in SIZE.tolist())}]"]
     lines += ["squareness: {EC0Y: 20 urad, EB0Z: 10 urad, EA0Z: 30 urad}"]
     (tmp_path / "m.yaml").write_text("\n".join(lines), encoding="utf-8")
     built = Volumetric(load_machine(tmp_path / "m.yaml"))
     points = generator.uniform(0.0, 1.0, (10, 3)) * SIZE
     probe = np.array([0.02, -0.03, -0.1])
-    expected = np.array([tip_error(chain, x, probe, values_at(functions, x) | square) for x in points])
+    expected = np.array(
+        [tip_error(chain, x, probe, values_at(functions, x) | square) for x in points]
+    )
     assert np.abs(expected).max() > 2e-5
     # Products of errors, and cubic splines between 41 points.
     np.testing.assert_allclose(built.systematic(points), expected, rtol=0, atol=5e-9)
 
 
-RANDOM = {"dx_x": 1e-6, "dy_y": 2e-6, "dz_x": 0.5e-6, "Ey_x": 3e-6, "Ez_y": 2e-6, "Ex_y": 4e-6, "Ex_z": 5e-6}
+RANDOM = {
+    "dx_x": 1e-6,
+    "dy_y": 2e-6,
+    "dz_x": 0.5e-6,
+    "Ey_x": 3e-6,
+    "Ez_y": 2e-6,
+    "Ex_y": 4e-6,
+    "Ex_z": 5e-6,
+}
 
 
 @pytest.mark.parametrize("name", ["MB1", "CX1"])
 def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
-    """Functions are drawn anew at each end of a length, squareness and temperature once for both, on rigid bodies."""
+    """Functions are drawn anew at each end of a length, squareness and temperature once for both,
+    on rigid bodies.
+    """
     chain = [list(ARRANGEMENTS[name].probe_side), list(ARRANGEMENTS[name].workpiece_side)]
     errors = tuple(
-        ParametricError(f"E{('XYZ' if key[0] == 'd' else 'ABC')[AXES.index(key[1])]}{key[3].upper()}", deviation=size)
+        ParametricError(
+            f"E{('XYZ' if key[0] == 'd' else 'ABC')[AXES.index(key[1])]}{key[3].upper()}",
+            deviation=size,
+        )
         for key, size in RANDOM.items()
     )
     probe = np.array([0.03, -0.05, -0.12])
@@ -226,7 +288,10 @@ def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
         name,
         errors=errors,
         probe=tuple(probe.tolist()),
-        squareness=(Squareness("EC0Y", 0.0, deviation=2e-6), Squareness("EB0Z", 0.0, deviation=3e-6)),
+        squareness=(
+            Squareness("EC0Y", 0.0, deviation=2e-6),
+            Squareness("EB0Z", 0.0, deviation=3e-6),
+        ),
         temperature={"x": AxisTemperature(11e-6, 0.0, 0.2), "z": AxisTemperature(8e-6, 0.0, 0.3)},
         probing=0.7e-6,
     )
@@ -240,7 +305,12 @@ def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
         tips = []
         for x in (start, end):
             drawn = {key: generator.normal(0, size) for key, size in RANDOM.items()}
-            tips.append(x + tip_error(chain, x, probe, drawn | lasting) + stretch * x + generator.normal(0, 0.7e-6, 3))
+            tips.append(
+                x
+                + tip_error(chain, x, probe, drawn | lasting)
+                + stretch * x
+                + generator.normal(0, 0.7e-6, 3)
+            )
         found["start"][k], found["end"][k] = tips[0] - start, tips[1] - end
         found["length"][k] = np.linalg.norm(tips[1] - tips[0]) - np.linalg.norm(end - start)
     built = Volumetric(described)
@@ -256,8 +326,12 @@ def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
 def test_random_parts_add_in_quadrature() -> None:
     # At x = y = 0 the Z slide of MB1 is carried by both others: roll of Y by z, and the pitch of X.
     errors = (ParametricError("EBX", deviation=3e-6), ParametricError("EBY", deviation=4e-6))
-    found = Volumetric(machine("MB1", errors=errors, probing=1e-6)).errors(np.array([[0.0, 0.0, 0.6]]))
-    np.testing.assert_allclose(found.deviation[0], [np.hypot(0.6 * 5e-6, 1e-6), 1e-6, 1e-6], rtol=1e-12)
+    found = Volumetric(machine("MB1", errors=errors, probing=1e-6)).errors(
+        np.array([[0.0, 0.0, 0.6]])
+    )
+    np.testing.assert_allclose(
+        found.deviation[0], [np.hypot(0.6 * 5e-6, 1e-6), 1e-6, 1e-6], rtol=1e-12
+    )
 
 
 def test_random_parts_of_a_length_do_not_cancel_at_a_common_position() -> None:
@@ -268,11 +342,16 @@ def test_random_parts_of_a_length_do_not_cancel_at_a_common_position() -> None:
 
 def test_temperature_and_squareness_do_cancel() -> None:
     described = machine(
-        squareness=(Squareness("EC0Y", 0.0, deviation=2e-6),), temperature={"y": AxisTemperature(10e-6, 1.0, 0.5)}
+        squareness=(Squareness("EC0Y", 0.0, deviation=2e-6),),
+        temperature={"y": AxisTemperature(10e-6, 1.0, 0.5)},
     )
-    along_x = Volumetric(described).lengths(np.array([[0.0, 1.0, 0.0]]), np.array([[1.5, 1.0, 0.0]]))
+    along_x = Volumetric(described).lengths(
+        np.array([[0.0, 1.0, 0.0]]), np.array([[1.5, 1.0, 0.0]])
+    )
     assert along_x.deviation[0] == pytest.approx(0.0, abs=1e-18)
-    along_y = Volumetric(described).lengths(np.array([[0.0, 0.2, 0.0]]), np.array([[0.0, 1.0, 0.0]]))
+    along_y = Volumetric(described).lengths(
+        np.array([[0.0, 0.2, 0.0]]), np.array([[0.0, 1.0, 0.0]])
+    )
     assert along_y.deviation[0] == pytest.approx(5e-6 * 0.8, rel=1e-12)
 
 
@@ -281,18 +360,21 @@ def test_the_fitted_model_has_what_is_stated() -> None:
     model = fitted_volumetric(described, (0.0, 0.0, 0.0), (1.8, 1.2, 1.2), 3)
     names = [one.name for one in model.parameters]
     assert names[-4:] == ["EC0Y", "EB0Z", "EA0Z", "phi1"]
-    # A cubic that is zero at one end has three coefficients, a straightness error of degree two one.
+    # A cubic that is zero at one end has three coefficients, a straightness error of degree two
+    # one.
     assert [name for name in names if name.startswith("EXX")] == ["EXX[1]", "EXX[2]", "EXX[3]"]
     assert [name for name in names if name.startswith("EYX")] == ["EYX[1]"]
     straight = MachineDescription(**{**vars(described), "errors": described.errors[:1]})
-    assert "phi2" in [one.name for one in fitted_volumetric(straight, (0.0,) * 3, (1.0,) * 3, 3).parameters]
+    assert "phi2" in [
+        one.name for one in fitted_volumetric(straight, (0.0,) * 3, (1.0,) * 3, 3).parameters
+    ]
 
 
 def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
     """The same file as machine and as model: the stated coefficients are the fitted model's own.
 
-    The bend of the arm is told as straightness of its axis, whose own direction the fitted model's frame takes: the two
-    frames are turned to one another, and the probe is not.
+    The bend of the arm is told as straightness of its axis, whose own direction the fitted model's
+    frame takes: the two frames are turned to one another, and the probe is not.
     """
     described = load_machine("designs/park/machines/gec-like.yaml")
     truth = true_volumetric(described)
@@ -320,7 +402,10 @@ def test_a_random_machine_of_the_fitted_family_has_the_stated_sizes() -> None:
     described = load_machine("designs/park/machines/gec-like.yaml")
     model = fitted_volumetric(described, described.lower, described.upper, 3)
     a = true_parameters(
-        RandomSettings.model_validate({"kind": "random", "position": "2 um", "rotation": "4 urad"}), model
+        RandomSettings.model_validate({"kind": "random", "position": "2 um", "rotation": "4 urad"}),
+        model,
     )
     by_name = {one.name: value for one, value in zip(model.parameters, a, strict=True)}
-    assert [abs(by_name[name]) for name in ("EC0Y", "EB0Z", "EA0Z", "phi1")] == pytest.approx([4e-6] * 4)
+    assert [abs(by_name[name]) for name in ("EC0Y", "EB0Z", "EA0Z", "phi1")] == pytest.approx(
+        [4e-6] * 4
+    )

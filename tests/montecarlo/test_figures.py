@@ -1,4 +1,6 @@
-"""Statistics of replicates: coverage, bias, their standard errors, and the same bits however the work is shared."""
+"""Statistics of replicates: coverage, bias, their standard errors, and the same bits however the
+work is shared.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,11 @@ from ballplate.montecarlo.targets import Target, sample_of_pairs, targets
 from ballplate.montecarlo.trials import run_trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.estimation.observations import distance_rows, expected_readings, reading_blocks
+from ballplate.simulator.estimation.observations import (
+    distance_rows,
+    expected_readings,
+    reading_blocks,
+)
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
@@ -57,7 +63,9 @@ def test_residuals_are_those_of_a_right_model() -> None:
     misfit = two_thousand().misfit
     assert abs(misfit.mean.value - misfit.degrees_of_freedom) < 4 * misfit.mean.error
     # The variance of chi-square is twice its degrees of freedom.
-    assert misfit.mean.error == pytest.approx(np.sqrt(2 * misfit.degrees_of_freedom / 2048), rel=0.1)
+    assert misfit.mean.error == pytest.approx(
+        np.sqrt(2 * misfit.degrees_of_freedom / 2048), rel=0.1
+    )
     assert abs(misfit.rejected.value - 0.05) < 4 * misfit.rejected.error
 
 
@@ -65,10 +73,16 @@ def test_linearised_uncertainties_are_those_of_the_plan() -> None:
     planned = predict(shipped("quickstart.yaml")).quantities
     found = two_thousand().comparisons
     for symbol in ("U1", "U2", "U4", "U5"):
-        assert found[symbol].linear_average == pytest.approx(planned[symbol].average, rel=1e-3), symbol
-        assert found[symbol].linear_maximum == pytest.approx(planned[symbol].maximum, rel=1e-3), symbol
+        assert found[symbol].linear_average == pytest.approx(planned[symbol].average, rel=1e-3), (
+            symbol
+        )
+        assert found[symbol].linear_maximum == pytest.approx(planned[symbol].maximum, rel=1e-3), (
+            symbol
+        )
     # A sample of the pairs of points.
-    assert found["U6"].sampled and found["U6"].linear_average == pytest.approx(planned["U6"].average, rel=0.02)
+    assert found["U6"].sampled and found["U6"].linear_average == pytest.approx(
+        planned["U6"].average, rel=0.02
+    )
 
 
 def test_standard_errors_are_the_scatter_of_repeated_runs() -> None:
@@ -76,7 +90,10 @@ def test_standard_errors_are_the_scatter_of_repeated_runs() -> None:
     shared = quickstart()
     # On a machine with a bias, which has a scatter of its own.
     aims = tuple(replace(aim, base=aim.base + 0.7 * aim.uncertainty) for aim in targets(shared))
-    runs = [outcome(shared, aims, tally(shared, aims, estimate_batch(shared, 7, k), BATCH)) for k in range(32)]
+    runs = [
+        outcome(shared, aims, tally(shared, aims, estimate_batch(shared, 7, k), BATCH))
+        for k in range(32)
+    ]
     for symbol in ("U1", "U4", "U6"):
         for name in ("spread", "actual", "bias", "known", "estimated"):
             figures: list[Figure] = [getattr(run.comparisons[symbol], name) for run in runs]
@@ -103,11 +120,17 @@ def test_bias_is_found_where_there_is_one_and_only_there() -> None:
 
 
 def test_actual_errors_are_compared_as_root_mean_squares() -> None:
-    """Computed once more, data set by data set; one point of almost no uncertainty does not rule the ratio."""
+    """Computed once more, data set by data set; one point of almost no uncertainty does not rule
+    the ratio.
+    """
     shared = quickstart()
     parts = [estimate_batch(shared, 1, k) for k in range(2)]
     of_angles = [aim for aim in targets(shared) if aim.symbol == "U2"][0]
-    tiny = [replace(aim, uncertainty=aim.uncertainty.copy()) for aim in targets(shared) if aim.symbol == "U4"][0]
+    tiny = [
+        replace(aim, uncertainty=aim.uncertainty.copy())
+        for aim in targets(shared)
+        if aim.symbol == "U4"
+    ][0]
     tiny.uncertainty[0] *= 1e-3
     for aim in (of_angles, tiny):
         first, second = (tally(shared, (aim,), part, BATCH) for part in parts)
@@ -116,7 +139,9 @@ def test_actual_errors_are_compared_as_root_mean_squares() -> None:
         of_units = []
         for unit in set(aim.units):
             own = [k for k, one in enumerate(aim.units) if one == unit]
-            of_units += [np.mean(errors[:, own] ** 2) / np.mean(aim.uncertainty[own] ** 2)] * len(own)
+            of_units += [np.mean(errors[:, own] ** 2) / np.mean(aim.uncertainty[own] ** 2)] * len(
+                own
+            )
         assert found.value == pytest.approx(np.sqrt(np.mean(of_units)), rel=1e-12)
         assert 0.8 < found.value < 1.25
     # In units of its own uncertainty the one point's errors would rule.
@@ -156,7 +181,9 @@ def test_a_replicate_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyP
     total = tally(shared, aims, failed, 60)
     assert (total.count, total.failed) == (59, (2 * BATCH + 5,))
     assert tally(shared, aims, failed, 4).failed == ()
-    none = outcome(shared, aims, tally(shared, aims, replace(found, converged=found.converged & False), 60))
+    none = outcome(
+        shared, aims, tally(shared, aims, replace(found, converged=found.converged & False), 60)
+    )
     assert none.comparisons == {} and len(none.failed) == 60
 
 
@@ -174,7 +201,11 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
     assert "Too optimistic? The fitted model cannot follow the true machine exactly." in lines
     assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
     # A misfit that does no harm.
-    for ratio, harm in ((Figure(1.03, 0.01), False), (Figure(1.05, 0.01), True), (Figure(0.9, 0.01), False)):
+    for ratio, harm in (
+        (Figure(1.03, 0.01), False),
+        (Figure(1.05, 0.01), True),
+        (Figure(0.9, 0.01), False),
+    ):
         one = replace(done.outcome.comparisons["U4"], actual=ratio)
         harmless = replace(done, outcome=replace(done.outcome, comparisons={"U4": one}))
         lines = "\n".join(trials_lines(harmless))
@@ -185,7 +216,9 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
 
 @pytest.mark.parametrize("variant", ["kinematic fit", "empirical fit"])
 def test_a_second_fit_with_the_true_functions(variant: str) -> None:
-    """Neither model of section 5.3 contains the other; only the kinematic one cannot follow the machine."""
+    """Neither model of section 5.3 contains the other; only the kinematic one cannot follow the
+    machine.
+    """
     experiment = shipped("npl/5.3.yaml", variant)
     done = trials(experiment, 16)
     assert done.outcome is not None
@@ -194,13 +227,17 @@ def test_a_second_fit_with_the_true_functions(variant: str) -> None:
         return
     assert done.optimism is not None and done.optimism.own_model is not None
     own = done.optimism.own_model
-    # The rank that the true machine's functions add, by a singular value decomposition of both models' derivatives.
+    # The rank that the true machine's functions add, by a singular value decomposition of both
+    # models' derivatives.
     design, truth = true_experiment(experiment)
     columns = []
     for model in (design.model, truth.model):
         both = replace(design, model=model)
         columns.append(dense_columns(both))
-    ranks = [np.linalg.matrix_rank(one, tol=1e-9 * np.linalg.norm(one, 2)) for one in (columns[0], np.hstack(columns))]
+    ranks = [
+        np.linalg.matrix_rank(one, tol=1e-9 * np.linalg.norm(one, 2))
+        for one in (columns[0], np.hstack(columns))
+    ]
     assert own.more == ranks[1] - ranks[0]
     assert own.gain == done.outcome.misfit.noise_free
     expected = scipy.stats.ncx2.sf(scipy.stats.chi2.isf(0.05, own.more), own.more, own.gain)
@@ -209,7 +246,9 @@ def test_a_second_fit_with_the_true_functions(variant: str) -> None:
 
 
 def dense_columns(design: Design) -> np.ndarray:
-    """Derivatives of all readings and distances by balls, poses and the model, scaled to unit columns."""
+    """Derivatives of all readings and distances by balls, poses and the model, scaled to unit
+    columns.
+    """
     state = nominal_state(design)
     x = expected_readings(design, state, design.readings)
     blocks = reading_blocks(design, state, design.readings, x)

@@ -1,4 +1,6 @@
-"""A machine file as the true machine: the frame that it is told in is none that a misfit could come from."""
+"""A machine file as the true machine: the frame that it is told in is none that a misfit could come
+from.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,11 @@ MACHINE = "{kind: machine, file: machine.yaml}"
 
 def written(folder: Path, machine: str, **replaced: str) -> Path:
     (folder / "machine.yaml").write_text(machine, encoding="utf-8")
-    text = (SHIPPED / "plate.yaml").read_text(encoding="utf-8").replace("machines/npl-like.yaml", "machine.yaml")
+    text = (
+        (SHIPPED / "plate.yaml")
+        .read_text(encoding="utf-8")
+        .replace("machines/npl-like.yaml", "machine.yaml")
+    )
     for old, new in replaced.items():
         assert f"{old}: {MACHINE}" in text
         text = text.replace(f"{old}: {MACHINE}", f"{old}: {new}")
@@ -33,10 +39,13 @@ def written(folder: Path, machine: str, **replaced: str) -> Path:
 
 
 def assert_followed(path: Path) -> None:
-    """Readings without noise leave no residual, and lead to the true machine in the frame of the fitted one."""
+    """Readings without noise leave no residual, and lead to the true machine in the frame of the
+    fitted one.
+    """
     (experiment,) = load(path)
     shared = reference(*true_experiment(experiment))
-    # What is of second order in the misalignment of positions, far below a nanometre, is not part of the model.
+    # What is of second order in the misalignment of positions, far below a nanometre, is not part
+    # of the model.
     assert shared.sum_of_squares < 1e-8
     for target in targets(shared):
         assert np.abs(target.base / target.uncertainty).max() < 1e-4, target.symbol
@@ -44,20 +53,30 @@ def assert_followed(path: Path) -> None:
 
 @pytest.mark.parametrize("name", KEYS)
 @pytest.mark.parametrize("arrangement", ["MB1", "FB1"])
-def test_neither_reference_point_nor_straight_lines_are_a_misfit(tmp_path: Path, name: str, arrangement: str) -> None:
-    machine = (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8").replace("MB1", arrangement)
+def test_neither_reference_point_nor_straight_lines_are_a_misfit(
+    tmp_path: Path, name: str, arrangement: str
+) -> None:
+    machine = (
+        (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8").replace("MB1", arrangement)
+    )
     criterion = name if name in ("end points", "minimum zone") else "least squares"
-    machine = machine.replace("straightness: least squares", f"straightness: {criterion}") + KEYS[name]
+    machine = (
+        machine.replace("straightness: least squares", f"straightness: {criterion}") + KEYS[name]
+    )
     if arrangement == "FB1":
         # The lever of a table's rotation is one power more than the rotation.
-        machine = machine.replace("EZY: {bandwidth: 3 um}", "EZY: {polynomial: [0 um, 1 um, 2 um, 3 um]}")
+        machine = machine.replace(
+            "EZY: {bandwidth: 3 um}", "EZY: {polynomial: [0 um, 1 um, 2 um, 3 um]}"
+        )
         machine = machine.replace("[0 um, 7 um, -7 um]", "[0 um, 7 um, -7 um, 1 um]")
     assert_followed(written(tmp_path, machine))
 
 
 def test_a_kinematic_model_holds_the_x_axis(tmp_path: Path) -> None:
     machine = (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8")
-    model = "{kind: kinematic, arrangement: MB1, position_coefficients: 4, rotation_coefficients: 3}"
+    model = (
+        "{kind: kinematic, arrangement: MB1, position_coefficients: 4, rotation_coefficients: 3}"
+    )
     assert_followed(written(tmp_path, machine, error_model=model))
 
 

@@ -23,12 +23,16 @@ def truth(design: Design, seed: int = 1, size: float = 2e-6) -> Truth:
     generator = np.random.default_rng(seed)
     drawn = nominal_state(design)
     free = (~design.held[:, : design.dimension]).all(axis=1)
-    turn = rotation_from_vector(1e-4 * generator.standard_normal((len(free), design.held.shape[1] - design.dimension)))
+    turn = rotation_from_vector(
+        1e-4 * generator.standard_normal((len(free), design.held.shape[1] - design.dimension))
+    )
     state = State(
         drawn.balls + 1e-5 * generator.standard_normal(drawn.balls.shape),
         np.where(free[:, None, None], turn @ drawn.rotations, drawn.rotations),
         drawn.origins + 1e-5 * free[:, None] * generator.standard_normal(drawn.origins.shape),
-        size * generator.standard_normal(len(drawn.a)) / [p.effect for p in design.model.parameters],
+        size
+        * generator.standard_normal(len(drawn.a))
+        / [p.effect for p in design.model.parameters],
     )
     if design.free_offsets is not None:
         moved = 1e-5 * design.free_offsets * generator.standard_normal(design.probes.shape)
@@ -50,7 +54,10 @@ def small(pairs: bool = True, kept: bool = False) -> Design:
     )
     generator = np.random.default_rng(3)
     return replace(
-        design, readings=replace(design.readings, repeats=generator.integers(1, 4, len(design.readings.ball)))
+        design,
+        readings=replace(
+            design.readings, repeats=generator.integers(1, 4, len(design.readings.ball))
+        ),
     )
 
 
@@ -93,7 +100,9 @@ def with_length_standard(projected: bool) -> Design:
 
 
 def with_unknown_probes(lengths: bool) -> Design:
-    """Offsets of all probes but the first are parameters, known a little, and so is a machine error and an origin."""
+    """Offsets of all probes but the first are parameters, known a little, and so is a machine error
+    and an origin.
+    """
     design = with_length_standard(False) if lengths else small()
     free = np.ones(design.probes.shape, bool)
     free[0] = False
@@ -159,7 +168,11 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
         balls = np.arange(len(design.balls))[group.ball]
         own = plates[(readings.position == group.position) & np.isin(readings.ball, balls)]
         # A ball's repeats stand in the groups of a position in the order of the readings.
-        earlier = [g for g in shared.groups if g.position == group.position and g.rows.start < group.rows.start]
+        earlier = [
+            g
+            for g in shared.groups
+            if g.position == group.position and g.rows.start < group.rows.start
+        ]
         for place, ball in enumerate(balls):
             turn = sum(int((np.arange(len(design.balls))[g.ball] == ball).sum()) for g in earlier)
             row = own[design.readings.ball[own] == ball][turn]
@@ -186,7 +199,9 @@ def assert_agree(shared: Reference, found: Estimates, state: State, squares: flo
     start, own = shared.start, found.found
 
     def assert_close(value: np.ndarray, expected: np.ndarray, spread: np.ndarray) -> None:
-        np.testing.assert_allclose(value, expected, rtol=0, atol=5e-6 * float(spread.std(axis=0).max()))
+        np.testing.assert_allclose(
+            value, expected, rtol=0, atol=5e-6 * float(spread.std(axis=0).max())
+        )
 
     assert_close(start.balls + own.balls[k].T, state.balls, own.balls)
     assert_close(start.origins + own.origins[k], state.origins, own.origins)
@@ -210,7 +225,16 @@ def assert_agree(shared: Reference, found: Estimates, state: State, squares: flo
         with_unknown_probes(False),
         with_unknown_probes(True),
     ],
-    ids=["distances", "neighbours", "co-ordinates", "projected", "length", "plane", "probes", "probes and length"],
+    ids=[
+        "distances",
+        "neighbours",
+        "co-ordinates",
+        "projected",
+        "length",
+        "plane",
+        "probes",
+        "probes and length",
+    ],
 )
 def test_each_replicate_is_the_estimate_of_its_own_readings(design: Design) -> None:
     shared = reference(design, truth(design))
@@ -244,7 +268,9 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
     first = estimate_batch(shared, 1, 3)
     estimate_batch(shared, 1, 0)
     again = estimate_batch(shared, 1, 3)
-    assert (first.found.a == again.found.a).all() and (first.sum_of_squares == again.sum_of_squares).all()
+    assert (first.found.a == again.found.a).all() and (
+        first.sum_of_squares == again.sum_of_squares
+    ).all()
     assert (first.found.a != estimate_batch(shared, 2, 3).found.a).any()
 
 

@@ -1,4 +1,5 @@
-"""Pools at random: one to three artefacts of different kinds, certificates, times, limits of every kind, readings done.
+"""Pools at random: one to three artefacts of different kinds, certificates, times, limits of every
+kind, readings done.
 
 Lengths are chosen so that whatever is drawn lies inside the volume.
 """
@@ -48,10 +49,11 @@ PROBES = {"down": [0, 0, -40], "right": [40, 0, 0], "back": [0, 40, 0]}
 
 @dataclass(frozen=True)
 class RandomPool:
-    """A file with a pool and what is asked of it: criterion, budget, and readings of the first positions drawn.
+    """A file with a pool and what is asked of it: criterion, budget, and readings of the first
+    positions drawn.
 
-    `path` is the file's; `readings` the readings' that have been taken, None where nothing is done, after which the
-    artefact may be `standing` where it was.
+    `path` is the file's; `readings` the readings' that have been taken, None where nothing is done,
+    after which the artefact may be `standing` where it was.
     """
 
     path: Path
@@ -117,11 +119,16 @@ def _said(generator: np.random.Generator) -> dict[str, Any]:
     names = list(artefacts)
     drawn = int(generator.integers(0, 3))
     count = drawn + int(generator.integers(4, 8 if generator.random() < 0.8 else 14))
-    positions = [_position(generator, d, k, names, artefacts) for k in range(max(count, len(names)))]
+    positions = [
+        _position(generator, d, k, names, artefacts) for k in range(max(count, len(names)))
+    ]
     if drawn:
         said["positions"] = positions[:drawn]
     calibration = [
-        one for name in names if generator.random() < 0.6 for one in [_certificate(generator, name, artefacts)]
+        one
+        for name in names
+        if generator.random() < 0.6
+        for one in [_certificate(generator, name, artefacts)]
     ]
     if calibration:
         said["calibration"] = calibration
@@ -132,12 +139,19 @@ def _said(generator: np.random.Generator) -> dict[str, Any]:
     for k in range(int(generator.integers(0, 3)) if open_ else 0):
         name = open_[int(generator.integers(len(open_)))]
         price = f"{int(generator.integers(10, 90))} min"
-        offered.append({"name": f"certificate {k}", **_certificate(generator, name, artefacts), "price": price})
+        offered.append(
+            {"name": f"certificate {k}", **_certificate(generator, name, artefacts), "price": price}
+        )
     for k, one in enumerate(positions[drawn:]):
         if k % 3 == 1:
             one["times"] = {"set_up": f"{int(generator.integers(1, 40))} min"}
     said["pool"] = {
-        "times": {"set_up": "10 min", "reading": "20 s", "probe_change": "3 min", "plane_change": "15 min"},
+        "times": {
+            "set_up": "10 min",
+            "reading": "20 s",
+            "probe_change": "3 min",
+            "plane_change": "15 min",
+        },
         "candidates": positions[drawn:],
         "limits": _limits(generator, positions, drawn),
     }
@@ -148,7 +162,10 @@ def _said(generator: np.random.Generator) -> dict[str, Any]:
     said["evaluation"] = {
         "points": {"random": 12, "seed": 3},
         "probe": "down",
-        "tasks": [{"name": "long", "from": ends[0], "to": ends[1]}, {"name": "other", "from": ends[0], "to": across}],
+        "tasks": [
+            {"name": "long", "from": ends[0], "to": ends[1]},
+            {"name": "other", "from": ends[0], "to": across},
+        ],
     }
     return said
 
@@ -163,7 +180,11 @@ def _artefacts(generator: np.random.Generator, d: int) -> dict[str, dict[str, An
 
 
 def _position(
-    generator: np.random.Generator, d: int, k: int, names: Sequence[str], artefacts: dict[str, dict[str, Any]]
+    generator: np.random.Generator,
+    d: int,
+    k: int,
+    names: Sequence[str],
+    artefacts: dict[str, dict[str, Any]],
 ) -> dict[str, Any]:
     is_next = k < len(names) or generator.random() < 0.7
     name = names[k % len(names)] if is_next else names[int(generator.integers(len(names)))]
@@ -178,7 +199,11 @@ def _position(
         said["quarter_turns"] = int(generator.integers(4))
     else:
         # Where a bar is turned it stays in the octant that it points to.
-        turn = int(generator.integers(0, 91)) if kind == "two_spheres" else int(generator.integers(0, 20))
+        turn = (
+            int(generator.integers(0, 91))
+            if kind == "two_spheres"
+            else int(generator.integers(0, 20))
+        )
         origin = [f"{int(generator.integers(70, SIDES[axis] - 270))} mm" for axis in "xyz"[:d]]
         rotation = [
             "0 deg",
@@ -195,18 +220,26 @@ def _position(
     return said
 
 
-def _certificate(generator: np.random.Generator, name: str, artefacts: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _certificate(
+    generator: np.random.Generator, name: str, artefacts: dict[str, dict[str, Any]]
+) -> dict[str, Any]:
     u = f"{float(np.exp(generator.uniform(np.log(0.3), np.log(30.0)))):.3g} um"
     kind = artefacts[name]["kind"]
     if kind == "two_spheres":
         return {"artefact": name, "kind": "distances", "pairs": "all", "standard_uncertainty": u}
     if generator.random() < 0.3:
         return {"artefact": name, "kind": "coordinates", "balls": "all", "standard_uncertainty": u}
-    pairs = "all" if kind == "balls" else ["corner sides", "corners", "neighbours"][int(generator.integers(3))]
+    pairs = (
+        "all"
+        if kind == "balls"
+        else ["corner sides", "corners", "neighbours"][int(generator.integers(3))]
+    )
     return {"artefact": name, "kind": "distances", "pairs": pairs, "standard_uncertainty": u}
 
 
-def _limits(generator: np.random.Generator, positions: Sequence[dict[str, Any]], drawn: int) -> dict[str, Any]:
+def _limits(
+    generator: np.random.Generator, positions: Sequence[dict[str, Any]], drawn: int
+) -> dict[str, Any]:
     names = [one["name"] for one in positions]
     limits: dict[str, Any] = {}
     if generator.random() < 0.3:
@@ -214,7 +247,9 @@ def _limits(generator: np.random.Generator, positions: Sequence[dict[str, Any]],
     if generator.random() < 0.3:
         limits["never_together"] = [names[-2:]]
     if generator.random() < 0.3:
-        limits["at_most"] = [{"of": {"artefact": positions[-1]["artefact"]}, "count": int(generator.integers(2, 4))}]
+        limits["at_most"] = [
+            {"of": {"artefact": positions[-1]["artefact"]}, "count": int(generator.integers(2, 4))}
+        ]
     return limits
 
 
@@ -224,10 +259,14 @@ def _readings(path: Path, generator: np.random.Generator) -> Path:
     assert experiment.pool is not None
     places = [one.item for one in experiment.pool.candidates if isinstance(one.item, Position)]
     chosen = places[: int(generator.integers(1, 4))]
-    return write_some(experiment, chosen, path.with_suffix(".csv"), float(generator.choice([0.4, 0.7, 1.0])))
+    return write_some(
+        experiment, chosen, path.with_suffix(".csv"), float(generator.choice([0.4, 0.7, 1.0]))
+    )
 
 
-def write_some(experiment: Experiment, positions: Sequence[Position], path: Path, share: float) -> Path:
+def write_some(
+    experiment: Experiment, positions: Sequence[Position], path: Path, share: float
+) -> Path:
     """Write exact readings of positions, of the last of them only a share."""
     design = lay_out(replace(experiment, positions=tuple(positions)))
     readings, x = exact_readings(design, nominal_state(design))

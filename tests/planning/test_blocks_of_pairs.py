@@ -1,4 +1,6 @@
-"""Criteria of distances, worked through in blocks, against all distances at once; and what a plan refuses."""
+"""Criteria of distances, worked through in blocks, against all distances at once; and what a plan
+refuses.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ SIZE = 9
 
 
 def some_places(count: int, dimension: int) -> tuple[Array, Array, Array]:
-    """Places of which two coincide, how they are displaced, and an open direction that moves one of them."""
+    """Places of which two coincide, how they are displaced, and an open direction that moves one of
+    them.
+    """
     generator = np.random.default_rng(count + dimension)
     places = generator.random((count, dimension))
     places[count // 2] = places[1]
@@ -31,7 +35,9 @@ def some_places(count: int, dimension: int) -> tuple[Array, Array, Array]:
 
 
 def all_rows(places: Array, displacement: Array, open_: Array) -> tuple[Array, Array, int]:
-    """Rows (pairs, z) and lengths (pairs,) of all distances that count, one by one, and how many are left open."""
+    """Rows (pairs, z) and lengths (pairs,) of all distances that count, one by one, and how many
+    are left open.
+    """
     rows, lengths, excluded = [], [], 0
     for i, j in combinations(range(len(places)), 2):
         apart = places[i] - places[j]
@@ -50,23 +56,34 @@ def all_rows(places: Array, displacement: Array, open_: Array) -> tuple[Array, A
 @pytest.mark.parametrize(("count", "dimension"), [(5, 2), (23, 3), (40, 2)])
 @pytest.mark.parametrize(("block", "kept"), [(7, 0), (7, 1000), (256, 1024)])
 def test_blocks_make_no_difference(
-    monkeypatch: pytest.MonkeyPatch, block: int, kept: int, count: int, dimension: int, largest: bool
+    monkeypatch: pytest.MonkeyPatch,
+    block: int,
+    kept: int,
+    count: int,
+    dimension: int,
+    largest: bool,
 ) -> None:
     monkeypatch.setattr(criteria, "BLOCK", block)
     monkeypatch.setattr(criteria, "MOST_PLACES_KEPT", kept)
     monkeypatch.setattr(criteria, "KEPT", 10 * kept)
     given = some_places(count, dimension), some_places(count + 1, dimension)
     several = Several(tuple(Pairs(*one) for one in given))
-    rows, lengths, excluded = (np.concatenate(parts) for parts in zip(*map(_listed, given), strict=True))
+    rows, lengths, excluded = (
+        np.concatenate(parts) for parts in zip(*map(_listed, given), strict=True)
+    )
     assert several.count == len(rows)
     assert [part.excluded for part in several.parts if isinstance(part, Pairs)] == excluded.tolist()
-    assert np.sort(np.concatenate(list(several.lengths()))) == pytest.approx(np.sort(lengths), rel=1e-12)
+    assert np.sort(np.concatenate(list(several.lengths()))) == pytest.approx(
+        np.sort(lengths), rel=1e-12
+    )
 
     root = np.random.default_rng(3).normal(size=(SIZE, SIZE))
     name: CriterionName = "U6-maximum" if largest else "U6"
     found = Criterion(name, False, several, np.zeros((0, SIZE)))
     expected = np.sqrt(np.einsum("pz,zy,py->p", rows, root @ root.T, rows))
-    assert found.value(root) == pytest.approx(expected.max() if largest else expected.mean(), rel=1e-12)
+    assert found.value(root) == pytest.approx(
+        expected.max() if largest else expected.mean(), rel=1e-12
+    )
 
     power = 8.0
     weights = (expected / expected.max()) ** (power - 1) if largest else np.ones(len(rows))
@@ -88,7 +105,9 @@ def _listed(given: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
 
 
 def test_many_points_take_little_memory() -> None:
-    """A matrix over all pairs of two thousand places has 32 MB, and some ten of them used to be formed."""
+    """A matrix over all pairs of two thousand places has 32 MB, and some ten of them used to be
+    formed.
+    """
     generator = np.random.default_rng(1)
     places, displacement = generator.random((2000, 3)), generator.normal(size=(2000, 3, 4))
     pairs = Pairs(places, displacement, np.zeros((2000, 3, 0)))
@@ -109,25 +128,33 @@ def test_more_points_than_a_plan_goes_through(tmp_path: Path) -> None:
     experiment = load(path, planning=True)[0]
     with pytest.raises(ExperimentError) as caught:
         campaign(experiment, Request("U6-maximum", None))
-    assert str(caught.value) == (
-        f"{path}: evaluation.points: 1001 points make 500500 distances, which a search for U6-maximum computes some "
-        "thousand times, which takes too long; give at most 1000, better some hundred, or plan for tasks"
+    assert (
+        str(caught.value)
+        == f"{path}: evaluation.points: 1001 points make 500500 distances, which a search for"
+        " U6-maximum computes some thousand times, which takes too long; give at most 1000,"
+        " better some hundred, or plan for tasks"
     )
     criteria.refuse_many_points(experiment, "tasks")
 
 
-def test_more_candidates_than_there_is_memory_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_candidates_than_there_is_memory_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "pool.yaml"
     path.write_text(TEXT)
     experiment = load(path, planning=True)[0]
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
     monkeypatch.setattr(information, "MOST_BYTES", 0)
-    with pytest.raises(ExperimentError, match=r"pool: 13 candidates with [0-9]+ parameters each take") as caught:
+    with pytest.raises(
+        ExperimentError, match=r"pool: 13 candidates with [0-9]+ parameters each take"
+    ) as caught:
         information.pool_information(experiment, candidates, False)
     size = int(str(caught.value).split(" candidates with ")[1].split()[0])
     monkeypatch.setattr(information, "MOST_BYTES", 13 * 8 * size**2 - 1)
-    with pytest.raises(ExperimentError, match=r"; offer at most 12, positions of the experiment and certificates"):
+    with pytest.raises(
+        ExperimentError, match=r"; offer at most 12, positions of the experiment and certificates"
+    ):
         information.pool_information(experiment, candidates, False)
     monkeypatch.setattr(information, "MOST_BYTES", 13 * 8 * size**2)
     assert len(information.pool_information(experiment, candidates, False).matrices) == 13

@@ -1,4 +1,6 @@
-"""Plans as a user asks for them: what is drawn, what is done, what is chosen earlier, and what goes wrong."""
+"""Plans as a user asks for them: what is drawn, what is done, what is chosen earlier, and what goes
+wrong.
+"""
 
 from __future__ import annotations
 
@@ -86,7 +88,9 @@ def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
 
 
 @pytest.mark.parametrize("read", [1, 3, 5])
-def test_an_interrupted_campaign_never_does_worse_than_its_remainder(drawn: Path, read: int) -> None:
+def test_an_interrupted_campaign_never_does_worse_than_its_remainder(
+    drawn: Path, read: int
+) -> None:
     experiment = first(drawn)
     assert experiment.pool is not None
     done = done_candidates(readings_of(drawn, read), experiment)
@@ -114,27 +118,49 @@ def test_what_was_read_in_part_counts_as_it_was_read(drawn: Path) -> None:
     assert partly.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
 
 
-def test_readings_of_a_position_that_is_no_candidate_are_refused(drawn: Path, tmp_path: Path) -> None:
+def test_readings_of_a_position_that_is_no_candidate_are_refused(
+    drawn: Path, tmp_path: Path
+) -> None:
     experiment = first(drawn)
     assert experiment.pool is not None
     path = tmp_path / "other.csv"
     path.write_text("position,ball,probe,x_mm,y_mm,z_mm\nlo,r1c1,down,1,2,3\nlo,r1c2,down,1,2,3\n")
-    with pytest.raises(ExperimentError, match='other.csv:2:1: no position "lo".*did you mean "low"'):
+    with pytest.raises(
+        ExperimentError, match='other.csv:2:1: no position "lo".*did you mean "low"'
+    ):
         done_candidates(path, experiment)
 
 
-def test_an_earlier_choice_is_found_again_and_gone_on_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_earlier_choice_is_found_again_and_gone_on_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path, chosen = tmp_path / "pool.yaml", tmp_path / "chosen.yaml"
     path.write_text(TEXT)
-    assert main(["plan", str(path), "--hours", "5", "-o", str(chosen), "--workers", "1", "--json"]) == 0
+    assert (
+        main(["plan", str(path), "--hours", "5", "-o", str(chosen), "--workers", "1", "--json"])
+        == 0
+    )
     before = json.loads(capsys.readouterr().out)
     experiment = first(path)
     assert experiment.pool is not None
-    names = [experiment.pool.candidates[k].name for k in earlier_choice(load(chosen)[0], offer(experiment.pool))]
+    names = [
+        experiment.pool.candidates[k].name
+        for k in earlier_choice(load(chosen)[0], offer(experiment.pool))
+    ]
     assert names == before["chosen"]
     # Three positions are read as planned; the rest is planned anew, at the cost of what was left.
     some = readings_of(chosen, 3)
-    again = ["plan", str(path), "--done", str(some), "--from", str(chosen), "--workers", "1", "--json"]
+    again = [
+        "plan",
+        str(path),
+        "--done",
+        str(some),
+        "--from",
+        str(chosen),
+        "--workers",
+        "1",
+        "--json",
+    ]
     assert main(again) == 0
     after = json.loads(capsys.readouterr().out)
     assert len(after["done"]) == 3 and set(after["done"]) <= set(after["chosen"])
@@ -142,10 +168,25 @@ def test_an_earlier_choice_is_found_again_and_gone_on_from(tmp_path: Path, capsy
     assert after["drawn"] == pytest.approx(before["value"], rel=1e-9)
 
 
-def test_what_is_written_is_worth_what_was_told(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_written_is_worth_what_was_told(
+    drawn: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     chosen = drawn.with_name("chosen.yaml")
     assert (
-        main(["plan", str(drawn), "--criterion", "tasks-maximum", "-o", str(chosen), "--workers", "1", "--json"]) == 0
+        main(
+            [
+                "plan",
+                str(drawn),
+                "--criterion",
+                "tasks-maximum",
+                "-o",
+                str(chosen),
+                "--workers",
+                "1",
+                "--json",
+            ]
+        )
+        == 0
     )
     found = json.loads(capsys.readouterr().out)
     assert main(["run", str(chosen), "--json"]) == 0
@@ -157,13 +198,17 @@ def test_what_is_written_is_worth_what_was_told(drawn: Path, capsys: pytest.Capt
     assert list(found["plan"]["quantities"]) == list(worth["quantities"])
     for symbol, quantity in worth["quantities"].items():
         for key in ("maximum", "average", "count", "undetermined"):
-            assert found["plan"]["quantities"][symbol][key] == pytest.approx(quantity[key], rel=1e-9), symbol
+            assert found["plan"]["quantities"][symbol][key] == pytest.approx(
+                quantity[key], rel=1e-9
+            ), symbol
     # No other file is overwritten.
     assert main(["plan", str(drawn), "-o", str(chosen), "--workers", "1"]) == 3
     assert "--force" in capsys.readouterr().err
 
 
-def test_too_little_is_told_with_what_stays_open(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_little_is_told_with_what_stays_open(
+    drawn: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["plan", str(drawn), "--positions", "1", "--workers", "1"]) == 1
     told = capsys.readouterr().out
     assert "no choice was found that determines everything" in told
@@ -180,7 +225,9 @@ def test_too_little_is_told_with_what_stays_open(drawn: Path, capsys: pytest.Cap
         (["--sheet", "sheet.pdf"], "ends in .html"),
     ],
 )
-def test_wrong_usage(drawn: Path, options: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_usage(
+    drawn: Path, options: list[str], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as left:
         main(["plan", str(drawn), *options])
     assert left.value.code == 2
@@ -195,7 +242,10 @@ def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> No
 def test_sheets_are_written(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for ending in ("html", "csv"):
         sheet = drawn.with_name(f"sheet.{ending}")
-        assert main(["plan", str(drawn), "--positions", "4", "--sheet", str(sheet), "--workers", "1"]) == 0
+        assert (
+            main(["plan", str(drawn), "--positions", "4", "--sheet", str(sheet), "--workers", "1"])
+            == 0
+        )
         told = sheet.read_text()
         assert told.count("right") >= 2 and "flatness" in told
 
@@ -207,7 +257,9 @@ def test_the_curve_falls_and_keeps_above_its_bound(drawn: Path) -> None:
     assert len(values) >= 5
     assert (np.diff(values) <= 1e-12).all()
     assert (bounds <= values).all()
-    assert found.value <= min(p.value for p in found.curve if p.budget == found.budget) * (1 + 1e-12)
+    assert found.value <= min(p.value for p in found.curve if p.budget == found.budget) * (
+        1 + 1e-12
+    )
 
 
 def test_hours_buy_certificates_too(tmp_path: Path) -> None:
@@ -227,7 +279,9 @@ def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "no position can be read with 0.1 h; allow more" in capsys.readouterr().err
 
 
-def test_the_pool_is_not_overwritten_by_the_choice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_pool_is_not_overwritten_by_the_choice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "pool.yaml"
     path.write_text(TEXT)
     assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 2
@@ -250,7 +304,9 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
         return replace(found, value=10 * found.value) if found is not None and is_wrong else found
 
     monkeypatch.setattr(planning, "bound", wrong)
-    monkeypatch.setattr(planning, "in_processes", lambda task, tasks, workers: (task(*one) for one in tasks))
+    monkeypatch.setattr(
+        planning, "in_processes", lambda task, tasks, workers: (task(*one) for one in tasks)
+    )
     assert main(["plan", str(drawn), "--positions", "5", "--curve", "--workers", "1"]) == 70
     out, err = capsys.readouterr()
     assert out == "" and err.startswith("internal error: U6") and "the bound of any choice" in err
@@ -270,5 +326,7 @@ def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
     campaign(load(drawn, planning=True)[0], request, report=lambda *step: steps.append(step))
     searched = [(done, wanted) for what, done, wanted in steps if what == "starts of the search"]
     assert len(searched) > 1
-    assert searched == [(done, searched[0][1]) for done in range(searched[0][0], searched[0][1] + 1)]
+    assert searched == [
+        (done, searched[0][1]) for done in range(searched[0][0], searched[0][1] + 1)
+    ]
     assert all(0 <= done <= wanted for _, done, wanted in steps)

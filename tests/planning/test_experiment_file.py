@@ -25,9 +25,13 @@ NUMBERS = count()
 
 def same(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray):
-        return one.shape == other.shape and bool(np.array_equal(one, other, equal_nan=one.dtype.kind == "f"))
+        return one.shape == other.shape and bool(
+            np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+        )
     if hasattr(one, "__dataclass_fields__"):
-        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+        return all(
+            same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)
+        )
     return bool(one == other)
 
 
@@ -43,9 +47,13 @@ def planned(path: Path, variant: str | None = None) -> Experiment:
     return found
 
 
-def written(experiment: Experiment, chosen: tuple[Candidate, ...], path: Path, **more: Any) -> Experiment:
+def written(
+    experiment: Experiment, chosen: tuple[Candidate, ...], path: Path, **more: Any
+) -> Experiment:
     path.parent.mkdir(exist_ok=True)
-    path.write_text(experiment_text(experiment, chosen, "chosen here", path.parent, **more), "utf-8")
+    path.write_text(
+        experiment_text(experiment, chosen, "chosen here", path.parent, **more), "utf-8"
+    )
     (found,) = load(path)
     return found
 
@@ -61,7 +69,9 @@ def test_round_trip(name: str, number: int, seed: int, tmp_path: Path) -> None:
     sheet = run_sheet(list(dict.fromkeys([candidates[0], *chosen])), experiment.pool.changes)
     found = written(experiment, sheet.chosen, tmp_path / "chosen.yaml")
     expected = with_chosen(experiment, sheet.chosen)
-    assert found.pool is None and [one.name for one in found.positions] == [one.name for one in expected.positions]
+    assert found.pool is None and [one.name for one in found.positions] == [
+        one.name for one in expected.positions
+    ]
     assert_same(lay_out(found), lay_out(expected))
     if set(expected.artefacts) == set(experiment.artefacts):
         items = tuple(one.item for one in sheet.calibration)
@@ -79,7 +89,10 @@ def test_lengths_that_no_short_number_states(tmp_path: Path) -> None:
     experiment = planned(tmp_path / "odd.yaml")
     assert experiment.pool is not None
     chosen = tuple(one for one in experiment.pool.candidates if isinstance(one.item, Position))
-    assert_same(lay_out(written(experiment, chosen, tmp_path / "c.yaml")), lay_out(with_chosen(experiment, chosen)))
+    assert_same(
+        lay_out(written(experiment, chosen, tmp_path / "c.yaml")),
+        lay_out(with_chosen(experiment, chosen)),
+    )
 
 
 SOURCE = """\
@@ -153,7 +166,9 @@ def source(tmp_path: Path) -> Path:
     module = f"own_scale_model_{next(NUMBERS)}"
     (folder / f"{module}.py").write_text(MODEL)
     (folder / "tables/balls.csv").write_text("ball,x_mm,y_mm\na,0,0\nb,200,0\nc,0,200\n")
-    (folder / "tables/certificate.csv").write_text("ball,x_mm,y_mm,z_mm\na,0,0,0\nb,200.01,0,0\nc,0,200.02,0\n")
+    (folder / "tables/certificate.csv").write_text(
+        "ball,x_mm,y_mm,z_mm\na,0,0,0\nb,200.01,0,0\nc,0,200.02,0\n"
+    )
     (folder / "tables/points.csv").write_text("x_mm,y_mm,z_mm\n1,2,3\n400,500,600\n")
     (folder / "campaign.yaml").write_text(SOURCE.replace("own_scale_model", module), "utf-8")
     return folder / "campaign.yaml"
@@ -172,14 +187,25 @@ def test_beside_its_source_sections_keep_their_text(source: Path) -> None:
     assert_same(lay_out(found), lay_out(with_chosen(experiment, chosen)))
     text = (source.parent / "chosen.yaml").read_text("utf-8")
     assert text.startswith("# chosen here\n\ntitle: from a campaign   # kept\n")
-    assert "\n# the model\nerror_model: {kind: python" in text and "seed: 5   # kept as well" in text
+    assert (
+        "\n# the model\nerror_model: {kind: python" in text and "seed: 5   # kept as well" in text
+    )
     # The bar stands nowhere, and nothing is known of a position that is not read.
-    for gone in ("spare", "pool", "variants", "expected_rank_deficiency", "two: origin x", "at the top"):
+    for gone in (
+        "spare",
+        "pool",
+        "variants",
+        "expected_rank_deficiency",
+        "two: origin x",
+        "at the top",
+    ):
         assert gone not in text
     assert [prior.position for prior in found.priors] == ["more z 500 mm at 100, 100 mm"]
 
 
-def test_a_prior_of_the_machine_stays_though_its_name_begins_as_a_position_left_out_does(source: Path) -> None:
+def test_a_prior_of_the_machine_stays_though_its_name_begins_as_a_position_left_out_does(
+    source: Path,
+) -> None:
     (module,) = source.parent.glob("own_scale_model_*.py")
     module.write_text(MODEL.replace('Parameter("scale"', 'Parameter("two: strain"'))
     known = 'priors:\n  - {parameter: "two: strain", standard_uncertainty: 1 ppm}\n'
@@ -187,7 +213,10 @@ def test_a_prior_of_the_machine_stays_though_its_name_begins_as_a_position_left_
     experiment = planned(source, "as is")
     chosen = by_name(experiment, "more z 500 mm at 100, 100 mm", "one")
     found = written(experiment, chosen, source.parent / "chosen.yaml")
-    assert [prior.name for prior in found.priors] == ["two: strain", "more z 500 mm at 100, 100 mm: origin x"]
+    assert [prior.name for prior in found.priors] == [
+        "two: strain",
+        "more z 500 mm at 100, 100 mm: origin x",
+    ]
 
 
 def test_elsewhere_files_are_found_again(source: Path, tmp_path: Path) -> None:
@@ -197,10 +226,20 @@ def test_elsewhere_files_are_found_again(source: Path, tmp_path: Path) -> None:
     found = written(experiment, chosen, path, title="chosen: some", expected_rank_deficiency=4)
     assert_same(lay_out(found), lay_out(with_chosen(experiment, chosen)))
     assert found.title == "chosen: some" and found.seed == 7 and found.expected_rank_deficiency == 4
-    assert [one.name for one in found.positions] == ["two", "one", "on", "more z 450 mm at 100, 100 mm"]
+    assert [one.name for one in found.positions] == [
+        "two",
+        "one",
+        "on",
+        "more z 450 mm at 100, 100 mm",
+    ]
     assert found.positions[1].pose.origin[2] == 0.11
     text = path.read_text("utf-8")
-    for name in ("tables/balls.csv", "tables/certificate.csv", "tables/points.csv", "machines/true.yaml"):
+    for name in (
+        "tables/balls.csv",
+        "tables/certificate.csv",
+        "tables/points.csv",
+        "machines/true.yaml",
+    ):
         assert f"../campaign/{name}" in text
     assert "folder: ../campaign" in text
 
@@ -224,7 +263,11 @@ def test_files_of_unusual_form(change: Any, source: Path) -> None:
 
 
 def test_texts_that_look_like_numbers_stay_texts(source: Path) -> None:
-    text = source.read_text("utf-8").replace("name: one,", 'name: "1e-6",').replace("[one].level", "[1e-6].level")
+    text = (
+        source.read_text("utf-8")
+        .replace("name: one,", 'name: "1e-6",')
+        .replace("[one].level", "[1e-6].level")
+    )
     source.write_text(text.replace('name: "on"', 'name: "0o17"'), "utf-8")
     experiment = planned(source, "as is")
     chosen = by_name(experiment, "1e-6", "0o17", "two")
@@ -236,7 +279,9 @@ def test_positions_of_a_file_that_has_none(source: Path) -> None:
     text = source.read_text("utf-8")
     start, end = text.index("positions:\n"), text.index("calibration:\n")
     text = text[:start] + text[end : text.index("variants:")]
-    source.write_text(text.replace('  - {parameter: "two: origin x", standard_uncertainty: 1 mm}\n', ""), "utf-8")
+    source.write_text(
+        text.replace('  - {parameter: "two: origin x", standard_uncertainty: 1 mm}\n', ""), "utf-8"
+    )
     experiment = planned(source)
     assert experiment.positions == ()
     chosen = by_name(experiment, "more z 500 mm at 100, 100 mm", "on")

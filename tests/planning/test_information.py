@@ -24,7 +24,8 @@ from .small_pool import TEXT
 
 CAMPAIGN = Path("designs/planning/campaign.yaml")
 
-# A plate in two dimensions whose probes have offsets that are estimated, some balls of it read, and more often.
+# A plate in two dimensions whose probes have offsets that are estimated, some balls of it read, and
+# more often.
 FLAT = """
 title: a plate on a table
 machine: {volume: [600 mm, 500 mm], repeatability: [1 um, 2 um]}
@@ -71,7 +72,14 @@ def selections(experiment: Experiment, count: int, size: int, seed: int) -> list
     return [sorted(generator.choice(n, min(size, n), replace=False).tolist()) for _ in range(count)]
 
 
-NAMES: tuple[CriterionName, ...] = ("U6", "U6-maximum", "U5", "U5-maximum", "tasks", "tasks-maximum")
+NAMES: tuple[CriterionName, ...] = (
+    "U6",
+    "U6-maximum",
+    "U5",
+    "U5-maximum",
+    "tasks",
+    "tasks-maximum",
+)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -93,7 +101,9 @@ def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> N
 
 
 @pytest.mark.parametrize("name", ["U6", "U5"])
-def test_equal_for_estimated_offsets_and_parts_of_a_plate(tmp_path: Path, name: CriterionName) -> None:
+def test_equal_for_estimated_offsets_and_parts_of_a_plate(
+    tmp_path: Path, name: CriterionName
+) -> None:
     (experiment,) = load(written(tmp_path, FLAT), planning=True)
     assert experiment.pool is not None
     problem = problem_of(experiment, name)
@@ -137,7 +147,10 @@ def test_combinations_of_balls_change_nothing() -> None:
     assert some.basis.size < every.basis.size
     chosen = [0, 1, 8, 17, 30, 40, 50]
     limits = constraints(experiment.pool.candidates, experiment.pool.changes, Budget())
-    found = [value(Problem(one, criterion(one, experiment, "U6"), limits), chosen) for one in (some, every)]
+    found = [
+        value(Problem(one, criterion(one, experiment, "U6"), limits), chosen)
+        for one in (some, every)
+    ]
     assert found[0] == pytest.approx(found[1], rel=1e-12)
 
 
@@ -151,7 +164,11 @@ def test_all_candidates_together_have_the_identity() -> None:
 
 def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
     # With one probe, rotations cannot be told from straightness.
-    text = TEXT.replace("[[right, down]]", "[down]").replace("[[back, down]]", "[down]").replace(", probe: right", "")
+    text = (
+        TEXT.replace("[[right, down]]", "[down]")
+        .replace("[[back, down]]", "[down]")
+        .replace(", probe: right", "")
+    )
     (experiment,) = load(written(tmp_path, text), planning=True)
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
@@ -165,12 +182,15 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
         criterion(information, experiment, "A")
     problem = problem_of(experiment, "U5")
     assert problem.criterion.excluded == full.quantities["U5"].undetermined
-    assert value(problem, range(len(candidates))) == pytest.approx(full.quantities["U5"].average, rel=1e-9)
+    assert value(problem, range(len(candidates))) == pytest.approx(
+        full.quantities["U5"].average, rel=1e-9
+    )
 
 
 def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
     drawn = (
-        "positions: [{name: low, artefact: plate, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}]"
+        "positions: [{name: low, artefact: plate, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0"
+        " mm}, probes: [down]}]"
     )
     prior = 'priors: [{parameter: "low: origin x", standard_uncertainty: 1 um}]'
     (experiment,) = load(written(tmp_path, f"{TEXT}{drawn}\n{prior}\n"), planning=True)
@@ -235,32 +255,46 @@ def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
     assert experiment.pool is not None
     problem = problem_of(experiment, "U6")
     names = [candidate.name for candidate in experiment.pool.candidates]
-    for wanted in (["a", "b", "of small"], ["c", "d", "of large"], ["a", "b", "c", "of small", "of large"]):
+    for wanted in (
+        ["a", "b", "of small"],
+        ["c", "d", "of large"],
+        ["a", "b", "c", "of small", "of large"],
+    ):
         chosen = [names.index(name) for name in wanted]
         full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         assert full.verdict.deficiency == 0
         assert value(problem, chosen) == pytest.approx(full.quantities["U6"].average, rel=1e-9)
-    # Neither the sides of the one nor those of the other tell squareness, and nothing else is shared.
+    # Neither the sides of the one nor those of the other tell squareness, and nothing else is
+    # shared.
     chosen = [names.index(name) for name in ("a", "d", "of small", "of large")]
     full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
     assert full.verdict.deficiency == 1 and value(problem, chosen) == np.inf
 
 
-# What is known all but exactly: of a machine's parameter, of a certificate, and beside readings that are coarse.
+# What is known all but exactly: of a machine's parameter, of a certificate, and beside readings
+# that are coarse.
 TIGHT = {
-    "a prior": ("target_accuracy", "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_accuracy"),
+    "a prior": (
+        "target_accuracy",
+        "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_accuracy",
+    ),
     "coarse readings": ("repeatability: 1 um", "repeatability: 10 mm"),
     "an item on offer": (
         "pairs: corner sides, standard_uncertainty: 0.5 um, price",
         "pairs: corner sides, standard_uncertainty: 1e-9 um, price",
     ),
-    "a certificate": ("standard_uncertainty: 0.5 um}\ntarget", "standard_uncertainty: 1e-9 um}\ntarget"),
+    "a certificate": (
+        "standard_uncertainty: 0.5 um}\ntarget",
+        "standard_uncertainty: 1e-9 um}\ntarget",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", ["U6", "U5"])
 @pytest.mark.parametrize("what", TIGHT)
-def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str, name: CriterionName) -> None:
+def test_equal_beside_what_is_known_all_but_exactly(
+    tmp_path: Path, what: str, name: CriterionName
+) -> None:
     old, new = TIGHT[what]
     assert old in TEXT
     (experiment,) = load(written(tmp_path, TEXT.replace(old, new, 1)), planning=True)
@@ -279,7 +313,9 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str, n
 
 
 def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_path: Path) -> None:
-    """Whatever certificates say: the choice that is written has no such plate, so that `run` counts the others only."""
+    """Whatever certificates say: the choice that is written has no such plate, so that `run` counts
+    the others only.
+    """
     certified = TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")
     (experiment,) = load(written(tmp_path, certified), planning=True)
     assert experiment.pool is not None
@@ -295,7 +331,9 @@ def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_p
 
 @pytest.mark.parametrize("positions", [2, 3, 4])
 def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> None:
-    (experiment,) = load(written(tmp_path, TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")), planning=True)
+    (experiment,) = load(
+        written(tmp_path, TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")), planning=True
+    )
     assert experiment.pool is not None
     found = campaign(experiment, Request("U5", Budget(positions=positions)))
     candidates = experiment.pool.candidates
@@ -305,19 +343,27 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
             places = [one.item for one in chosen if isinstance(one.item, Position)]
             if len({one.artefact for one in places}) == 2 and len(places) <= positions:
                 full = predict(with_chosen(experiment, chosen))
-                best = min(best, np.inf if full.verdict.deficiency else full.quantities["U5"].average)
+                best = min(
+                    best, np.inf if full.verdict.deficiency else full.quantities["U5"].average
+                )
     assert found.bound <= found.value == pytest.approx(best, rel=1e-9)
-    with pytest.raises(ExperimentError, match='U5 takes in the distances of ".*", of which no position can be read'):
+    with pytest.raises(
+        ExperimentError, match='U5 takes in the distances of ".*", of which no position can be read'
+    ):
         campaign(experiment, Request("U5", Budget(positions=1)))
 
 
 def test_rounding_holds_nothing_of_a_standard_that_is_left_out(tmp_path: Path) -> None:
-    """A bar with a loose certificate, which told the machine's parameters where no position placed it."""
+    """A bar with a loose certificate, which told the machine's parameters where no position placed
+    it.
+    """
     (experiment,) = load(written(tmp_path, PLATE_AND_BAR), planning=True)
     assert experiment.pool is not None
     candidates = experiment.pool.candidates
     chosen = [k for k, one in enumerate(candidates) if one.item.artefact == "plate"]
-    alone = replace(experiment, pool=replace(experiment.pool, candidates=tuple(candidates[k] for k in chosen)))
+    alone = replace(
+        experiment, pool=replace(experiment.pool, candidates=tuple(candidates[k] for k in chosen))
+    )
     for name in ("A", "U6"):
         with_bar = value(problem_of(experiment, name), chosen)  # type: ignore[arg-type]
         without = value(problem_of(alone, name), range(len(chosen)))  # type: ignore[arg-type]

@@ -1,4 +1,6 @@
-"""Positions that were interrupted: completed where they stand, set up again, or left, and never to the plan's harm."""
+"""Positions that were interrupted: completed where they stand, set up again, or left, and never to
+the plan's harm.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,9 @@ def readings_of(path: Path, names: list[str], count: int) -> Path:
     by_name = {one.name: one for one in experiment.pool.candidates}
     chosen = [by_name[name] for name in names]
     places = [one.item for one in chosen if isinstance(one.item, Position)]
-    return write_some(experiment, places, path.with_name("readings.csv"), (count + 0.5) / chosen[-1].readings)
+    return write_some(
+        experiment, places, path.with_name("readings.csv"), (count + 0.5) / chosen[-1].readings
+    )
 
 
 def gone_on(path: Path, readings: Path, budget: Budget, standing: bool = True) -> Campaign:
@@ -77,7 +81,9 @@ def test_a_position_is_completed_where_it_stands_without_another_set_up(pool: Pa
     # Five readings of a minute each are what five minutes are good for.
     assert sorted(names_of(found)) == ["low", "side"]
     assert (found.spent.seconds, found.spent.readings, found.spent.positions) == (300.0, 5, 0)
-    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
+    sheet = run_sheet(
+        found.chosen, found.pool.changes, found.done, found.completed, found.interrupted
+    )
     step = sheet.steps[-1]
     assert (step.name, step.done, step.readings, step.seconds) == ("low", False, 5, 300.0)
     assert step.balls == "the rest, 5 of 9 readings: r2c2, r2c3, r3c1, r3c2, r3c3"
@@ -85,13 +91,18 @@ def test_a_position_is_completed_where_it_stands_without_another_set_up(pool: Pa
     # It is worth what both positions are worth that are read in one go.
     (experiment,) = load(pool, planning=True)
     assert experiment.pool is not None
-    whole = with_chosen(experiment, [one for one in experiment.pool.candidates if one.name in ("side", "low")])
+    whole = with_chosen(
+        experiment, [one for one in experiment.pool.candidates if one.name in ("side", "low")]
+    )
     assert found.value == pytest.approx(predict(whole).quantities["U6"].average, rel=1e-9)
 
 
 def test_what_has_been_moved_is_not_offered_for_completion(pool: Path) -> None:
     path = readings_of(pool, ["side", "low"], 4)
-    assert names_of(gone_on(pool, path, Budget(seconds=5 * 60.0), standing=False)) == ["side", "low"]
+    assert names_of(gone_on(pool, path, Budget(seconds=5 * 60.0), standing=False)) == [
+        "side",
+        "low",
+    ]
     again = gone_on(pool, path, Budget(seconds=19 * 60.0), standing=False)
     assert again.completed is None and again.spent.seconds <= 19 * 60.0
     assert set(names_of(again)) > {"side", "low"}
@@ -100,7 +111,10 @@ def test_what_has_been_moved_is_not_offered_for_completion(pool: Path) -> None:
 def test_only_the_position_that_was_read_last_still_stands(pool: Path) -> None:
     readings = readings_of(pool, ["low", "side"], 18)
     lines = readings.read_text().splitlines()
-    readings.write_text("\n".join([line for line in lines if ",r3c" not in line or not line.startswith("low")]) + "\n")
+    readings.write_text(
+        "\n".join([line for line in lines if ",r3c" not in line or not line.startswith("low")])
+        + "\n"
+    )
     (experiment,) = load(pool, planning=True)
     assert experiment.pool is not None
     offered = offer(experiment.pool, done_candidates(readings, experiment))
@@ -110,23 +124,33 @@ def test_only_the_position_that_was_read_last_still_stands(pool: Path) -> None:
 
 
 def test_the_rest_is_read_before_anything_is_moved(pool: Path) -> None:
-    """From the standing position the change-over to another plane is paid; from a free start it would not be."""
+    """From the standing position the change-over to another plane is paid; from a free start it
+    would not be.
+    """
     path = readings_of(pool, ["side", "low"], 4)
     found = gone_on(pool, path, Budget(seconds=3600.0 * 2))
-    sheet = run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
+    sheet = run_sheet(
+        found.chosen, found.pool.changes, found.done, found.completed, found.interrupted
+    )
     todo = [step for step in sheet.steps if not step.done]
     assert todo[0].name == "low" and len(todo) > 2
     assert sheet.seconds == pytest.approx(found.spent.seconds)
     planes = [step.plane for step in todo]
     moves = sum(one != other for one, other in zip(planes, planes[1:], strict=False))
-    probes = sum(one.probes[-1] != other.probes[0] for one, other in zip(todo, todo[1:], strict=False))
+    probes = sum(
+        one.probes[-1] != other.probes[0] for one, other in zip(todo, todo[1:], strict=False)
+    )
     assert sum(step.change_seconds for step in todo) == moves * 1200.0 + probes * 180.0
 
 
 @pytest.mark.parametrize("standing", [True, False])
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
-def test_no_selection_is_better_and_more_readings_do_no_harm(pool: Path, count: int, standing: bool) -> None:
-    """Against full computations of all selections, with positions, parts and rests composed by hand."""
+def test_no_selection_is_better_and_more_readings_do_no_harm(
+    pool: Path, count: int, standing: bool
+) -> None:
+    """Against full computations of all selections, with positions, parts and rests composed by
+    hand.
+    """
     readings = readings_of(pool, ["side", "low"], count)
     budget = Budget(seconds=45 * 60.0)
     found = gone_on(pool, readings, budget, standing)
@@ -143,7 +167,8 @@ def test_no_selection_is_better_and_more_readings_do_no_harm(pool: Path, count: 
         for first, more in ways:
             todo = [*([] if more is None else [more]), *chosen]
             seconds = sum(one.seconds for one in todo)
-            # The plane changes as seldom as there are planes, and left, which has another probe, may come last.
+            # The plane changes as seldom as there are planes, and left, which has another probe,
+            # may come last.
             seconds += 1200.0 * max(len({one.plane for one in todo}) - 1, 0)
             seconds += 180.0 if len({one.name == "left" for one in todo}) == 2 else 0.0
             if seconds > 45 * 60.0:
@@ -168,7 +193,9 @@ def test_the_rest_adds_what_both_parts_are_worth_in_one_pose(pool: Path) -> None
     found = pool_information(experiment, candidates, completed={1: 0})
     plain = pool_information(experiment, candidates)
     np.testing.assert_allclose(found.matrices[0] + found.matrices[1], plain.matrices[1], atol=1e-13)
-    assert np.linalg.eigvalsh(plain.matrices[1] - plain.matrices[0] - plain.matrices[2]).max() > 1e-3
+    assert (
+        np.linalg.eigvalsh(plain.matrices[1] - plain.matrices[0] - plain.matrices[2]).max() > 1e-3
+    )
     assert found.pose_ranks == (6, 6, 6)
 
 
@@ -176,7 +203,9 @@ def command(*arguments: object) -> int:
     return main([str(one) for one in arguments])
 
 
-def test_the_file_written_takes_the_complete_readings(pool: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_file_written_takes_the_complete_readings(
+    pool: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     readings = readings_of(pool, ["side", "low"], 5)
     rest, sheet, data = (pool.with_name(name) for name in ("rest.yaml", "rest.md", "rest.csv"))
     options = ["--done", readings, "--hours", "1.2", "--workers", "1", "-o", rest, "--sheet", sheet]
@@ -199,7 +228,9 @@ def test_the_file_written_takes_the_complete_readings(pool: Path, capsys: pytest
     assert found["completed"] == "low" and found["interrupted"] == [{"name": "low", "readings": 5}]
 
 
-def test_a_position_set_up_again_may_be_interrupted_again(pool: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_position_set_up_again_may_be_interrupted_again(
+    pool: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     readings = readings_of(pool, ["side", "low"], 2)
     text = TEXT.replace("  candidates:", "  limits: {keep: [low]}\n  candidates:")
     pool.write_text(text)
@@ -207,23 +238,31 @@ def test_a_position_set_up_again_may_be_interrupted_again(pool: Path, capsys: py
     plan_on = ["plan", pool, "--hours", "1", "--workers", "1", "--moved", "--json"]
     assert command(*plan_on, "--done", readings, "-o", rest) == 0
     found = json.loads(capsys.readouterr().out)
-    # Two balls tell nothing of a turn about their line, and what has to be chosen is not done with them.
+    # Two balls tell nothing of a turn about their line, and what has to be chosen is not done with
+    # them.
     assert found["left_open"] == 1 and {"low", "low again"} <= set(found["chosen"])
     assert found["chosen"][-1] == "low"
     assert load(rest)[0].expected_rank_deficiency == 1 and command("check", rest) == 0
     assert command("simulate", rest, "-o", data) == 0
     with data.open(newline="") as stream:
         rows = list(csv.reader(stream))
-    taken = [row for row in rows if row[0] in ("side", "low")] + [row for row in rows if row[0] == "low again"][:7]
+    taken = [row for row in rows if row[0] in ("side", "low")] + [
+        row for row in rows if row[0] == "low again"
+    ][:7]
     with readings.open("w", newline="") as stream:
         csv.writer(stream, lineterminator="\n").writerows([rows[0], *taken])
     capsys.readouterr()
     assert command(*plan_on, "--done", readings, "--from", rest) == 0
     found = json.loads(capsys.readouterr().out)
-    assert {one["name"]: one["readings"] for one in found["interrupted"]} == {"low": 2, "low again": 7}
+    assert {one["name"]: one["readings"] for one in found["interrupted"]} == {
+        "low": 2,
+        "low again": 7,
+    }
     assert "low again 2" in found["chosen"]
     assert command(*plan_on[:-2], "--done", readings, "--from", rest) == 0
-    assert "low again was interrupted after 7 readings; 2 more complete it" in capsys.readouterr().out
+    assert (
+        "low again was interrupted after 7 readings; 2 more complete it" in capsys.readouterr().out
+    )
 
 
 def test_a_position_that_has_to_be_chosen_is_refused_where_there_is_no_room_for_it(
@@ -243,7 +282,12 @@ def test_readings_with_uncertainties_of_their_own_are_written_with_them(
     uncertain = [f"{line},{0.7 + 0.1 * (k % 3):.1f}" for k, line in enumerate(lines)]
     readings.write_text("\n".join([f"{head},u_um", *uncertain]) + "\n")
     rest = pool.with_name("rest.yaml")
-    assert command("plan", pool, "--done", readings, "--hours", "1", "--workers", "1", "--json", "-o", rest) == 0
+    assert (
+        command(
+            "plan", pool, "--done", readings, "--hours", "1", "--workers", "1", "--json", "-o", rest
+        )
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)
     assert command("run", rest, "--json") == 0
     worth = json.loads(capsys.readouterr().out)["quantities"]["U6"]["average"]
@@ -258,7 +302,9 @@ def test_readings_with_uncertainties_of_their_own_are_written_with_them(
 
 
 def test_three_balls_in_a_line_may_stand_in_any_turn_about_it(pool: Path) -> None:
-    """Nothing is told of a turn that the readings leave open; exact ones were taken for a plate turned over."""
+    """Nothing is told of a turn that the readings leave open; exact ones were taken for a plate
+    turned over.
+    """
     turned = """
     - planes: [x, y, z]
       levels: [200 mm, 111 mm]
@@ -269,7 +315,9 @@ def test_three_balls_in_a_line_may_stand_in_any_turn_about_it(pool: Path) -> Non
     pool.write_text(TEXT.rstrip("\n") + turned)
     (experiment,) = load(pool, planning=True)
     assert experiment.pool is not None
-    names = [one.name for one in experiment.pool.candidates if one.name.startswith(("x ", "y ", "z "))]
+    names = [
+        one.name for one in experiment.pool.candidates if one.name.startswith(("x ", "y ", "z "))
+    ]
     assert len(names) == 24
     for name in names:
         for count in (1, 2, 3):
@@ -277,12 +325,17 @@ def test_three_balls_in_a_line_may_stand_in_any_turn_about_it(pool: Path) -> Non
             assert taken.read.readings == count
 
 
-def test_without_any_further_position_balls_may_be_unread(pool: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_any_further_position_balls_may_be_unread(
+    pool: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     readings = readings_of(pool, ["low"], 4)
     assert command("plan", pool, "--done", readings, "--hours", "2", "--workers", "1") == 0
     capsys.readouterr()
     assert command("plan", pool, "--done", readings, "--hours", "0.01", "--workers", "1") == 3
-    assert '"plate" was begun, and no position of its other balls can be read' in capsys.readouterr().err
+    assert (
+        '"plate" was begun, and no position of its other balls can be read'
+        in capsys.readouterr().err
+    )
 
 
 def test_a_first_position_is_not_paid_for_twice_in_the_default_budget(pool: Path) -> None:
@@ -298,8 +351,8 @@ positions:
     assert experiment.pool is not None
     offered = offer(experiment.pool, done_candidates(readings, experiment))
     found = campaign(experiment, Request("U6"), offered)
-    # Five readings are left of the first; then two changes of plane, two set-ups of ten minutes, 27 readings and one
-    # change of probe.
+    # Five readings are left of the first; then two changes of plane, two set-ups of ten minutes, 27
+    # readings and one change of probe.
     assert found.drawn_spent is not None
     assert found.drawn_spent.seconds == 5 * 60.0 + 2 * 1200.0 + 2 * 600.0 + 27 * 60.0 + 180.0
     assert (found.drawn_spent.readings, found.drawn_spent.positions) == (32, 2)
@@ -318,7 +371,9 @@ SECOND = """
 def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
     pool: Path, minutes: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """No experiment may hold a plate with unread balls; its readings are left out if they are not worth the rest."""
+    """No experiment may hold a plate with unread balls; its readings are left out if they are not
+    worth the rest.
+    """
     small = "size: [300 mm, 200 mm]}, small: {kind: square, balls: 2, size: 100 mm}}"
     text = TEXT.replace("size: [300 mm, 200 mm]}}", small).replace(
         "probes: [down]}", "probes: [down], artefact: plate}"
@@ -336,7 +391,9 @@ def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
     budget = Budget(seconds=60.0 * minutes)
     taken = done_candidates(readings, experiment)
     found = {
-        standing: campaign(experiment, Request("U6", budget), offer(experiment.pool, taken, standing))
+        standing: campaign(
+            experiment, Request("U6", budget), offer(experiment.pool, taken, standing)
+        )
         for standing in (True, False)
     }
     less = campaign(experiment, Request("U6", budget), offer(experiment.pool, taken[:2]))
@@ -344,14 +401,20 @@ def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
         assert one.value <= less.value * (1 + 1e-9)
         full = predict(with_chosen(experiment, one.chosen))
         assert one.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
-        assert [left.name for left in one.ignored] == ([] if "small low" in names_of(one) else ["small low"])
+        assert [left.name for left in one.ignored] == (
+            [] if "small low" in names_of(one) else ["small low"]
+        )
     assert found[True].value <= found[False].value * (1 + 1e-9)
-    # Two readings of a minute complete it where it stands, which is all that a few minutes are good for; ten minutes
-    # more are needed if it does not.
+    # Two readings of a minute complete it where it stands, which is all that a few minutes are good
+    # for; ten minutes more are needed if it does not.
     assert not found[True].ignored or minutes > 14
     assert bool(found[False].ignored) or minutes > 14
     capsys.readouterr()
-    status = command("plan", pool, "--done", readings, "--hours", minutes / 60, "--moved", "--workers", "1")
+    status = command(
+        "plan", pool, "--done", readings, "--hours", minutes / 60, "--moved", "--workers", "1"
+    )
     assert status == 0
     told = capsys.readouterr().out
-    assert ("small low is left out: nothing else worth its time" in told) == bool(found[False].ignored)
+    assert ("small low is left out: nothing else worth its time" in told) == bool(
+        found[False].ignored
+    )

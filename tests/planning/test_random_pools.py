@@ -1,4 +1,6 @@
-"""Choices from pools at random: never better than their bound, worth what the written file is worth, best of all."""
+"""Choices from pools at random: never better than their bound, worth what the written file is
+worth, best of all.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ FEW = 6
 
 
 def by_run(experiment: Experiment, name: CriterionName) -> float:
-    """The criterion by what `run` computes, infinite where something that it is about is undetermined."""
+    """The criterion by what `run` computes, infinite where something that it is about is
+    undetermined.
+    """
     kind, _, largest = name.partition("-")
     if kind in ("U6", "U5", "tasks"):
         found = predict(experiment).quantities[kind]
@@ -53,14 +57,18 @@ def by_run(experiment: Experiment, name: CriterionName) -> float:
 
 
 def sheet_of(found: Campaign) -> RunSheet:
-    return run_sheet(found.chosen, found.pool.changes, found.done, found.completed, found.interrupted)
+    return run_sheet(
+        found.chosen, found.pool.changes, found.done, found.completed, found.interrupted
+    )
 
 
 def written(found: Campaign, folder: Path) -> Experiment:
     """The choice as `plan -o` writes it, read again."""
     path = folder / "chosen.yaml"
     path.write_text(
-        experiment_text(found.experiment, sheet_of(found).chosen, "", folder, None, found.left_open or None)
+        experiment_text(
+            found.experiment, sheet_of(found).chosen, "", folder, None, found.left_open or None
+        )
     )
     return load(path)[0]
 
@@ -78,7 +86,9 @@ def best_of_all(pool: RandomPool) -> float:
     experiment = pool.experiment
     assert experiment.pool is not None
     candidates, limits = experiment.pool.candidates, experiment.pool
-    every = chain.from_iterable(combinations(range(len(candidates)), k) for k in range(1, len(candidates) + 1))
+    every = chain.from_iterable(
+        combinations(range(len(candidates)), k) for k in range(1, len(candidates) + 1)
+    )
     plates = {name for name, one in experiment.artefacts.items() if one.role == "plate"}
     offered = {one.item.artefact for one in candidates if isinstance(one.item, Position)}
     best = np.inf
@@ -100,7 +110,9 @@ def best_of_all(pool: RandomPool) -> float:
 
 
 def check_choice(pool: RandomPool, folder: Path) -> bool:
-    """Whether there is a choice that determines everything; it has to be what it is said to be in any case."""
+    """Whether there is a choice that determines everything; it has to be what it is said to be in
+    any case.
+    """
     try:
         taken = pool.taken
         found = pool.planned(taken)
@@ -116,23 +128,29 @@ def check_choice(pool: RandomPool, folder: Path) -> bool:
     if not taken and len(found.pool.candidates) <= FEW and not found.excluded:
         assert best_of_all(pool) == pytest.approx(found.value, rel=1e-9)
     if pool.readings is not None and not found.ignored:
-        # What has been read is part of what the file plans, and with the rest of it nothing is missing.
+        # What has been read is part of what the file plans, and with the rest of it nothing is
+        # missing.
         design = lay_out(experiment)
         with pool.readings.open(newline="", encoding="utf-8") as stream:
-            read = Counter((row["position"], row["ball"], row["probe"]) for row in csv.DictReader(stream))
+            read = Counter(
+                (row["position"], row["ball"], row["probe"]) for row in csv.DictReader(stream)
+            )
         planned = Counter[tuple[str, str, str]]()
         for position in experiment.positions:
             for group in position.readings:
                 for ball, probe in product(group.balls, group.probes):
                     planned[position.name, ball, probe] += group.repeats
         assert read <= planned
-        complete = read_readings(write_some(experiment, experiment.positions, folder / "all.csv", 1.0), design)
+        complete = read_readings(
+            write_some(experiment, experiment.positions, folder / "all.csv", 1.0), design
+        )
         assert complete.missing == complete.unplanned == ()
     return found.is_determined
 
 
 def check_more_data(pool: RandomPool) -> bool:
-    """Whether there is an interrupted position, with whose readings the plan has to be no worse than without.
+    """Whether there is an interrupted position, with whose readings the plan has to be no worse
+    than without.
 
     A better direction makes the condition worse, and larger pools are searched, not tried out.
     """

@@ -1,4 +1,6 @@
-"""Repairs of deficient and weak designs: whatever is told is written out as a file and computed again."""
+"""Repairs of deficient and weak designs: whatever is told is written out as a file and computed
+again.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,14 @@ from ballplate.planning.repair.search import Repair, Repairs, repairs
 from ballplate.results.study import check
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Experiment, Pool, Position
+from ballplate.simulator.experiment.model import (
+    AtMost,
+    Candidate,
+    ChangeTimes,
+    Experiment,
+    Pool,
+    Position,
+)
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -50,7 +59,9 @@ def design(file: str, variant: str) -> Experiment:
 
 @cache
 def repaired(file: str, variant: str) -> Repairs:
-    found = repairs(design(file, variant), most=2 if variant in ("D", "n=4 NDEL=7", "grid n=7 NDEL=10") else 3)
+    found = repairs(
+        design(file, variant), most=2 if variant in ("D", "n=4 NDEL=7", "grid n=7 NDEL=10") else 3
+    )
     assert found is not None
     return found
 
@@ -79,7 +90,11 @@ def put(said: dict[str, Any], path: str, value: Any, is_new: bool = False) -> No
 
 
 def place(entries: list[Any], step: str) -> int:
-    return int(step) if step.isdigit() else next(k for k, one in enumerate(entries) if one["name"] == step)
+    return (
+        int(step)
+        if step.isdigit()
+        else next(k for k, one in enumerate(entries) if one["name"] == step)
+    )
 
 
 def written_out(said: dict[str, Any], repair: Repair, folder: Path) -> Experiment:
@@ -98,17 +113,26 @@ def test_repaired_files_have_full_rank(file: str, variant: str, tmp_path: Path) 
     before = check(design(file, variant)).verdict
     assert found.complete
     for repair in found.complete:
-        after = check(written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)).verdict
+        after = check(
+            written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)
+        ).verdict
         assert after.deficiency == repair.deficiency == 0
         assert len(after.weak) == repair.weak
         np.testing.assert_allclose(after.singular_values[-1], repair.smallest, rtol=1e-5)
         assert repair.removes == tuple(range(before.deficiency))
     for repair in found.partial:
-        after = check(written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)).verdict
+        after = check(
+            written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)
+        ).verdict
         assert after.deficiency == repair.deficiency == before.deficiency - len(repair.removes)
         # What is left open has no part in what is said to be removed.
         gone = {part.name for k in repair.removes for part in before.null[k].functions}
-        stays = {part.name for k, one in enumerate(before.null) if k not in repair.removes for part in one.functions}
+        stays = {
+            part.name
+            for k, one in enumerate(before.null)
+            if k not in repair.removes
+            for part in one.functions
+        }
         assert not (gone - stays) & {part.name for one in after.null for part in one.functions}
 
 
@@ -128,7 +152,9 @@ def test_a_dense_computation_agrees(file: str, variant: str) -> None:
     for changes in [(), *(one.changes for one in repaired(file, variant).complete)]:
         changed = lay_out(apply_all(changes, experiment))
         problem = dense.planned(changed, 5, 5)
-        whole = dense.jacobian(lambda step, of=problem: dense.residuals(of, step), problem.parameters)  # type: ignore[misc]
+        whole = dense.jacobian(
+            lambda step, of=problem: dense.residuals(of, step), problem.parameters
+        )  # type: ignore[misc]
         assert dense.spread(whole).deficiency == (0 if changes else 2)
 
 
@@ -138,7 +164,10 @@ def test_words_name_errors_and_positions() -> None:
     first, written = lines[:2]
     assert 'repair 1: turn position "z low" by ' in first
     assert "full rank, and nothing is weakly determined; removes undetermined 1 and 2 (" in first
-    assert all(name in first for name in ("EXX", "EYY", "EZZ", "average U6 0.2", "smallest singular value 0.0"))
+    assert all(
+        name in first
+        for name in ("EXX", "EYY", "EZZ", "average U6 0.2", "smallest singular value 0.0")
+    )
     assert written.startswith(
         "repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: "
     )
@@ -150,13 +179,20 @@ def test_words_name_errors_and_positions() -> None:
 def test_screening_tells_the_rank(file: str, variant: str) -> None:
     """Rows of added observations on the null directions against the full computation."""
     base = examine(design(file, variant))
-    additions = [one for changes in offers(base.experiment).values() for one in changes if one.adds is not None]
+    additions = [
+        one
+        for changes in offers(base.experiment).values()
+        for one in changes
+        if one.adds is not None
+    ]
     seen = seen_by(base, additions)
     assert len(seen) == len(additions)
     generator = np.random.default_rng(3)
     for k in generator.choice(len(additions), 12, replace=False):
         after = judge(base.experiment, (additions[k],))
-        assert after is not None and after.deficiency == base.judged.deficiency - rank_of([seen[additions[k]]])
+        assert after is not None and after.deficiency == base.judged.deficiency - rank_of(
+            [seen[additions[k]]]
+        )
     for _ in range(6):
         chosen = [additions[k] for k in generator.choice(len(additions), 2, replace=False)]
         after = judge(base.experiment, chosen)
@@ -170,7 +206,11 @@ def small(**changed: Any) -> dict[str, Any]:
     said: dict[str, Any] = {
         "title": "trap",
         "machine": {"volume": ["600 mm"] * 3, "repeatability": "0.2 um"},
-        "error_model": {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2},
+        "error_model": {
+            "kind": "kinematic",
+            "position_coefficients": 3,
+            "rotation_coefficients": 2,
+        },
         "probes": {
             "down": ["0 mm", "0 mm", "-50 mm"],
             "right": ["50 mm", "0 mm", "0 mm"],
@@ -187,9 +227,14 @@ def small(**changed: Any) -> dict[str, Any]:
                 "probes": [probe],
             }
             for plane, (probe, axes) in across.items()
-            for where, level, corner, turns in (("low", "100 mm", "60 mm", 0), ("high", "500 mm", "150 mm", 1))
+            for where, level, corner, turns in (
+                ("low", "100 mm", "60 mm", 0),
+                ("high", "500 mm", "150 mm", 1),
+            )
         ],
-        "calibration": [{"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}],
+        "calibration": [
+            {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}
+        ],
         "evaluation": {"points": {"random": 60, "seed": 1}, "probe": "down"},
     }
     for path, value in changed.items():
@@ -244,7 +289,8 @@ def of_a_file() -> dict[str, Any]:
 
 
 TRAPS = {
-    one.__name__: one for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical, of_a_file)
+    one.__name__: one
+    for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical, of_a_file)
 }
 
 
@@ -301,11 +347,15 @@ def test_what_cannot_be_repaired_says_what_was_tried() -> None:
 
 
 def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost, ...] = ()) -> Pool:
-    """Positions of the experiment, drawn, then three to add: one that tells nothing, and two that tell all."""
+    """Positions of the experiment, drawn, then three to add: one that tells nothing, and two that
+    tell all.
+    """
     drawn = [Candidate(one.name, one, 600.0, "", "", True, {}) for one in experiment.positions]
     low = experiment.positions[0]
     shifted = replace(low.pose, origin=low.pose.origin + np.array([0.0, 0.0, 0.4]))
-    turned = replace(low.pose, rotation=low.pose.rotation @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
+    turned = replace(
+        low.pose, rotation=low.pose.rotation @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    )
     turned = replace(turned, origin=low.pose.origin + np.array([0.75, 0.0, 0.2]))
     aside = replace(low.pose, origin=low.pose.origin + np.array([0.125, 0.0, 0.3]))
     named = [("in between", shifted), ("turned", turned), ("aside", aside)]
@@ -319,12 +369,16 @@ def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost,
 def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
     found = repairs(replace(experiment, pool=pool), most=1)
     assert found is not None
-    return [change.words for one in found.complete for change in one.changes if change.kind == Kind.POOL]
+    return [
+        change.words for one in found.complete for change in one.changes if change.kind == Kind.POOL
+    ]
 
 
 def test_the_cheapest_of_a_pool() -> None:
     experiment = design("npl/6.1.1", "B")
-    assert from_pool(experiment, pool_of(experiment, [60.0, 5400.0, 1800.0])) == ['add "aside" of the pool (30 min)']
+    assert from_pool(experiment, pool_of(experiment, [60.0, 5400.0, 1800.0])) == [
+        'add "aside" of the pool (30 min)'
+    ]
     # Of the two only as many as the limits leave.
     no_more = (AtMost((4, 6), 0),)
     pool = pool_of(experiment, [60.0, 5400.0, 1800.0], no_more)
@@ -335,7 +389,10 @@ def test_what_costs_nothing_is_told_before_what_the_pool_has_a_price_for() -> No
     experiment = design("npl/6.1.1", "B")
     found = repairs(replace(experiment, pool=pool_of(experiment, [60.0, 5400.0, 1800.0])), most=2)
     assert found is not None and not any(one.weak or one.is_faint for one in found.complete)
-    assert [[change.kind for change in one.changes] for one in found.complete] == [[Kind.MOVE], [Kind.POOL]]
+    assert [[change.kind for change in one.changes] for one in found.complete] == [
+        [Kind.MOVE],
+        [Kind.POOL],
+    ]
 
 
 def test_a_pool_of_a_file(tmp_path: Path) -> None:
@@ -386,7 +443,9 @@ def test_a_set_of_a_pool_is_minimal() -> None:
     assert set(costs.values()) == {cheapest}
 
 
-@settings(max_examples=3, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(
+    max_examples=3, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 @given(
     chosen=st.sets(st.integers(0, 5), min_size=1, max_size=3),
     coefficients=st.integers(2, 3),
@@ -394,7 +453,11 @@ def test_a_set_of_a_pool_is_minimal() -> None:
     with_length=st.booleans(),
 )
 def test_whatever_is_told_holds(
-    tmp_path_factory: pytest.TempPathFactory, chosen: set[int], coefficients: int, turns: int, with_length: bool
+    tmp_path_factory: pytest.TempPathFactory,
+    chosen: set[int],
+    coefficients: int,
+    turns: int,
+    with_length: bool,
 ) -> None:
     folder = tmp_path_factory.mktemp("any")
 

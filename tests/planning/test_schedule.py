@@ -25,14 +25,21 @@ kinds = st.builds(
     st.sampled_from("xyz"),
     st.frozensets(st.sampled_from(["down", "left", "right"]), min_size=1),
 )
-change_times = st.builds(ChangeTimes, st.sampled_from([0.0, 120.0, 4000.0]), st.sampled_from([0.0, 100.0, 1800.0]))
+change_times = st.builds(
+    ChangeTimes, st.sampled_from([0.0, 120.0, 4000.0]), st.sampled_from([0.0, 100.0, 1800.0])
+)
 
 
 def position(kind: Kind, name: str, seconds: float = 600.0) -> Candidate:
     balls = np.arange(1)
     group = ReadingGroup(tuple(sorted(kind.probes)), ("1",), balls, 1)
     item = Position(name, kind.artefact, Pose(np.eye(3), np.zeros(3)), (group,))
-    said = {"name": name, "plane": kind.plane, "level": "0 mm", "corner": {"x": "0 mm", "y": "0 mm"}}
+    said = {
+        "name": name,
+        "plane": kind.plane,
+        "level": "0 mm",
+        "corner": {"x": "0 mm", "y": "0 mm"},
+    }
     return Candidate(name, item, seconds, kind.plane, "", False, said)
 
 
@@ -56,7 +63,8 @@ def every_order(members: Sequence[Kind]) -> Iterator[list[tuple[Kind, tuple[str,
 
 def least_of_all(members: Sequence[Kind], changes: ChangeTimes) -> float:
     return min(
-        cost([(position(kind, "p"), probes) for kind, probes in order], changes) for order in every_order(members)
+        cost([(position(kind, "p"), probes) for kind, probes in order], changes)
+        for order in every_order(members)
     )
 
 
@@ -69,7 +77,9 @@ def test_least_change_over_of_all_orders(members: list[Kind], changes: ChangeTim
     assert cost(sequence, changes) == least
     assert sorted(one.name for one, _ in sequence) == [str(k) for k in range(len(members))]
     for one, probes in sequence:
-        assert sorted(probes) == sorted({name for group in one.item.readings for name in group.probes})
+        assert sorted(probes) == sorted(
+            {name for group in one.item.readings for name in group.probes}
+        )
 
 
 @settings(max_examples=25, deadline=None)
@@ -95,7 +105,9 @@ def test_of_the_cheapest_orders_that_which_goes_on_from_what_is_done(
 
 @settings(max_examples=25, deadline=None)
 @given(kinds, st.lists(kinds, min_size=1, max_size=3), change_times)
-def test_going_on_from_what_still_stands_is_paid(standing: Kind, members: list[Kind], changes: ChangeTimes) -> None:
+def test_going_on_from_what_still_stands_is_paid(
+    standing: Kind, members: list[Kind], changes: ChangeTimes
+) -> None:
     rest = position(standing, "rest")
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
     sequence = ordered(own, changes, [], rest)
@@ -109,13 +121,24 @@ def test_going_on_from_what_still_stands_is_paid(standing: Kind, members: list[K
 
 
 def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
-    some = [Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])]
-    assert len({changeover(order, CHANGES) for order in (some, some[::-1], frozenset(some), tuple(some))}) == 1
+    some = [
+        Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])
+    ]
+    assert (
+        len(
+            {
+                changeover(order, CHANGES)
+                for order in (some, some[::-1], frozenset(some), tuple(some))
+            }
+        )
+        == 1
+    )
     assert changeover([], CHANGES) == 0.0
 
 
 def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
-    # Six places with three kinds each that share probes: one change of place fewer than places is least.
+    # Six places with three kinds each that share probes: one change of place fewer than places is
+    # least.
     many = [
         Kind(artefact, plane, frozenset(probes))
         for artefact in ("a", "b")
@@ -127,11 +150,15 @@ def test_of_many_kinds_the_heuristic_finds_what_is_known_to_be_least() -> None:
     assert changeover(many, CHANGES) == 5 * CHANGES.plane
     assert process_time() - began < 10.0
     order = cheapest([(kind, 1) for kind in many], CHANGES)
-    assert order.seconds == 5 * CHANGES.plane and {visit.kind for visit in order.visits} == set(many)
+    assert order.seconds == 5 * CHANGES.plane and {visit.kind for visit in order.visits} == set(
+        many
+    )
 
 
 def test_six_kinds_take_a_moment() -> None:
-    six = [Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])]
+    six = [
+        Kind("plate", plane, frozenset(probes)) for plane in "xyz" for probes in (["a"], ["a", "b"])
+    ]
     changeover(six, CHANGES)
     began = process_time()
     for _ in range(1000):
@@ -146,7 +173,8 @@ def test_times_of_a_run_sheet_by_hand() -> None:
     # 20 min and 49 readings of 15 s, of two probes twice as many and a change of 2 min.
     assert [one.seconds for one in drawn] == [1200 + 735] * 2 + [1200 + 1470 + 120] * 4
     sheet = run_sheet(drawn, experiment.pool.changes)
-    # Two changes of plane, each with another probe; within a plane the second position begins where the first ended.
+    # Two changes of plane, each with another probe; within a plane the second position begins where
+    # the first ended.
     assert sheet.seconds == 2 * 1935 + 4 * 2790 + 2 * (1800 + 120)
     assert sheet.hours == sheet.seconds / 3600
     assert sum(step.readings for step in sheet.steps) == 2 * 49 + 4 * 98

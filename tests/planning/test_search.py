@@ -26,7 +26,16 @@ from hypothesis import strategies as st
 
 from .small_pool import TEXT
 
-CRITERIA: tuple[CriterionName, ...] = ("U6", "U6-maximum", "U5", "tasks", "A", "D", "E", "condition")
+CRITERIA: tuple[CriterionName, ...] = (
+    "U6",
+    "U6-maximum",
+    "U5",
+    "tasks",
+    "A",
+    "D",
+    "E",
+    "condition",
+)
 SIZE = 13
 
 
@@ -71,7 +80,11 @@ def limits(draw: Callable[[st.SearchStrategy], object]) -> Constraints:  # type:
             st.one_of(st.none(), st.integers(2, 9)),
         )
     )
-    at_most = draw(st.lists(st.builds(lambda m, k: AtMost(tuple(m), k), members, st.integers(1, 3)), max_size=2))
+    at_most = draw(
+        st.lists(
+            st.builds(lambda m, k: AtMost(tuple(m), k), members, st.integers(1, 3)), max_size=2
+        )
+    )
     must = draw(st.frozensets(st.integers(0, SIZE - 1), max_size=2))
     return replace(base, budget=budget, at_most=tuple(at_most), must=must)  # type: ignore[arg-type]
 
@@ -110,7 +123,9 @@ def tried(examples: int) -> settings:
 @pytest.mark.parametrize("name", ["U6", "E"])
 @tried(3)
 @given(limited=limits())
-def test_the_best_or_near_it_and_never_below_the_bound(name: CriterionName, limited: Constraints) -> None:
+def test_the_best_or_near_it_and_never_below_the_bound(
+    name: CriterionName, limited: Constraints
+) -> None:
     near_the_best_and_above_the_bound(name, limited)
 
 
@@ -136,7 +151,9 @@ def test_the_bound_is_tight_where_everything_may_be_chosen(name: CriterionName) 
     problem = problem_of(name)
     found = bound(problem)
     assert found is not None
-    assert found.value == pytest.approx(values(name).min(), rel=0.03 if problem.criterion.is_sharp else 2e-3)
+    assert found.value == pytest.approx(
+        values(name).min(), rel=0.03 if problem.criterion.is_sharp else 2e-3
+    )
     assert found.value <= values(name).min()
 
 
@@ -194,14 +211,18 @@ def test_gains_are_what_a_selection_is_without_and_with() -> None:
     for gain in found.gains:
         assert gain.without >= gain.with_ == found.value
     after = [gain.with_ for gain in found.left_out]
-    assert after == sorted(after) and all(gain.without == found.value >= gain.with_ for gain in found.left_out)
+    assert after == sorted(after) and all(
+        gain.without == found.value >= gain.with_ for gain in found.left_out
+    )
 
 
 def test_limits_that_nothing_keeps_to_are_told() -> None:
     pool = small().pool
     assert pool is not None
     kept = replace(small(), pool=replace(pool, must=(0, 1, 2)))
-    with pytest.raises(ExperimentError, match="what has to be chosen takes .* more than 1 position; allow more"):
+    with pytest.raises(
+        ExperimentError, match="what has to be chosen takes .* more than 1 position; allow more"
+    ):
         campaign(kept, Request("U6", Budget(positions=1)))
     both = replace(small(), pool=replace(pool, must=(0, 1), at_most=(AtMost((0, 1), 1),)))
     with pytest.raises(ExperimentError, match="no more than 1 of them"):

@@ -28,7 +28,8 @@ STANDARDS = (
   - {kind: distances, artefact: tile, pairs: all, standard_uncertainty: 0.4 um + L/1000000}""",
     )
     .replace(
-        "    - {name: bar, artefact: bar, pose: {origin: [100 mm, 250 mm, 200 mm]}, probes: [down], repeats: 2}",
+        "    - {name: bar, artefact: bar, pose: {origin: [100 mm, 250 mm, 200 mm]}, probes: [down],"
+        " repeats: 2}",
         """    - {name: bar, artefact: bar, pose: {origin: [100 mm, 250 mm, 200 mm]}, probes: [down], repeats: 2}
     - {name: bar y, artefact: bar, pose: {origin: [100 mm, 100 mm, 200 mm], rotation: [0 deg, 0 deg, 80 deg]},
        probes: [down, right]}
@@ -52,14 +53,18 @@ def test_equal_to_the_full_computation(name: str, tmp_path: Path) -> None:
             continue
         kind, _, largest = name.partition("-")
         expected = getattr(full.quantities[kind], "maximum" if largest else "average")
-        assert value(problem, chosen) == pytest.approx(expected, rel=1e-9), [names[k] for k in chosen]
+        assert value(problem, chosen) == pytest.approx(expected, rel=1e-9), [
+            names[k] for k in chosen
+        ]
         places = [one.item.artefact for one in items if isinstance(one.item, Position)]
         with_standards += places.count("bar") + places.count("tile") > 1
     assert with_standards > 4
 
 
 def test_positions_that_read_different_balls_are_not_overrated(tmp_path: Path) -> None:
-    """What certificates tell of one another from position to position is left out: a plan is on the safe side."""
+    """What certificates tell of one another from position to position is left out: a plan is on the
+    safe side.
+    """
     text = STANDARDS.replace("probes: [down], repeats: 2}", "probes: [down], balls: [a, b, d]}")
     (experiment,) = load(written(tmp_path, text), planning=True)
     assert experiment.pool is not None

@@ -34,9 +34,17 @@ def experiment() -> Experiment:
 @pytest.fixture(scope="module")
 def sheet(experiment: Experiment) -> RunSheet:
     assert experiment.pool is not None
-    wanted = ("upright", "flat low", "bar along y", "flat z 300 mm at 300, 400 mm turn 1", "better sides")
+    wanted = (
+        "upright",
+        "flat low",
+        "bar along y",
+        "flat z 300 mm at 300, 400 mm turn 1",
+        "better sides",
+    )
     by_name = {one.name: one for one in experiment.pool.candidates}
-    return run_sheet([by_name[name] for name in wanted], experiment.pool.changes, done=[by_name["flat low"]])
+    return run_sheet(
+        [by_name[name] for name in wanted], experiment.pool.changes, done=[by_name["flat low"]]
+    )
 
 
 def test_lines(sheet: RunSheet) -> None:
@@ -82,7 +90,9 @@ class Tags(HTMLParser):
         self.seen.append((tag, dict(attrs)))
 
 
-def test_page_stands_alone_and_has_a_box_for_each_position(sheet: RunSheet, experiment: Experiment) -> None:
+def test_page_stands_alone_and_has_a_box_for_each_position(
+    sheet: RunSheet, experiment: Experiment
+) -> None:
     page = sheet_page(sheet, experiment, "<b>day</b>")
     assert "<b>day" not in page and "&lt;b&gt;day" in page
     tags = Tags()
@@ -96,18 +106,26 @@ def test_page_stands_alone_and_has_a_box_for_each_position(sheet: RunSheet, expe
     assert "@media print" in page
 
 
-@pytest.mark.parametrize("name", ["flat low", "upright", "standing x 500 mm at 50, 100 mm turn 2", "bar along x"])
+@pytest.mark.parametrize(
+    "name", ["flat low", "upright", "standing x 500 mm at 50, 100 mm turn 2", "bar along x"]
+)
 def test_drawing_is_to_scale_and_right_handed(name: str, experiment: Experiment) -> None:
     assert experiment.pool is not None
     candidate = next(one for one in experiment.pool.candidates if one.name == name)
     root = ElementTree.fromstring(place_drawing(candidate, experiment))
-    circles = np.array([[float(one.attrib[key]) for key in ("cx", "cy")] for one in root.iter("circle")])
+    circles = np.array(
+        [[float(one.attrib[key]) for key in ("cx", "cy")] for one in root.iter("circle")]
+    )
     balls = ball_coordinates(candidate.item.pose, experiment.layouts[candidate.item.artefact])
     across, up = {"flat low": (0, 1), "upright": (0, 2), "bar along x": (0, 2)}.get(name, (1, 2))
     # Seen from +y with z upwards, x runs to the left.
     sign = -1 if across == 0 and up == 2 else 1
     scale = (SIZE - 2 * MARGIN) / np.ptp(
-        [experiment.machine.volume.lower[[across, up]], experiment.machine.volume.upper[[across, up]]], axis=0
+        [
+            experiment.machine.volume.lower[[across, up]],
+            experiment.machine.volume.upper[[across, up]],
+        ],
+        axis=0,
     ).max()
     moved = (circles - circles[0]) / scale
     assert moved[:, 0] == pytest.approx(sign * (balls[:, across] - balls[0, across]), abs=1e-3)
@@ -115,7 +133,11 @@ def test_drawing_is_to_scale_and_right_handed(name: str, experiment: Experiment)
 
 
 def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:
-    text = Path("designs/planning/campaign.yaml").read_text("utf-8").replace("flat low", "'<script>alert(1)</script>'")
+    text = (
+        Path("designs/planning/campaign.yaml")
+        .read_text("utf-8")
+        .replace("flat low", "'<script>alert(1)</script>'")
+    )
     (tmp_path / "e.yaml").write_text(text, "utf-8")
     (found,) = load(tmp_path / "e.yaml", planning=True)
     assert found.pool is not None

@@ -1,4 +1,6 @@
-"""What is deficient and what is not where a budget allows little more than determines everything, by a dense rank."""
+"""What is deficient and what is not where a budget allows little more than determines everything,
+by a dense rank.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,8 @@ from ballplate.simulator.experiment.pool import with_chosen
 
 from tests.reference import dense
 
-# Of the pairs of its candidates that have both plates some determine everything, and most leave open a direction in
-# which what a plan computes with has small last components.
+# Of the pairs of its candidates that have both plates some determine everything, and most leave
+# open a direction in which what a plan computes with has small last components.
 TEXT = """
 title: two plates
 machine: {volume: [500 mm, 400 mm, 300 mm], repeatability: 1 um}
@@ -53,10 +55,13 @@ pool:
 """
 COEFFICIENTS = 2
 
-# The same with more candidates than are tried one by one, and the length in a certificate on offer, as good as exact.
+# The same with more candidates than are tried one by one, and the length in a certificate on offer,
+# as good as exact.
 MORE = TEXT.replace("[100 mm, 250 mm]", "[100 mm, 170 mm, 250 mm]")
 EXACT = (
-    MORE.replace("  - {kind: distances, artefact: wide, pairs: corners, standard_uncertainty: 0.5 um}\n", "")
+    MORE.replace(
+        "  - {kind: distances, artefact: wide, pairs: corners, standard_uncertainty: 0.5 um}\n", ""
+    )
     + """
   calibration:
     - {name: exact, artefact: wide, kind: distances, pairs: corners, standard_uncertainty: 1e-7 um, price: 1 h}
@@ -90,7 +95,9 @@ def artefacts(chosen: tuple[int, ...]) -> set[str]:
 
 @cache
 def averages() -> dict[tuple[int, ...], dict[str, float]]:
-    """Average U5 and U6 of the pairs of candidates that determine everything; of the others none."""
+    """Average U5 and U6 of the pairs of candidates that determine everything; of the others
+    none.
+    """
     found = {}
     for chosen in combinations(range(len(candidates())), 2):
         design = lay_out(with_chosen(two_plates(), [candidates()[k] for k in chosen]))
@@ -147,7 +154,9 @@ def test_a_null_vector_is_found_however_small_its_last_components(last: float) -
     assert full_root(np.eye(size) - along) is None
     root = full_root(np.eye(size) - (1 - 1e-6) * along)
     assert root is not None
-    np.testing.assert_allclose(root @ root.T, np.eye(size) + (1e6 - 1) * along, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(
+        root @ root.T, np.eye(size) + (1e6 - 1) * along, rtol=1e-8, atol=1e-8
+    )
 
 
 def test_beside_a_certificate_that_is_as_good_as_exact() -> None:
@@ -176,5 +185,7 @@ def test_beside_a_certificate_that_is_as_good_as_exact() -> None:
     found = campaign(must, Request("U5", Budget(positions=2)))
     assert found.is_determined
     # The certificate outweighs readings by 1e8, which leaves half of the digits.
-    assert found.value == pytest.approx(of_names[frozenset(one.name for one in found.chosen)], rel=1e-7)
+    assert found.value == pytest.approx(
+        of_names[frozenset(one.name for one in found.chosen)], rel=1e-7
+    )
     assert found.value <= 1.01 * min(of_names.values())

@@ -1,4 +1,5 @@
-"""A machine as a product of rigid motions, written for the comparison with Park, Burdekin and Peggs alone.
+"""A machine as a product of rigid motions, written for the comparison with Park, Burdekin and Peggs
+alone.
 
 Rotations are full ones, by Rodrigues' formula. Nothing of the package is used.
 """
@@ -24,13 +25,17 @@ def _motion(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
 
 
 def tip_error(
-    chain: Sequence[Sequence[str]], position: np.ndarray, probe: np.ndarray, errors: Mapping[str, float]
+    chain: Sequence[Sequence[str]],
+    position: np.ndarray,
+    probe: np.ndarray,
+    errors: Mapping[str, float],
 ) -> np.ndarray:
     """Where the tip is in the workpiece's frame, less where it should be.
 
-    `chain` has the axes on the probe's and on the workpiece's side, from the ground outwards; `errors` are those of
-    the axes where they stand now: dy_x is the displacement in y by the x axis, Ey_x its rotation about y, and a, b1
-    and b2 turn the axes' directions. A table goes the other way as the scale counts.
+    `chain` has the axes on the probe's and on the workpiece's side, from the ground outwards;
+    `errors` are those of the axes where they stand now: dy_x is the displacement in y by the x
+    axis, Ey_x its rotation about y, and a, b1 and b2 turn the axes' directions. A table goes the
+    other way as the scale counts.
     """
     direction = np.eye(3)
     direction[0, 1] = -errors.get("a", 0.0)

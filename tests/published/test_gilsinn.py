@@ -40,13 +40,18 @@ def test_the_shipped_table_is_the_documents() -> None:
 def test_the_dome_is_a_quarter_of_a_circle_tangent_to_a_cylinder() -> None:
     table = {name: np.array(values, dtype=float) for name, values in columns(DOCUMENT).items()}
     x, z = table["nominal_x_mm"][12:], table["nominal_z_mm"][12:]
-    a, b, c = np.linalg.lstsq(np.column_stack([2 * x, 2 * z, np.ones(20)]), x**2 + z**2, rcond=None)[0]
+    a, b, c = np.linalg.lstsq(
+        np.column_stack([2 * x, 2 * z, np.ones(20)]), x**2 + z**2, rcond=None
+    )[0]
     radius = np.sqrt(c + a**2 + b**2)
     assert (a, b, radius) == pytest.approx((0.0, -37.084, 37.084), abs=1e-4)
     assert np.abs(np.hypot(x - a, z - b) - radius).max() < 2e-5
-    # Points stand 4.32 degrees apart, the twelfth on the cylinder 1.27 mm (0.05 in) before the tangent point.
+    # Points stand 4.32 degrees apart, the twelfth on the cylinder 1.27 mm (0.05 in) before the
+    # tangent point.
     np.testing.assert_allclose(np.diff(np.degrees(np.arctan2(x, z + 37.084))), -4.32375, atol=1e-4)
-    assert (table["nominal_x_mm"][11], table["nominal_z_mm"][11]) == pytest.approx((37.084, -37.084 - 1.27), abs=1e-9)
+    assert (table["nominal_x_mm"][11], table["nominal_z_mm"][11]) == pytest.approx(
+        (37.084, -37.084 - 1.27), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("every", [4, 5])
@@ -58,7 +63,9 @@ def test_the_dome_with_zero_slope_at_the_linear_feature(every: int) -> None:
     places = np.linspace(fitted.space.lower, fitted.space.upper, 301)
     for powers, digits in (("local", 1e-14), ("global", 1e-11)):
         found = pieces(fitted, powers)  # type: ignore[arg-type]
-        np.testing.assert_allclose(found.values(places), fitted.values(places), rtol=0, atol=digits * scale)
+        np.testing.assert_allclose(
+            found.values(places), fitted.values(places), rtol=0, atol=digits * scale
+        )
     # The misfit is a small part of the errors, as Table 1's finish errors are.
     assert 2e-6 < fitted.sigma < 3e-6 and scale > 78e-6
 
@@ -72,7 +79,9 @@ def test_the_dome_with_zero_slope_at_the_linear_feature(every: int) -> None:
         np.testing.assert_allclose(found, fitted.values(fitted.x) / scale, rtol=0, atol=bound)
         by_recursion = truncated_powers.pieces(c, knots)
         ours = pieces(fitted, "global").coefficients * unit ** np.arange(4) / scale
-        np.testing.assert_allclose(ours, by_recursion, rtol=0, atol=10 * bound * np.abs(by_recursion).max())
+        np.testing.assert_allclose(
+            ours, by_recursion, rtol=0, atol=10 * bound * np.abs(by_recursion).max()
+        )
 
 
 def test_arc_length_along_both_features() -> None:
@@ -83,7 +92,9 @@ def test_arc_length_along_both_features() -> None:
 
 
 def test_finish_errors_follow_what_the_spline_left_of_the_semi_finish_errors() -> None:
-    """The finish cut was corrected by a spline through the semi-finish errors: their residuals show in it."""
+    """The finish cut was corrected by a spline through the semi-finish errors: their residuals show
+    in it.
+    """
     curve = dome(CurveSettings(every=4, holds=(Hold("start", 1, 0.0),)))
     finish = np.array(columns(DOCUMENT)["finish_error_um"][11:], dtype=float)
     assert np.corrcoef(curve.fit.residuals, finish)[0, 1] == pytest.approx(0.67, abs=0.01)
@@ -98,21 +109,30 @@ def test_dome_and_linear_feature_are_fitted_at_once() -> None:
         jump = curve.fit.values(boundary, k) - curve.fit.values(boundary, k, "below")
         assert abs(jump[0]) * length**k < 1e-12 * scale
     assert abs(curve.fit.values(boundary, 2)[0]) * length**2 > scale
-    level = dome(CurveSettings(boundaries=(TANGENT,), straight=(1,), holds=(Hold(TANGENT, 1, 0.0),)))
+    level = dome(
+        CurveSettings(boundaries=(TANGENT,), straight=(1,), holds=(Hold(TANGENT, 1, 0.0),))
+    )
     assert abs(level.fit.values(boundary, 1)[0]) * length < 1e-12 * scale
-    assert level.fit.free == curve.fit.free - 1 and level.fit.sum_of_squares > curve.fit.sum_of_squares
+    assert (
+        level.fit.free == curve.fit.free - 1 and level.fit.sum_of_squares > curve.fit.sum_of_squares
+    )
 
 
 @pytest.mark.parametrize("variant", ["joined", "level ends", "cyclic"])
 def test_the_shipped_experiment_recovers_its_machine(
     variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Readings without noise come out again, and the joint of the scales shows in a model that is smooth across it."""
+    """Readings without noise come out again, and the joint of the scales shows in a model that is
+    smooth across it.
+    """
     file, readings = "designs/gilsinn/scales-in-two-parts.yaml", tmp_path / "readings.csv"
     assert main(["simulate", file, "--variant", variant, "--exact", "-o", str(readings)]) == 0
     squares = {}
     for fitted in (variant, "smooth"):
-        assert main(["fit", file, str(readings), "--variant", fitted, "--sigma", "given", "--json"]) == 0
+        assert (
+            main(["fit", file, str(readings), "--variant", fitted, "--sigma", "given", "--json"])
+            == 0
+        )
         found = json.loads(capsys.readouterr().out)
         squares[fitted] = found["sum_of_squares"]
     assert squares[variant] < 1e-9

@@ -1,11 +1,14 @@
-"""The readings of NBSIR 79-1752: the report's own fits, and multiple redundancy by the general estimator.
+"""The readings of NBSIR 79-1752: the report's own fits, and multiple redundancy by the general
+estimator.
 
-Misprints of the tables that are put right here or in the readings shipped, each the only change of a digit or sign with
-which the report's own results come out:
+Misprints of the tables that are put right here or in the readings shipped, each the only change of
+a digit or sign with which the report's own results come out:
 
 - made-up readings, ball 1, x in position 2: .000010, must be -.000010;
-- made-up readings, ball 8, true and computed x: 1.110020, must be 1.111020; by multiple redundancy 1.110028: 1.111028;
-- made-up readings, ball 5, "true" y: 13.777777, which the readings do not contain; they give 13.777770;
+- made-up readings, ball 8, true and computed x: 1.110020, must be 1.111020; by multiple redundancy
+1.110028: 1.111028;
+- made-up readings, ball 5, "true" y: 13.777777, which the readings do not contain; they give
+13.777770;
 - made-up readings, ball 4, x by multiple redundancy: .132674, must be .132672;
 - made-up readings, ball 9, x by the three-parameter fit: 9.735171, must be 9.735173;
 - real readings, ball 12, y in position 2: 12.002806, must be 12.002796;
@@ -30,8 +33,8 @@ FOLDER = Path("designs/hocken_borchardt")
 INCH = 0.0254
 # The last digit printed.
 DIGIT = 1e-6
-# Table 1: the co-ordinates by the five-parameter fit with the whole scale difference in x, by multiple redundancy
-# without one, and those that the readings were made from.
+# Table 1: the co-ordinates by the five-parameter fit with the whole scale difference in x, by
+# multiple redundancy without one, and those that the readings were made from.
 FIVE_PARAMETERS = np.array(
     [
         (0.0, 0.0),
@@ -72,7 +75,8 @@ THREE_PARAMETERS = np.array(
         (9.735173, 3.164785),
     ]
 )
-# Tables 2 and A1, real readings: by the five-parameter fit, the three-parameter fit, and Reeve's program.
+# Tables 2 and A1, real readings: by the five-parameter fit, the three-parameter fit, and Reeve's
+# program.
 REAL_FIVE = np.array(
     [
         (0.0, 0.0),
@@ -124,7 +128,9 @@ REAL_REDUNDANT = np.array(
         (-14.002125, 14.998604),
     ]
 )
-TRUE = np.array([(12.026450, 13.777770) if i == 4 else row for i, row in enumerate(FIVE_PARAMETERS)])
+TRUE = np.array(
+    [(12.026450, 13.777770) if i == 4 else row for i, row in enumerate(FIVE_PARAMETERS)]
+)
 
 
 def observed(data: str, variant: str):  # type: ignore[no-untyped-def]
@@ -163,7 +169,9 @@ def test_five_parameters() -> None:
 
 
 def test_five_parameters_by_multiple_redundancy() -> None:
-    """The full estimate agrees within what the equations of the first order neglect, and has uncertainties."""
+    """The full estimate agrees within what the equations of the first order neglect, and has
+    uncertainties.
+    """
     found = reversed_("dummy", "x")
     full = {e.name: e for e in found.redundant}
     for estimate in found.estimates:
@@ -178,7 +186,9 @@ def test_five_parameters_by_multiple_redundancy() -> None:
 
 
 def test_true_parameters_are_within_the_uncertainties() -> None:
-    """Table 1 tells what the readings were made with; rounding to a microinch is their only error."""
+    """Table 1 tells what the readings were made with; rounding to a microinch is their only
+    error.
+    """
     full = {e.name: e for e in reversed_("dummy", "x").redundant}
     microinch = 1e-6 * INCH
     true = {"alpha": 4.79e-6, "beta": -131.26e-6, "gamma": 13.70e-6, "offset x": -14.20 * microinch}
@@ -197,8 +207,8 @@ def test_three_parameters() -> None:
     }
     assert round(found.found.sigma / INCH * 1e6, 1) == 7.0
     assert np.abs(found.coordinates / INCH - TRUE).max() < 14e-6
-    # The table's axes go through the zero of the readings, from which ball 1 is off by the mean of both its readings,
-    # the second turned back, and through ball 2.
+    # The table's axes go through the zero of the readings, from which ball 1 is off by the mean of
+    # both its readings, the second turned back, and through ball 2.
     shifted = found.coordinates / INCH + (0.000014 / 2, -0.000010 / 2)
     turn = shifted[1, 1] / shifted[1, 0]
     turned = shifted + turn * np.column_stack([shifted[:, 1], -shifted[:, 0]])
@@ -207,8 +217,12 @@ def test_three_parameters() -> None:
 
 
 def test_options() -> None:
-    """Where the scale difference goes changes no parameter, and the co-ordinates by gamma along the machine's axes."""
-    found: dict[Scale, ReversalFit] = {scale: reversed_("dummy", scale) for scale in ("x", "y", "split", "none")}
+    """Where the scale difference goes changes no parameter, and the co-ordinates by gamma along the
+    machine's axes.
+    """
+    found: dict[Scale, ReversalFit] = {
+        scale: reversed_("dummy", scale) for scale in ("x", "y", "split", "none")
+    }
     assert len({tuple(values(one).items()) for one in found.values()}) == 1
     gamma = found["x"].found.gamma
     x, y, split, none = (found[scale].coordinates / INCH for scale in ("x", "y", "split", "none"))
@@ -218,9 +232,18 @@ def test_options() -> None:
     np.testing.assert_allclose(none, x * (1 + gamma, 1), rtol=0, atol=3e-9)
     for scale, one in found.items():
         if scale != "none":
-            assert [e.name for e in one.redundant] == ["alpha", "beta", "gamma", "offset x", "offset y"]
-            np.testing.assert_allclose(one.coordinates, one.full.plates[0].coordinates, rtol=0, atol=3e-9)
-    # Multiple redundancy has no scale difference to leave unapplied: it shares out what it finds between both axes.
+            assert [e.name for e in one.redundant] == [
+                "alpha",
+                "beta",
+                "gamma",
+                "offset x",
+                "offset y",
+            ]
+            np.testing.assert_allclose(
+                one.coordinates, one.full.plates[0].coordinates, rtol=0, atol=3e-9
+            )
+    # Multiple redundancy has no scale difference to leave unapplied: it shares out what it finds
+    # between both axes.
     assert [e.name for e in found["none"].redundant] == ["alpha", "beta", "offset x", "offset y"]
     other = found["none"].full.plates[0].coordinates / INCH
     np.testing.assert_allclose(other, split, rtol=0, atol=3e-6)
@@ -239,14 +262,23 @@ def test_multiple_redundancy_without_scale() -> None:
 
 
 def test_no_degrees_of_freedom_explain_reeves_sigma_of_the_real_readings() -> None:
-    """Table 2 prints 17.0: 20 of 22 degrees of freedom, counted as for the made-up readings, make it 16.8."""
+    """Table 2 prints 17.0: 20 of 22 degrees of freedom, counted as for the made-up readings, make
+    it 16.8.
+    """
     found = fitted("real", "without scale")
     freedom = found.design.observations - found.design.parameter_count
-    assert freedom == 22 and {e.name: 1e6 * e.value for e in found.estimates}["alpha"] == pytest.approx(
-        -0.66, abs=0.005
-    )
-    by_count = {n: float(np.sqrt(found.solution.factor.sum_of_squares / n)) for n in range(freedom - 6, freedom + 1)}
-    assert {n: round(sigma, 1) for n, sigma in by_count.items() if n in (19, 20, 22)} == {19: 17.2, 20: 16.8, 22: 16.0}
+    assert freedom == 22 and {e.name: 1e6 * e.value for e in found.estimates}[
+        "alpha"
+    ] == pytest.approx(-0.66, abs=0.005)
+    by_count = {
+        n: float(np.sqrt(found.solution.factor.sum_of_squares / n))
+        for n in range(freedom - 6, freedom + 1)
+    }
+    assert {n: round(sigma, 1) for n, sigma in by_count.items() if n in (19, 20, 22)} == {
+        19: 17.2,
+        20: 16.8,
+        22: 16.0,
+    }
     assert min(abs(sigma - 17.0) for sigma in by_count.values()) > 0.15
 
 
@@ -265,7 +297,13 @@ def test_multiple_redundancy_with_scale() -> None:
     [
         (
             True,
-            {"alpha": -0.67, "beta": -141.27, "gamma": 2.82, "offset x": -14.30, "offset y": -17.58},
+            {
+                "alpha": -0.67,
+                "beta": -141.27,
+                "gamma": 2.82,
+                "offset x": -14.30,
+                "offset y": -17.58,
+            },
             16.9,
             REAL_FIVE,
         ),
@@ -278,7 +316,13 @@ def test_published_results_for_the_real_readings(
 ) -> None:
     """Tables 2 and A1."""
     found = reversed_("real", "x", offsets)
-    scales = {"alpha": 1e6, "beta": 1e6, "gamma": 1e6, "offset x": 1e6 / INCH, "offset y": 1e6 / INCH}
+    scales = {
+        "alpha": 1e6,
+        "beta": 1e6,
+        "gamma": 1e6,
+        "offset x": 1e6 / INCH,
+        "offset y": 1e6 / INCH,
+    }
     assert {e.name: round(e.value * scales[e.name], 2) for e in found.estimates} == parameters
     assert round(found.found.sigma / INCH * 1e6, 1) == sigma
     # The program computed in single steps: the last digit may differ by one.
@@ -292,7 +336,9 @@ def test_multiple_redundancy_for_the_real_readings() -> None:
     estimates = values(found)
     assert round(estimates["alpha"], 2) == -0.66
     assert round(estimates["first: rotation z"], 1) == -141.5
-    np.testing.assert_allclose(found.plates[0].coordinates / INCH, REAL_REDUNDANT, rtol=0, atol=0.5 * DIGIT)
+    np.testing.assert_allclose(
+        found.plates[0].coordinates / INCH, REAL_REDUNDANT, rtol=0, atol=0.5 * DIGIT
+    )
     assert found.degrees_of_freedom == 22
     # With two degrees of freedom less, as for the made-up readings.
     assert np.sqrt(found.solution.factor.sum_of_squares / 20) == pytest.approx(16.8, abs=0.05)
@@ -318,11 +364,15 @@ def test_real_readings_reversed(offsets: bool) -> None:
     within = found.found.bias if offsets else 2.0
     assert found.found.bias < 0.05
     for estimate in found.estimates:
-        assert abs(estimate.value - full[estimate.name].value) < within * full[estimate.name].standard_uncertainty
+        assert (
+            abs(estimate.value - full[estimate.name].value)
+            < within * full[estimate.name].standard_uncertainty
+        )
     plate = found.full.plates[0]
     free = plate.standard_uncertainties > 0
     off = np.abs(found.coordinates - plate.coordinates)[free] / plate.standard_uncertainties[free]
     assert free.sum() == 23 and off.max() < within
-    # The report's sigma is of the difference of two readings; the full estimate's, in microinches, of one.
+    # The report's sigma is of the difference of two readings; the full estimate's, in microinches,
+    # of one.
     if offsets:
         assert found.full.sigma * 1e-6 * INCH == pytest.approx(found.found.single, rel=1e-3)

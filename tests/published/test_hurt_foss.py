@@ -1,4 +1,6 @@
-"""US 4,437,151 (Hurt and Foss): length equations, and the two steps for the Bryan gauge, over simulated campaigns."""
+"""US 4,437,151 (Hurt and Foss): length equations, and the two steps for the Bryan gauge, over
+simulated campaigns.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,11 @@ from ballplate.simulator.readings.reading_files import read_readings
 
 FOLDER = Path("designs/hurt_foss")
 NAMES = ("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")
-CAMPAIGNS = [("bar-bell", "length known"), ("bryan-gauge", "radius known"), ("bryan-gauge", "two pivots")]
+CAMPAIGNS = [
+    ("bar-bell", "length known"),
+    ("bryan-gauge", "radius known"),
+    ("bryan-gauge", "two pivots"),
+]
 COUNT = 1000
 
 
@@ -32,8 +38,12 @@ def shipped(file: str, variant: str) -> Experiment:
     return {one.name: one for one in load(FOLDER / f"{file}.yaml")}[variant]
 
 
-def campaigns(design: Design, truth: Truth, estimator: LengthEstimator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (count, 6) of the parameters in simulated campaigns, and their stated uncertainties."""
+def campaigns(
+    design: Design, truth: Truth, estimator: LengthEstimator, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (count, 6) of the parameters in simulated campaigns, and their stated
+    uncertainties.
+    """
     on_truth = replace(design, model=truth.model)
     errors, stated = [], []
     for trial in range(count):
@@ -86,7 +96,9 @@ def test_equations_110_with_the_centre_are_exact_for_gauges(variant: str) -> Non
 
 
 @pytest.mark.parametrize(("file", "variant"), CAMPAIGNS)
-def test_the_general_estimator_is_unbiased_over_a_thousand_campaigns(file: str, variant: str) -> None:
+def test_the_general_estimator_is_unbiased_over_a_thousand_campaigns(
+    file: str, variant: str
+) -> None:
     experiment = shipped(file, variant)
     shared = reference(*true_experiment(experiment))
     start = shared.start.a - shared.truth.state.a
@@ -99,24 +111,31 @@ def test_the_general_estimator_is_unbiased_over_a_thousand_campaigns(file: str, 
 
 
 def assert_unbiased(z: np.ndarray) -> None:
-    """z-scores (n, 6) with mean 0 and deviation 1, as far as n of them can tell: six tests at 4 sigma each."""
+    """z-scores (n, 6) with mean 0 and deviation 1, as far as n of them can tell: six tests at 4
+    sigma each.
+    """
     n = len(z)
     assert np.abs(z.mean(axis=0)).max() < 4.0 / np.sqrt(n)
     assert np.abs(z.std(axis=0, ddof=1) - 1.0).max() < 4.0 / np.sqrt(2 * n)
 
 
 @pytest.mark.parametrize(("file", "variant"), CAMPAIGNS[:2])
-def test_the_joint_length_equations_are_unbiased_over_a_thousand_campaigns(file: str, variant: str) -> None:
+def test_the_joint_length_equations_are_unbiased_over_a_thousand_campaigns(
+    file: str, variant: str
+) -> None:
     """Against their own scatter; the uncertainties that they state leave the certificate out."""
     experiment = shipped(file, variant)
     design, truth = true_experiment(experiment)
     errors, stated = campaigns(design, truth, "length-equations", COUNT)
     assert np.abs(errors.mean(axis=0) / (errors.std(axis=0, ddof=1) / np.sqrt(COUNT))).max() < 4.0
-    # With weights that are all the same, equal lengths and equal noise, they lose nothing against the general one.
+    # With weights that are all the same, equal lengths and equal noise, they lose nothing against
+    # the general one.
     found = predict(experiment)
-    assert errors.std(axis=0, ddof=1)[3:].max() == pytest.approx(found.quantities["U3 angles"].maximum, rel=0.1)
-    # Student's distribution for the few degrees of freedom that the scatter is estimated with; squareness only, as the
-    # certificate's error is one of scale.
+    assert errors.std(axis=0, ddof=1)[3:].max() == pytest.approx(
+        found.quantities["U3 angles"].maximum, rel=0.1
+    )
+    # Student's distribution for the few degrees of freedom that the scatter is estimated with;
+    # squareness only, as the certificate's error is one of scale.
     freedom = len(design.lengths) - 6 - 3 * len(design.gauge_positions)
     z = (errors / stated)[:, 3:]
     student = np.sqrt(freedom / (freedom - 2))
@@ -149,7 +168,8 @@ def test_the_bias_of_two_steps_is_what_the_centre_takes_up() -> None:
     kept = as_parameters(kept_by_two_steps(design.lengths.direction))
     foretold = kept @ truth.state.a - truth.state.a
     assert np.abs((errors.mean(axis=0) - foretold) / scatter).max() < 4.0
-    # Of the squareness of Z less than a third is left with elevations of 5 to 65 deg; C0Y is not touched.
+    # Of the squareness of Z less than a third is left with elevations of 5 to 65 deg; C0Y is not
+    # touched.
     assert np.abs(kept[[4, 5], [4, 5]]).max() < 1 / 3
     assert kept[3, 3] == pytest.approx(1.0, abs=1e-12)
     bias = dict(zip(NAMES, errors.mean(axis=0) / scatter, strict=True))
@@ -157,16 +177,33 @@ def test_the_bias_of_two_steps_is_what_the_centre_takes_up() -> None:
 
 
 def test_two_steps_are_right_where_every_direction_has_its_opposite() -> None:
-    """What is even in the direction cannot look like a shift, which is odd; no gauge on a table reaches that."""
-    half = directions(tuple((azimuth, elevation) for azimuth in range(6) for elevation in (-1.0, -0.3, 0.2, 0.9)))
-    np.testing.assert_allclose(kept_by_two_steps(np.concatenate([half, -half])), np.eye(6), rtol=0, atol=1e-12)
+    """What is even in the direction cannot look like a shift, which is odd; no gauge on a table
+    reaches that.
+    """
+    half = directions(
+        tuple((azimuth, elevation) for azimuth in range(6) for elevation in (-1.0, -0.3, 0.2, 0.9))
+    )
+    np.testing.assert_allclose(
+        kept_by_two_steps(np.concatenate([half, -half])), np.eye(6), rtol=0, atol=1e-12
+    )
 
 
 def test_shipped_readings_give_the_true_errors() -> None:
-    truth = {"scale x": 20e-6, "scale y": -30e-6, "scale z": 15e-6, "C0Y": 60e-6, "B0Z": -40e-6, "A0Z": 80e-6}
+    truth = {
+        "scale x": 20e-6,
+        "scale y": -30e-6,
+        "scale z": 15e-6,
+        "C0Y": 60e-6,
+        "B0Z": -40e-6,
+        "A0Z": 80e-6,
+    }
     for file, variant in CAMPAIGNS[:2]:
         experiment = shipped(file, variant)
-        found = fit(experiment, read_readings(FOLDER / f"{file}-readings.csv", lay_out(experiment)), "given")
+        found = fit(
+            experiment, read_readings(FOLDER / f"{file}-readings.csv", lay_out(experiment)), "given"
+        )
         for estimate in found.estimates:
             if estimate.name in truth:
-                assert abs(estimate.value - truth[estimate.name]) < 3.0 * estimate.standard_uncertainty
+                assert (
+                    abs(estimate.value - truth[estimate.name]) < 3.0 * estimate.standard_uncertainty
+                )

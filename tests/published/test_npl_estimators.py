@@ -1,9 +1,11 @@
-"""NPL Report CISE 15/98, section 6.2.7: the distances-only estimator against the full one, over 100 data sets.
+"""NPL Report CISE 15/98, section 6.2.7: the distances-only estimator against the full one, over 100
+data sets.
 
-The report gives one data set's differences for each plate. It does not say whether distances between balls read with
-different probes in the same position were used. With them the report's root mean square and maximum stand above 87 and
-79 % of the data sets with 5 x 5 balls, and above 9 and 61 % with 7 x 7. Without them the root mean squares stand above
-11 and 1 %, and the maxima above a tenth and fewer than 5 %: most data sets differ by more than the report's.
+The report gives one data set's differences for each plate. It does not say whether distances
+between balls read with different probes in the same position were used. With them the report's root
+mean square and maximum stand above 87 and 79 % of the data sets with 5 x 5 balls, and above 9 and
+61 % with 7 x 7. Without them the root mean squares stand above 11 and 1 %, and the maxima above a
+tenth and fewer than 5 %: most data sets differ by more than the report's.
 """
 
 from __future__ import annotations
@@ -19,11 +21,18 @@ from ballplate.reproduction.shipped import Shipped
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("difference", npl().statements.differences, ids=lambda difference: difference.design)
+@pytest.mark.parametrize(
+    "difference", npl().statements.differences, ids=lambda difference: difference.design
+)
 def test_the_reports_differences_lie_in_the_distribution(difference) -> None:  # type: ignore[no-untyped-def]
-    found = compare_difference(npl(), Shipped(Path("designs/npl")), difference, 100, lambda *_: None)
+    found = compare_difference(
+        npl(), Shipped(Path("designs/npl")), difference, 100, lambda *_: None
+    )
     assert found.agrees and len(found.comparison.rms) == 100
     print(f"\n{difference.design}: quantiles {QUANTILES} in um")
     for part in found.parts:
         shown = " ".join(f"{1e6 * value:.3f}" for value in np.quantile(part.values, QUANTILES))
-        print(f"{part.quantity:8}{shown}; the report's {1e6 * part.published:.3f} is above {100 * part.below:.0f} %")
+        print(
+            f"{part.quantity:8}{shown}; the report's {1e6 * part.published:.3f} is above"
+            f" {100 * part.below:.0f} %"
+        )

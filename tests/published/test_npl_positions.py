@@ -1,12 +1,15 @@
-"""The search for where the plate lies in NPL Report CISE 15/98, section 6.2: corners, turns, sides seen, levels.
+"""The search for where the plate lies in NPL Report CISE 15/98, section 6.2: corners, turns, sides
+seen, levels.
 
-The report says that in each pair of parallel planes the plate goes from one corner to the opposite one and turns by 90
-degrees. That leaves 64 choices of first corners, 128 of turns, up to how balls are numbered, and whether the plate is
-seen from the front or from behind in the x and y planes: 32,768. All are judged by the figures of Table 9, L = 0.3,
-that rest on no evaluation points, with normal equations of this file's own, which only have to be good for four digits.
+The report says that in each pair of parallel planes the plate goes from one corner to the opposite
+one and turns by 90 degrees. That leaves 64 choices of first corners, 128 of turns, up to how balls
+are numbered, and whether the plate is seen from the front or from behind in the x and y planes:
+32,768. All are judged by the figures of Table 9, L = 0.3, that rest on no evaluation points, with
+normal equations of this file's own, which only have to be good for four digits.
 
-Information on the machine and the balls is the sum of what each position gives after its pose is eliminated; that of
-the first, held position is added whole. A position has 32 variants, so that a choice takes a sum and an inversion.
+Information on the machine and the balls is the sum of what each position gives after its pose is
+eliminated; that of the first, held position is added whole. A position has 32 variants, so that a
+choice takes a sum and an inversion.
 """
 
 from __future__ import annotations
@@ -30,7 +33,11 @@ Array = NDArray[Any]
 DESIGN = "6.2.3[n=5 NDEL=5 L=0.3]"
 SIDE, REPEATABILITY = 0.3, 0.2
 IN_PLANE = {"z": (0, 1, 2), "x": (1, 2, 0), "y": (2, 0, 1)}
-TIPS = {"z": [(0, 0, -0.05)], "x": [(0.05, 0, 0), (-0.05, 0, 0)], "y": [(0, 0.05, 0), (0, -0.05, 0)]}
+TIPS = {
+    "z": [(0, 0, -0.05)],
+    "x": [(0.05, 0, 0), (-0.05, 0, 0)],
+    "y": [(0, 0.05, 0), (0, -0.05, 0)],
+}
 CORNERS = [(0, 0), (1, 0), (0, 1), (1, 1)]
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 # Corner, turns and side of the plate in the first planes of z, x and y and in the second ones.
@@ -42,7 +49,9 @@ LEVELS = (0.3, 0.7)
 
 @dataclass(frozen=True)
 class Given:
-    """What a position adds to the information on machine and balls, whole and without its pose, which follows."""
+    """What a position adds to the information on machine and balls, whole and without its pose,
+    which follows.
+    """
 
     whole: Array
     reduced: Array
@@ -51,7 +60,9 @@ class Given:
 
 
 class Plate:
-    """A plate of 5 x 5 balls, in metres, micrometres and microradians, on the report's kinematic model."""
+    """A plate of 5 x 5 balls, in metres, micrometres and microradians, on the report's kinematic
+    model.
+    """
 
     def __init__(self) -> None:
         steps = np.linspace(0.0, SIDE, 5)
@@ -63,7 +74,9 @@ class Plate:
 
     @cached_property
     def coefficients(self) -> Array:
-        """From the parameters to those of t - t^2, t^2 - t^3, ... and t for positions, t, t^2, ... for rotations."""
+        """From the parameters to those of t - t^2, t^2 - t^3, ... and t for positions, t, t^2, ...
+        for rotations.
+        """
         reported = self.model.reported()
         rows = []
         for f in self.model.functions:
@@ -85,7 +98,9 @@ class Plate:
             found += np.outer(row, row) / REPEATABILITY**2
         return found
 
-    def pose(self, plane: str, level: float, corner: tuple[int, int], turns: int, behind: bool) -> tuple[Array, Array]:
+    def pose(
+        self, plane: str, level: float, corner: tuple[int, int], turns: int, behind: bool
+    ) -> tuple[Array, Array]:
         """Rotation and origin."""
         first, second, normal = IN_PLANE[plane]
         turn = np.linalg.matrix_power(TURN, turns) @ np.diag([-1.0 if behind else 1.0, 1.0])
@@ -123,8 +138,12 @@ class Plate:
             self.known[key] = Given(whole, reduced, pose, np.linalg.inv(information[:6, :6]))
         return self.known[key]
 
-    def ratios(self, choice: Choice, levels: tuple[float, float], published: dict[str, float]) -> dict[str, float]:
-        """Published figures over those of a choice: averages and maxima of U2, U3 and U5, and the maximum of U1."""
+    def ratios(
+        self, choice: Choice, levels: tuple[float, float], published: dict[str, float]
+    ) -> dict[str, float]:
+        """Published figures over those of a choice: averages and maxima of U2, U3 and U5, and the
+        maximum of U1.
+        """
         given = []
         for plane, (corner, first, second, behind) in zip("zxy", choice, strict=True):
             given.append(self.position(plane, levels[0], CORNERS[corner], first, behind))
@@ -139,7 +158,10 @@ class Plate:
             "U1": np.sqrt(np.diag(covariance)[self.free :]),
             "U2": np.concatenate(
                 [
-                    np.sqrt(np.diag(one.pose_covariance) + np.einsum("ij,ij->i", one.pose @ covariance, one.pose))
+                    np.sqrt(
+                        np.diag(one.pose_covariance)
+                        + np.einsum("ij,ij->i", one.pose @ covariance, one.pose)
+                    )
                     for one in given[1:]
                 ]
             ),
@@ -167,7 +189,9 @@ def published() -> dict[str, float]:
 
 
 def choices() -> list[Choice]:
-    """All of them; the first position is not turned and seen from the front, as balls are numbered from any corner."""
+    """All of them; the first position is not turned and seen from the front, as balls are numbered
+    from any corner.
+    """
     pairs = [(turns, (turns + quarter) % 4) for turns in range(4) for quarter in (1, 3)]
     return [
         ((z, 0, turned, False), (x, *of_x, behind_x), (y, *of_y, behind_y))
@@ -179,12 +203,16 @@ def choices() -> list[Choice]:
 
 
 def deviation(ratios: dict[str, float]) -> float:
-    """Largest deviation from the common factor, which the maximum of U3 gives: it hardly depends on the choice."""
+    """Largest deviation from the common factor, which the maximum of U3 gives: it hardly depends on
+    the choice.
+    """
     return max(abs(ratio / ratios["U3 maximum"] - 1.0) for ratio in ratios.values())
 
 
 @single_threaded
-def ranked(plate: Plate, chosen: list[Choice], levels: tuple[float, float]) -> list[tuple[float, Choice]]:
+def ranked(
+    plate: Plate, chosen: list[Choice], levels: tuple[float, float]
+) -> list[tuple[float, Choice]]:
     """Choices with their largest deviations, the best first."""
     figures = published()
     return sorted((deviation(plate.ratios(choice, levels, figures)), choice) for choice in chosen)
@@ -207,8 +235,12 @@ def test_the_shipped_design_has_what_was_found(plate: Plate) -> None:
 
 
 def test_what_was_found_stands_out_among_its_neighbours(plate: Plate) -> None:
-    """Every choice that differs in one pair of planes; the whole search takes minutes and is left to the long tests."""
-    neighbours = [one for one in choices() if sum(a != b for a, b in zip(one, FOUND, strict=True)) <= 1]
+    """Every choice that differs in one pair of planes; the whole search takes minutes and is left
+    to the long tests.
+    """
+    neighbours = [
+        one for one in choices() if sum(a != b for a, b in zip(one, FOUND, strict=True)) <= 1
+    ]
     (best, choice), (second, _), *_ = ranked(plate, neighbours, LEVELS)
     assert len(neighbours) > 100
     assert choice == FOUND and best < 2e-4 and second > 50 * best

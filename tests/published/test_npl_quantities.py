@@ -1,4 +1,6 @@
-"""U2, U3 and U5 as NPL Report CISE 15/98 tabulates them, against their definitions computed densely."""
+"""U2, U3 and U5 as NPL Report CISE 15/98 tabulates them, against their definitions computed
+densely.
+"""
 
 from __future__ import annotations
 
@@ -82,6 +84,7 @@ def test_distances_from_the_first_ball(computed) -> None:  # type: ignore[no-unt
 def test_what_is_undetermined_is_counted() -> None:
     experiment = next(one for one in load("designs/npl/6.2.1.yaml") if one.name == "n=4 NDEL=7")
     found = tabulated_quantities(lay_out(experiment))
-    # Six directions change functions of Z, which have six coefficients each, and the plate does not deform.
+    # Six directions change functions of Z, which have six coefficients each, and the plate does not
+    # deform.
     assert found["U3"].undetermined > 0 and np.isfinite(found["U3"].average)
     assert found["U5"].undetermined == 0

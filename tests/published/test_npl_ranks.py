@@ -25,7 +25,9 @@ def test_rank_deficiencies(name: str) -> None:
             assert found.agrees and found.ours == FOUND.get(design, statement.deficiency), design
             # Exact deficiency stands apart from everything determined by many orders of magnitude.
             assert found.gap > 1e8
-    assert all(check(experiment).verdict.as_expected for experiment in load(f"designs/npl/{name}.yaml"))
+    assert all(
+        check(experiment).verdict.as_expected for experiment in load(f"designs/npl/{name}.yaml")
+    )
 
 
 def test_symmetrical_errors_are_named() -> None:

@@ -1,7 +1,9 @@
-"""NPL Report CISE 15/98, section 5: exact readings of one machine, fitted with the model of the same or another.
+"""NPL Report CISE 15/98, section 5: exact readings of one machine, fitted with the model of the
+same or another.
 
-The report's sums of squares are in square metres, with weight 1 for a reading; those here are brought to that form.
-Its readings are exact to about a nanometre only, those here to rounding, so that sums of squares end lower.
+The report's sums of squares are in square metres, with weight 1 for a reading; those here are
+brought to that form. Its readings are exact to about a nanometre only, those here to rounding, so
+that sums of squares end lower.
 """
 
 from __future__ import annotations
@@ -13,7 +15,12 @@ from pathlib import Path
 import pytest
 from ballplate.reproduction.compare import compare_progress
 from ballplate.reproduction.published import npl
-from ballplate.reproduction.shipped import Shipped, fitted_exactly, shipped_experiment, sums_of_squares
+from ballplate.reproduction.shipped import (
+    Shipped,
+    fitted_exactly,
+    shipped_experiment,
+    sums_of_squares,
+)
 from ballplate.results.fit import Fit
 from ballplate.results.study import check
 from ballplate.simulator.experiment.load import load
@@ -28,7 +35,9 @@ def steps(found: Fit) -> list[float]:
     return [iteration.step for iteration in found.solution.iterations[1:]]
 
 
-@pytest.mark.parametrize("progress", npl().statements.convergence, ids=lambda progress: progress.design)
+@pytest.mark.parametrize(
+    "progress", npl().statements.convergence, ids=lambda progress: progress.design
+)
 def test_published_iterations(progress) -> None:  # type: ignore[no-untyped-def]
     found = compare_progress(npl(), Shipped(Path("designs/npl")), progress)
     assert found.agrees, [line for line in found.lines if not line.agrees]
@@ -36,9 +45,15 @@ def test_published_iterations(progress) -> None:  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize(
     ("name", "variant"),
-    [("5.2", "kinematic fit"), ("5.4", "kinematic machine, kinematic fit"), ("5.2", "empirical fit")],
+    [
+        ("5.2", "kinematic fit"),
+        ("5.4", "kinematic machine, kinematic fit"),
+        ("5.2", "empirical fit"),
+    ],
 )
-def test_a_fit_that_contains_the_machine_converges_in_three_iterations(name: str, variant: str) -> None:
+def test_a_fit_that_contains_the_machine_converges_in_three_iterations(
+    name: str, variant: str
+) -> None:
     """Tables 1 and 3: steps of about 1e-4, 1e-8 and 1e-13, and readings met exactly."""
     found = fitted(name, variant)
     assert found.verdict.deficiency == 0 and found.solution.status == "converged"
@@ -52,16 +67,19 @@ def test_a_fit_that_contains_the_machine_converges_in_three_iterations(name: str
     assert at_last < 1e-22
 
 
-@pytest.mark.parametrize(("name", "variant"), [("5.3", "kinematic fit"), ("5.4", "empirical machine, kinematic fit")])
+@pytest.mark.parametrize(
+    ("name", "variant"), [("5.3", "kinematic fit"), ("5.4", "empirical machine, kinematic fit")]
+)
 def test_a_kinematic_fit_cannot_follow_an_empirical_machine(name: str, variant: str) -> None:
-    """Tables 2 and 4: it converges all the same, with a sum of squares orders of magnitude above what exact
-    readings leave. Table 4 ends at 2.6e-10 m^2.
+    """Tables 2 and 4: it converges all the same, with a sum of squares orders of magnitude above
+    what exact readings leave. Table 4 ends at 2.6e-10 m^2.
     """
     found = fitted(name, variant)
     assert found.solution.status == "converged"
     last = sums_of_squares(found)[-1]
     assert 1e-11 < last < 1e-8
-    # Anybody would notice: the sum of squares is far above the degrees of freedom, about which it should be.
+    # Anybody would notice: the sum of squares is far above the degrees of freedom, about which it
+    # should be.
     assert found.solution.factor.sum_of_squares > 10 * found.degrees_of_freedom
 
 
@@ -87,10 +105,13 @@ def test_an_empirical_fit_of_sparse_readings_is_recognised_as_deficient() -> Non
 
 @pytest.mark.parametrize("machine", ["kinematic", "empirical"])
 def test_what_the_sparse_readings_leave_open_is_named_after_a_fit_too(machine: str) -> None:
-    """Tables 3 and 4: steps that stay at 1e-3. The machine's errors tilt the twelve open directions just so much out of
-    the way that they are seen through products of errors; the iteration wanders along them. They are open all the same.
+    """Tables 3 and 4: steps that stay at 1e-3. The machine's errors tilt the twelve open directions
+    just so much out of the way that they are seen through products of errors; the iteration wanders
+    along them. They are open all the same.
     """
-    experiment = shipped_experiment(Shipped(Path("designs/npl")), f"5.4[{machine} machine, empirical fit]")
+    experiment = shipped_experiment(
+        Shipped(Path("designs/npl")), f"5.4[{machine} machine, empirical fit]"
+    )
     found = fitted("5.4", f"{machine} machine, empirical fit")
     assert found.verdict.deficiency == found.solution.spectrum.deficiency == 12
     assert found.verdict.null == check(experiment).verdict.null

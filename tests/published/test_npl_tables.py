@@ -1,4 +1,6 @@
-"""The uncertainties of NPL Report CISE 15/98, Tables 5 C and 6 to 12, and what the report says of them."""
+"""The uncertainties of NPL Report CISE 15/98, Tables 5 C and 6 to 12, and what the report says of
+them.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ def test_tables(shipped: Shipped) -> None:
         if not found.factor_agrees:
             failures.append(f"{column.design} {column.statistic}: common factor {found.factor:.3f}")
         failures += [
-            f"{column.design} {column.statistic} {figure.quantity}: {figure.adjusted:.3f}, permitted {figure.within}"
+            f"{column.design} {column.statistic} {figure.quantity}: {figure.adjusted:.3f},"
+            f" permitted {figure.within}"
             for figure in found.figures
             if not figure.agrees
         ]
@@ -37,7 +40,8 @@ def test_tables(shipped: Shipped) -> None:
 
 
 def test_figures_that_rest_on_no_random_points_agree_to_four_digits(shipped: Shipped) -> None:
-    """U1, U2, U3 and U5 of Tables 5 to 9 and 12, but for a misprint: what is assumed would move them by percents.
+    """U1, U2, U3 and U5 of Tables 5 to 9 and 12, but for a misprint: what is assumed would move
+    them by percents.
 
     Tables 10 and 11 rest on where further positions are, which is not known.
     """
@@ -59,13 +63,17 @@ def test_figures_that_rest_on_no_random_points_agree_to_four_digits(shipped: Shi
     assert off == ["6.2.2[n=10 NDEL=5] average U3"]
 
 
-@pytest.mark.parametrize("remark", npl().statements.remarks, ids=lambda remark: f"{remark.section} {remark.text[:30]}")
+@pytest.mark.parametrize(
+    "remark", npl().statements.remarks, ids=lambda remark: f"{remark.section} {remark.text[:30]}"
+)
 def test_remarks(remark, shipped: Shipped) -> None:  # type: ignore[no-untyped-def]
     found = compare_remark(shipped, remark)
     assert found.agrees, (found.least, found.largest)
 
 
-@pytest.mark.parametrize("erratum", npl().statements.errata, ids=lambda erratum: f"Table {erratum.table}")
+@pytest.mark.parametrize(
+    "erratum", npl().statements.errata, ids=lambda erratum: f"Table {erratum.table}"
+)
 def test_errata(erratum, shipped: Shipped) -> None:  # type: ignore[no-untyped-def]
     found = compare_erratum(npl(), shipped, erratum)
     assert len(found.lines) >= len(erratum.headed) and found.agrees
@@ -82,10 +90,14 @@ def test_every_exception_is_needed(shipped: Shipped) -> None:
 
 def test_what_is_named_exists(shipped: Shipped) -> None:
     stated = npl().statements
-    named = {column.design for column in npl().columns} | {d for one in stated.exceptions for d in one.designs}
+    named = {column.design for column in npl().columns} | {
+        d for one in stated.exceptions for d in one.designs
+    }
     for design in named:
         assert planned(shipped, design).label == design and case_of(design) in design
     keys = [one.key for one in (*stated.assumptions, *stated.exceptions)]
     assert len(keys) == len(set(keys))
     blocks = (*stated.ranks, *stated.remarks, *stated.illegible)
-    assert {one.section for one in blocks} | {c.section for c in npl().columns} <= set(stated.sections)
+    assert {one.section for one in blocks} | {c.section for c in npl().columns} <= set(
+        stated.sections
+    )

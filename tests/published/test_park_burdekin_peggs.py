@@ -1,7 +1,9 @@
-"""Park, Burdekin and Peggs, Appendix A: equations and rules as printed, against the chain formula and rigid bodies.
+"""Park, Burdekin and Peggs, Appendix A: equations and rules as printed, against the chain formula
+and rigid bodies.
 
-Every coefficient of every error in every equation and rule is compared; those that differ are listed as misprints in
-the data, and each is shown to be one by a product of full rotations that uses nothing of the package.
+Every coefficient of every error in every equation and rule is compared; those that differ are
+listed as misprints in the data, and each is shown to be one by a product of full rotations that
+uses nothing of the package.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ from ballplate.simulator.machines.description import (
 
 from tests.published.rigid_body import tip_error
 
-PRINTED: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("park-burdekin-peggs.yaml").read_text("utf-8"))
+PRINTED: dict[str, Any] = yaml.safe_load(
+    Path(__file__).with_name("park-burdekin-peggs.yaml").read_text("utf-8")
+)
 CHAINS: dict[str, list[list[str]]] = PRINTED["chains"]
 AXES = "xyz"
 FUNCTIONS = [f"{kind}{c}_{axis}" for axis in AXES for kind in "dE" for c in AXES]
@@ -51,7 +55,11 @@ def iso(name: str) -> str:
 def coefficient(expression: str, error: str, position: np.ndarray, probe: np.ndarray) -> float:
     """What the error is multiplied by in a printed expression."""
     names = dict.fromkeys([*FUNCTIONS, *SQUARENESS, "thermal", "phi1", "phi2"], 0.0)
-    for letters, values in (("xyz", position), (("xm", "ym", "zm"), position), (("Xp", "Yp", "Zp"), probe)):
+    for letters, values in (
+        ("xyz", position),
+        (("xm", "ym", "zm"), position),
+        (("Xp", "Yp", "Zp"), probe),
+    ):
         names |= dict(zip(letters, values.tolist(), strict=True))
     return float(eval(expression, {}, names | {error: 1.0}))
 
@@ -62,7 +70,9 @@ def by_rigid_bodies(name: str, error: str, position: np.ndarray, probe: np.ndarr
 
 
 @cache
-def _by_rigid_bodies(name: str, error: str, position: tuple[float, ...], probe: tuple[float, ...]) -> np.ndarray:
+def _by_rigid_bodies(
+    name: str, error: str, position: tuple[float, ...], probe: tuple[float, ...]
+) -> np.ndarray:
     step = 1e-5
     x, p = np.array(position), np.array(probe)
     after, before = (tip_error(CHAINS[name], x, p, {error: sign * step}) for sign in (1.0, -1.0))
@@ -75,14 +85,17 @@ def by_the_package(name: str, error: str, position: np.ndarray, probe: np.ndarra
 
 
 @cache
-def _by_the_package(name: str, error: str, position: tuple[float, ...], probe: tuple[float, ...]) -> np.ndarray:
+def _by_the_package(
+    name: str, error: str, position: tuple[float, ...], probe: tuple[float, ...]
+) -> np.ndarray:
     x, p = np.array([position]), np.array([probe])
     found = true_volumetric(described(name, {error: 1.0}, at=x[0]))
     return np.asarray((found.model.error(x, found.a, p) - p)[0])
 
 
 def described(name: str, errors: dict[str, float], at: np.ndarray) -> MachineDescription:
-    """A machine whose errors have the values `errors` where the axes stand at `at`, and are 0 at the reference point.
+    """A machine whose errors have the values `errors` where the axes stand at `at`, and are 0 at
+    the reference point.
 
     Straightness errors bend, so that no straight line can be taken off them.
     """
@@ -92,8 +105,12 @@ def described(name: str, errors: dict[str, float], at: np.ndarray) -> MachineDes
             t = at[AXES.index(error[3])] / 2.0
             curve = (0.0, 1.0, -1.0) if error[0] == "d" and error[1] != error[3] else (0.0, 1.0)
             scale = errors[error] / np.polynomial.polynomial.polyval(t, curve)
-            functions.append(ParametricError(iso(error), PowerSeries(tuple(scale * np.array(curve)))))
-    square = [Squareness(ISO[one][0], ISO[one][1] * errors[one]) for one in SQUARENESS if one in errors]
+            functions.append(
+                ParametricError(iso(error), PowerSeries(tuple(scale * np.array(curve))))
+            )
+    square = [
+        Squareness(ISO[one][0], ISO[one][1] * errors[one]) for one in SQUARENESS if one in errors
+    ]
     return MachineDescription(
         title=name,
         arrangement_name=name,
@@ -107,14 +124,22 @@ def described(name: str, errors: dict[str, float], at: np.ndarray) -> MachineDes
 
 
 def differences(
-    expressions: dict[str, str], errors: list[str], right: Callable[[str, str, np.ndarray, np.ndarray], float]
+    expressions: dict[str, str],
+    errors: list[str],
+    right: Callable[[str, str, np.ndarray, np.ndarray], float],
 ) -> set[tuple[str, str]]:
     """Expressions and errors whose printed coefficients are not the right ones at all positions."""
     found = set()
     for key, expression in expressions.items():
         for error in errors:
             for position, probe in zip(POSITIONS, PROBES, strict=True):
-                if abs(coefficient(expression, error, position, probe) - right(key, error, position, probe)) > 1e-9:
+                if (
+                    abs(
+                        coefficient(expression, error, position, probe)
+                        - right(key, error, position, probe)
+                    )
+                    > 1e-9
+                ):
                     found.add((key, error))
     return found
 
@@ -124,11 +149,15 @@ def listed(name: str, kind: str) -> dict[tuple[str, str], dict[str, str]]:
     return {(one["at"].split()[1], one["error"]): one for one in entries}
 
 
-def assert_right(entry: dict[str, str], key: str, value: Callable[[np.ndarray, np.ndarray], float]) -> None:
+def assert_right(
+    entry: dict[str, str], key: str, value: Callable[[np.ndarray, np.ndarray], float]
+) -> None:
     """What an entry says is right is what comes out, and what is printed is not."""
     for position, probe in zip(POSITIONS[:2], PROBES[:2], strict=True):
         found = value(position, probe)
-        assert found == pytest.approx(coefficient(f"{entry[key]} + 0 * a", "a", position, probe), abs=1e-7), entry
+        assert found == pytest.approx(
+            coefficient(f"{entry[key]} + 0 * a", "a", position, probe), abs=1e-7
+        ), entry
         other = entry.get("printed", entry.get("rule", ""))
         assert abs(found - coefficient(f"{other} + 0 * a", "a", position, probe)) > 1e-3, entry
 
@@ -147,14 +176,18 @@ def test_the_chain_formula_is_what_rigid_bodies_do(name: str) -> None:
     for error in [*FUNCTIONS, *SQUARENESS]:
         for position, probe in zip(POSITIONS[:2], PROBES[:2], strict=True):
             np.testing.assert_allclose(
-                by_the_package(name, error, position, probe), by_rigid_bodies(name, error, position, probe), atol=1e-8
+                by_the_package(name, error, position, probe),
+                by_rigid_bodies(name, error, position, probe),
+                atol=1e-8,
             )
 
 
 @machines
 def test_rigid_bodies_differ_from_the_formula_to_second_order(name: str) -> None:
     generator = np.random.default_rng(9)
-    errors = dict(zip([*FUNCTIONS, *SQUARENESS], generator.normal(0.0, 1e-5, 21).tolist(), strict=True))
+    errors = dict(
+        zip([*FUNCTIONS, *SQUARENESS], generator.normal(0.0, 1e-5, 21).tolist(), strict=True)
+    )
     position, probe = POSITIONS[0], PROBES[0]
     off = []
     for factor in (1.0, 10.0):
@@ -166,11 +199,17 @@ def test_rigid_bodies_differ_from_the_formula_to_second_order(name: str) -> None
     assert off[1] / off[0] == pytest.approx(100.0, rel=0.02)
 
 
-@pytest.mark.parametrize("entry", PRINTED["misprints"]["equations"], ids=lambda one: f"{one['at']} {one['error']}")
+@pytest.mark.parametrize(
+    "entry", PRINTED["misprints"]["equations"], ids=lambda one: f"{one['at']} {one['error']}"
+)
 def test_a_misprint_in_an_equation_is_none_of_rigid_bodies(entry: dict[str, str]) -> None:
     name, component = entry["at"].split()
     k = "XYZ".index(component)
-    assert_right(entry, "right", lambda position, probe: by_rigid_bodies(name, entry["error"], position, 0 * probe)[k])
+    assert_right(
+        entry,
+        "right",
+        lambda position, probe: by_rigid_bodies(name, entry["error"], position, 0 * probe)[k],
+    )
 
 
 @machines
@@ -192,13 +231,17 @@ def test_droop_is_as_printed(name: str) -> None:
         found = true_volumetric(MachineDescription(**{**vars(machine), "droop": {which: 3e-6}}))
         error = found.model.error(POSITIONS, found.a, np.zeros((4, 3)))
         for position, row in zip(POSITIONS, error, strict=True):
-            printed = [coefficient(PRINTED["equations"][name][c], which, position, position) for c in "XYZ"]
+            printed = [
+                coefficient(PRINTED["equations"][name][c], which, position, position) for c in "XYZ"
+            ]
             np.testing.assert_allclose(row, 3e-6 * np.array(printed), atol=1e-18)
 
 
 @pytest.mark.parametrize(("name", "arm", "about"), [("MH1", 0, 1), ("MH2", 1, 0)])
 def test_signs_of_a_sagging_arm(name: str, arm: int, about: int) -> None:
-    """Weight at the end of the arm turns the column, and bends the arm downwards, whichever way the arm points."""
+    """Weight at the end of the arm turns the column, and bends the arm downwards, whichever way the
+    arm points.
+    """
     out, height, stiffness = 0.8, 0.6, 1e-6
     weight = np.array([0.0, 0.0, -1.0])
     moment = np.cross(out * np.eye(3)[arm], weight)
@@ -206,19 +249,24 @@ def test_signs_of_a_sagging_arm(name: str, arm: int, about: int) -> None:
     shift = np.cross(stiffness * moment, height * np.eye(3)[2])
     position = np.zeros(3)
     position[arm], position[2] = out, height
-    tilt = coefficient(PRINTED["equations"][name]["XYZ"[arm]], "phi1", position, position) * stiffness
+    tilt = (
+        coefficient(PRINTED["equations"][name]["XYZ"[arm]], "phi1", position, position) * stiffness
+    )
     assert tilt == pytest.approx(shift[arm], rel=1e-12) and tilt > 0
     bend = coefficient(PRINTED["equations"][name]["Z"], "phi2", position, position)
     assert (bend < 0) == (name == "MH1")
 
 
 def seen(name: str, error: str, line: np.ndarray) -> np.ndarray:
-    """What a rotation adds (3,) on a line parallel to its axis, against the line through the reference point.
+    """What a rotation adds (3,) on a line parallel to its axis, against the line through the
+    reference point.
 
     `line` has the offsets of the line, and along the axis where it stands.
     """
     through = np.where(np.array(list(AXES)) == error[3], line, 0.0)
-    return by_rigid_bodies(name, error, line, np.zeros(3)) - by_rigid_bodies(name, error, through, np.zeros(3))
+    return by_rigid_bodies(name, error, line, np.zeros(3)) - by_rigid_bodies(
+        name, error, through, np.zeros(3)
+    )
 
 
 def displacement_rules(name: str) -> dict[str, str]:
@@ -244,17 +292,26 @@ def test_the_coupling_is_what_rigid_bodies_show(name: str) -> None:
             for position in POSITIONS:
                 measured = ParametricError(iso(key), line=tuple(position.tolist()))
                 found = coupling(described(name, {}, at=position), measured)[AXES.index(error[1])]
-                assert found == pytest.approx(seen(name, error, position)[AXES.index(key[1])], abs=1e-8)
+                assert found == pytest.approx(
+                    seen(name, error, position)[AXES.index(key[1])], abs=1e-8
+                )
 
 
-@pytest.mark.parametrize("entry", PRINTED["misprints"]["rules"], ids=lambda one: f"{one['at']} {one['error']}")
+@pytest.mark.parametrize(
+    "entry", PRINTED["misprints"]["rules"], ids=lambda one: f"{one['at']} {one['error']}"
+)
 def test_a_misprint_in_a_rule_is_not_what_is_seen(entry: dict[str, str]) -> None:
     name, key = entry["at"].split()
-    assert_right(entry, "right", lambda position, probe: -seen(name, entry["error"], position)[AXES.index(key[1])])
+    assert_right(
+        entry,
+        "right",
+        lambda position, probe: -seen(name, entry["error"], position)[AXES.index(key[1])],
+    )
 
 
 def slope(name: str, error: str, corner: np.ndarray, along: int, across: int) -> float:
-    """Slope between the ends of a line that begins at the reference position of `along` and ends at the corner.
+    """Slope between the ends of a line that begins at the reference position of `along` and ends at
+    the corner.
 
     Rotations grow from 0 at the reference point to 1 at the corner, so that Ex_x / xm is a slope.
     """
@@ -269,14 +326,16 @@ PLANES = {"a": (0, 1), "b1": (0, 2), "b2": (1, 2)}
 
 
 def angle(name: str, key: str, error: str, corner: np.ndarray) -> float:
-    """What a rotation adds to the slopes of both lines across one another: -alpha, where alpha is measured."""
+    """What a rotation adds to the slopes of both lines across one another: -alpha, where alpha is
+    measured.
+    """
     first, second = PLANES[key]
     return slope(name, error, corner, first, second) + slope(name, error, corner, second, first)
 
 
 def in_the_documents_way(name: str, key: str, error: str, corner: np.ndarray) -> float:
-    """What the printed rules count: for alpha the slope of the X line alone; for the others the slope of the Z line,
-    and of the other line only what the rule for its straightness takes off it.
+    """What the printed rules count: for alpha the slope of the X line alone; for the others the
+    slope of the Z line, and of the other line only what the rule for its straightness takes off it.
     """
     first, second = PLANES[key]
     if key == "a":
@@ -309,18 +368,32 @@ def test_what_the_angle_between_the_lines_has_besides(name: str) -> None:
     for key in squareness_rules(name):
         for error in ROTATIONS:
             for corner in POSITIONS:
-                if abs(angle(name, key, error, corner) - in_the_documents_way(name, key, error, corner)) > 1e-6:
+                if (
+                    abs(
+                        angle(name, key, error, corner)
+                        - in_the_documents_way(name, key, error, corner)
+                    )
+                    > 1e-6
+                ):
                     found.add((key, error))
     assert found == set(listed(name, "angle"))
 
 
-@pytest.mark.parametrize("entry", PRINTED["misprints"]["squareness"], ids=lambda one: f"{one['at']} {one['error']}")
+@pytest.mark.parametrize(
+    "entry", PRINTED["misprints"]["squareness"], ids=lambda one: f"{one['at']} {one['error']}"
+)
 def test_a_misprint_in_a_rule_for_squareness(entry: dict[str, str]) -> None:
     name, key = entry["at"].split()
-    assert_right(entry, "right", lambda corner, probe: in_the_documents_way(name, key, entry["error"], corner))
+    assert_right(
+        entry,
+        "right",
+        lambda corner, probe: in_the_documents_way(name, key, entry["error"], corner),
+    )
 
 
-@pytest.mark.parametrize("entry", PRINTED["misprints"]["angle"], ids=lambda one: f"{one['at']} {one['error']}")
+@pytest.mark.parametrize(
+    "entry", PRINTED["misprints"]["angle"], ids=lambda one: f"{one['at']} {one['error']}"
+)
 def test_a_term_that_rules_for_squareness_have_otherwise(entry: dict[str, str]) -> None:
     name, key = entry["at"].split()
     assert_right(entry, "angle", lambda corner, probe: angle(name, key, entry["error"], corner))
@@ -328,7 +401,9 @@ def test_a_term_that_rules_for_squareness_have_otherwise(entry: dict[str, str]) 
 
 @machines
 @pytest.mark.parametrize("key", SQUARENESS)
-def test_squareness_at_the_reference_point_is_the_angle_measured_less_the_tilts(name: str, key: str) -> None:
+def test_squareness_at_the_reference_point_is_the_angle_measured_less_the_tilts(
+    name: str, key: str
+) -> None:
     """An angle measured elsewhere on rigid bodies comes back as what was put in."""
     generator = np.random.default_rng(11)
     errors = dict(zip(ROTATIONS, generator.normal(0.0, 1e-5, 9).tolist(), strict=True))
@@ -342,12 +417,17 @@ def test_squareness_at_the_reference_point_is_the_angle_measured_less_the_tilts(
             end, start = at.copy(), at.copy()
             end[along], start[along] = 2.0, 0.0
             k = AXES.index(error[3])
-            shift = [by_rigid_bodies(name, error, x, np.zeros(3))[across] * value * x[k] / 2.0 for x in (end, start)]
+            shift = [
+                by_rigid_bodies(name, error, x, np.zeros(3))[across] * value * x[k] / 2.0
+                for x in (end, start)
+            ]
             measured -= (shift[0] - shift[1]) / 2.0
     machine = described(name, errors, at=corner)
     iso_name, sign = ISO[key]
     found = true_volumetric(
-        MachineDescription(**{**vars(machine), "squareness": (Squareness(iso_name, sign * measured, tuple(at)),)})
+        MachineDescription(
+            **{**vars(machine), "squareness": (Squareness(iso_name, sign * measured, tuple(at)),)}
+        )
     )
     value = found.a[[one.name for one in found.model.parameters].index(iso_name)]
     assert value == pytest.approx(sign * true, abs=1e-12)

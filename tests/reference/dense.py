@@ -1,12 +1,13 @@
 """A dense reference for the uncertainties U1 to U6: the definitions written out, and nothing else.
 
-The whole non-linear residual vector is one function of one parameter vector, its Jacobian is taken by
-complex steps, the covariance comes from one dense decomposition, and every uncertainty is the spread of a
-function of the parameters that is written down as it is defined. It is slow and takes memory in proportion
-to the square of the number of balls; no structure is made use of anywhere.
+The whole non-linear residual vector is one function of one parameter vector, its Jacobian is taken
+by complex steps, the covariance comes from one dense decomposition, and every uncertainty is the
+spread of a function of the parameters that is written down as it is defined. It is slow and takes
+memory in proportion to the square of the number of balls; no structure is made use of anywhere.
 
-Only plain arrays of a design are read. The error model is written anew: the x axis carries the y axis, which
-carries the z axis, which carries the probe (NPL Report CISE 15/98, section 2.2), right-handed rotations.
+Only plain arrays of a design are read. The error model is written anew: the x axis carries the y
+axis, which carries the z axis, which carries the probe (NPL Report CISE 15/98, section 2.2),
+right-handed rotations.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ FOLLOWS = 1e-12
 
 @dataclass(frozen=True)
 class Function:
-    """One of the 18 error functions: motion of `axis`, displacing along or turning about `component`."""
+    """One of the 18 error functions: motion of `axis`, displacing along or turning about
+    `component`.
+    """
 
     name: str
     axis: int
@@ -48,7 +51,9 @@ class Function:
 
 
 def error_functions(position_coefficients: int, rotation_coefficients: int) -> list[Function]:
-    """EXX, EYX, EZX, EXY, ... and then EAX, EBX, ...; coefficients count the constant, which is zero."""
+    """EXX, EYX, EZX, EXY, ... and then EAX, EBX, ...; coefficients count the constant, which is
+    zero.
+    """
     found = []
     for turns, letters, count in (
         (False, "XYZ", position_coefficients),
@@ -57,12 +62,16 @@ def error_functions(position_coefficients: int, rotation_coefficients: int) -> l
         for axis in range(3):
             for component in range(3):
                 name = "E" + letters[component] + "XYZ"[axis]
-                found.append(Function(name, axis, component, turns, count, name in ("EYX", "EZX", "EZY")))
+                found.append(
+                    Function(name, axis, component, turns, count, name in ("EYX", "EZX", "EZY"))
+                )
     return found
 
 
 def legendre(t: Values, count: int) -> Values:
-    """Legendre polynomials of 2t - 1 of degrees 0 to count - 1 at t (m,), by their recurrence: (m, count)."""
+    """Legendre polynomials of 2t - 1 of degrees 0 to count - 1 at t (m,), by their recurrence: (m,
+    count).
+    """
     s = 2.0 * t - 1.0
     columns = [np.ones_like(s), s]
     for k in range(1, count - 1):
@@ -72,7 +81,9 @@ def legendre(t: Values, count: int) -> Values:
 
 @cache
 def monomial_matrix(function: Function) -> Real:
-    """From the basis, t P_k(2t - 1) or t (1 - t) P_k(2t - 1), to coefficients of t, t^2, ...: exact."""
+    """From the basis, t P_k(2t - 1) or t (1 - t) P_k(2t - 1), to coefficients of t, t^2, ...:
+    exact.
+    """
     matrix = np.zeros((function.coefficients - 1, function.free))
     for k in range(function.free):
         for power in range(k + 1):
@@ -83,7 +94,9 @@ def monomial_matrix(function: Function) -> Real:
     return matrix
 
 
-def machine_error(functions: list[Function], lower: Real, upper: Real, x: Values, a: Values, p: Real) -> Values:
+def machine_error(
+    functions: list[Function], lower: Real, upper: Real, x: Values, a: Values, p: Real
+) -> Values:
     """e(x, a, p) at scale readings x (m, 3) with probe offsets p (m, 3)."""
     t = (x - lower) / (upper - lower)
     shift = np.zeros((len(x), 3, 3), np.result_type(x, a))
@@ -110,7 +123,9 @@ def machine_error(functions: list[Function], lower: Real, upper: Real, x: Values
 
 
 def turned(vectors: Values, matrices: Real) -> Values:
-    """`matrices` (k, 3, 3) followed by rotations about `vectors` (k, 3) by their lengths, which are short."""
+    """`matrices` (k, 3, 3) followed by rotations about `vectors` (k, 3) by their lengths, which are
+    short.
+    """
     x, y, z = vectors.T
     zero = np.zeros_like(x)
     cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
@@ -124,10 +139,12 @@ def turned(vectors: Values, matrices: Real) -> Values:
 
 @dataclass(frozen=True)
 class Problem:
-    """A design with the numbers of coefficients of its error model, and the point it is linearised at.
+    """A design with the numbers of coefficients of its error model, and the point it is linearised
+    at.
 
-    `scales` (readings, 3) are the scale readings, `rotations` and `origins` the poses at a zero parameter
-    vector, `balls` (n, 3) and `a` the values there; for planning these are the design's own and zero.
+    `scales` (readings, 3) are the scale readings, `rotations` and `origins` the poses at a zero
+    parameter vector, `balls` (n, 3) and `a` the values there; for planning these are the design's
+    own and zero.
     """
 
     design: Any
@@ -147,12 +164,16 @@ class Problem:
     def free_poses(self) -> list[tuple[int, int]]:
         """Position and place among (origin, rotation vector) of every free pose parameter."""
         design = self.design
-        plates = [k for k in range(len(design.origins)) if design.is_plate[design.position_artefact[k]]]
+        plates = [
+            k for k in range(len(design.origins)) if design.is_plate[design.position_artefact[k]]
+        ]
         return [(k, j) for k in plates for j in range(6) if not design.held[k, j]]
 
     @cached_property
     def length_root(self) -> Real:
-        """A root (r, m) of the pseudo-inverse of the lengths' covariance: what follows from others tells nothing."""
+        """A root (r, m) of the pseudo-inverse of the lengths' covariance: what follows from others
+        tells nothing.
+        """
         values, vectors = np.linalg.eigh(length_covariance(self.design))
         kept = values > FOLLOWS * values[-1]
         return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
@@ -184,7 +205,9 @@ def planned(design: Any, position_coefficients: int, rotation_coefficients: int)
 
 
 def unpack(problem: Problem, step: Values) -> tuple[Values, Values, Values, Values]:
-    """Balls, rotations, origins and coefficients after a step of all parameters from the problem's point."""
+    """Balls, rotations, origins and coefficients after a step of all parameters from the problem's
+    point.
+    """
     n = len(problem.plate_balls)
     balls = problem.balls.astype(step.dtype)
     balls[problem.plate_balls] += step[: 3 * n].reshape(n, 3)
@@ -192,7 +215,12 @@ def unpack(problem: Problem, step: Values) -> tuple[Values, Values, Values, Valu
     for (k, j), value in zip(problem.free_poses, step[3 * n :], strict=False):
         poses[k, j] = value
     rotations = turned(poses[:, 3:], problem.rotations)
-    return balls, rotations, problem.origins + poses[:, :3], problem.a + step[len(step) - len(problem.a) :]
+    return (
+        balls,
+        rotations,
+        problem.origins + poses[:, :3],
+        problem.a + step[len(step) - len(problem.a) :],
+    )
 
 
 def corrected(problem: Problem, x: Real, a: Values, p: Real) -> Values:
@@ -240,7 +268,8 @@ def length_errors(problem: Problem, points: Values) -> Values:
 
 
 def length_covariance(design: Any) -> Real:
-    """Covariance of the lengths of standards: a reading's noise is in each of its lengths, a certificate's error, too.
+    """Covariance of the lengths of standards: a reading's noise is in each of its lengths, a
+    certificate's error, too.
 
     A length whose repeatability is ignored has nothing in common with any other.
     """
@@ -252,7 +281,9 @@ def length_covariance(design: Any) -> Real:
             continue
         for sign, end in ((1.0, given.first[i]), (-1.0, given.second[i])):
             own = design.readings.uncertainty
-            u = (design.repeatability if own is None else own[end]) / np.sqrt(design.readings.repeats[end])
+            u = (design.repeatability if own is None else own[end]) / np.sqrt(
+                design.readings.repeats[end]
+            )
             noise[i, d * end : d * end + d] += sign * given.direction[i] * u
     covariance = noise @ noise.T
     same = given.certificate[:, None] == given.certificate
@@ -260,7 +291,9 @@ def length_covariance(design: Any) -> Real:
 
 
 def jacobian(function: Callable[[Values], Values], parameters: int) -> Real:
-    """Derivative (m, parameters) of a function of a step, at zero, by complex steps: exact to rounding."""
+    """Derivative (m, parameters) of a function of a step, at zero, by complex steps: exact to
+    rounding.
+    """
     columns = []
     for k in range(parameters):
         step = np.zeros(parameters, complex)
@@ -271,7 +304,8 @@ def jacobian(function: Callable[[Values], Values], parameters: int) -> Real:
 
 @dataclass(frozen=True)
 class Spread:
-    """Square root (parameters, rank) of the covariance, and the undetermined directions (parameters, nulls).
+    """Square root (parameters, rank) of the covariance, and the undetermined directions
+    (parameters, nulls).
 
     Singular values are those of the Jacobian with its columns scaled to unit length.
     """
@@ -290,7 +324,9 @@ class Spread:
         return self.root @ self.root.T
 
     def of(self, linear: Real) -> Real:
-        """Standard uncertainties (m,) of linear functions (m, parameters); NaN where undetermined."""
+        """Standard uncertainties (m,) of linear functions (m, parameters); NaN where
+        undetermined.
+        """
         values = np.sqrt(((linear @ self.root) ** 2).sum(axis=1))
         change = np.sqrt(((linear @ self.null) ** 2).sum(axis=1))
         size = np.sqrt(((linear * self.scale) ** 2).sum(axis=1))
@@ -316,7 +352,8 @@ def pairs_of(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def quantities(problem: Problem) -> dict[str, Callable[[Values], Values]]:
-    """What U1 to U6 are the standard uncertainties of, each as a function of a step of all parameters.
+    """What U1 to U6 are the standard uncertainties of, each as a function of a step of all
+    parameters.
 
     U5 holds the pairs of the first plate, then those of the second, and so on.
     """
@@ -379,12 +416,15 @@ def standard_uncertainties(problem: Problem, found: Spread | None = None) -> dic
     """Every single standard uncertainty behind U1 to U6."""
     found = found or linearised(problem)
     return {
-        symbol: found.of(jacobian(function, problem.parameters)) for symbol, function in quantities(problem).items()
+        symbol: found.of(jacobian(function, problem.parameters))
+        for symbol, function in quantities(problem).items()
     }
 
 
 def least_squares_step(problem: Problem) -> tuple[Real, float]:
-    """The Gauss-Newton step of all parameters from the problem's point, and the sum of squares there."""
+    """The Gauss-Newton step of all parameters from the problem's point, and the sum of squares
+    there.
+    """
     zero = np.zeros(problem.parameters)
     now = residuals(problem, zero)
     whole = jacobian(lambda step: residuals(problem, step), problem.parameters)

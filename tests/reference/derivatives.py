@@ -21,7 +21,9 @@ def complex_step(function: Callable[[Real], Real], at: Real) -> Real:
 
 
 def central_difference(function: Callable[[Real], Real], at: Real, step: float) -> Real:
-    """Derivative (..., n) by Richardson's extrapolation of central differences, for what cannot be complex."""
+    """Derivative (..., n) by Richardson's extrapolation of central differences, for what cannot be
+    complex.
+    """
 
     def plain(h: float) -> Real:
         columns = []
@@ -35,7 +37,9 @@ def central_difference(function: Callable[[Real], Real], at: Real, step: float) 
 
 
 def assert_derivative(found: Real, expected: Real, relative: float) -> None:
-    """Fail where `found` differs from `expected` by more than `relative` times the largest element."""
+    """Fail where `found` differs from `expected` by more than `relative` times the largest
+    element.
+    """
     assert found.shape == expected.shape
     size = float(np.abs(expected).max(initial=0.0))
     assert size > 0.0, "a derivative that is zero everywhere tests nothing"

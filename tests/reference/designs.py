@@ -1,4 +1,6 @@
-"""Designs of NPL Report CISE 15/98 put together by hand, for tests and benchmarks of the estimator alone."""
+"""Designs of NPL Report CISE 15/98 put together by hand, for tests and benchmarks of the estimator
+alone.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ TIPS = {
     "+y": (0.0, 0.05, 0.0),
     "-y": (0.0, -0.05, 0.0),
 }
-# Which machine axes the first and the second axis of a plate lie along, in planes of constant x, y and z.
+# Which machine axes the first and the second axis of a plate lie along, in planes of constant x, y
+# and z.
 PLANE_AXES = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
 PLANE_TIPS = {"x": ("+x", "-x"), "y": ("+y", "-y"), "z": ("down",)}
 SIDE = 0.75
@@ -68,10 +71,13 @@ def neighbours(balls: Real) -> list[tuple[int, int]]:
     return [(int(i), int(j)) for i, j in zip(first, second, strict=True)]
 
 
-def placed(plane: str, level: float, corner: tuple[float, float], turns: int, side: float = SIDE) -> Placed:
+def placed(
+    plane: str, level: float, corner: tuple[float, float], turns: int, side: float = SIDE
+) -> Placed:
     """A plate in a plane of constant x, y or z, in quarter turns about its centre.
 
-    `corner` is the lowest corner of the area it covers, in the order of the other two machine axes (x, y, z).
+    `corner` is the lowest corner of the area it covers, in the order of the other two machine axes
+    (x, y, z).
     """
     first, second = PLANE_AXES[plane]
     third = 3 - first - second
@@ -87,7 +93,9 @@ def placed(plane: str, level: float, corner: tuple[float, float], turns: int, si
 
 
 def six_positions(side: float = SIDE) -> list[Placed]:
-    """Experiment 6.2.1: two positions in each of the planes z, x, y, each turned against the other."""
+    """Experiment 6.2.1: two positions in each of the planes z, x, y, each turned against the
+    other.
+    """
     low, high = (0.0, 0.0), (1.0 - side, 1.0 - side)
     turns = {"z": (0, 1), "x": (1, 0), "y": (0, 1)}
     return [
@@ -119,7 +127,8 @@ def plate_design(
     lower: tuple[float, float, float] = (0.0, 0.0, 0.0),
     upper: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> Design:
-    """One plate read in all positions, with calibrated distances `sides` or co-ordinates of the balls listed.
+    """One plate read in all positions, with calibrated distances `sides` or co-ordinates of the
+    balls listed.
 
     Without calibrated co-ordinates the first pose is held.
     """
@@ -136,7 +145,9 @@ def plate_design(
     certified = np.repeat(np.array(list(coordinates), np.int64), 3)
     axis = np.tile(np.arange(3), len(coordinates))
     return Design(
-        model=kinematic_model(ARRANGEMENTS["MB2"], position_coefficients, rotation_coefficients, lower, upper),
+        model=kinematic_model(
+            ARRANGEMENTS["MB2"], position_coefficients, rotation_coefficients, lower, upper
+        ),
         lower=np.array(lower),
         upper=np.array(upper),
         repeatability=np.array(repeatability),
@@ -160,7 +171,9 @@ def plate_design(
             np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
             np.full(len(first), SIGMA),
         ),
-        coordinates=Coordinates(certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)),
+        coordinates=Coordinates(
+            certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
+        ),
         lengths=no_lengths(),
     )
 
@@ -168,11 +181,17 @@ def plate_design(
 def no_lengths() -> Lengths:
     """A design's lengths where it has no length standard."""
     none, empty = np.zeros(0, np.int64), np.zeros(0)
-    return Lengths(none, none, empty, empty, none.astype(bool), np.zeros((0, 3)), none.astype(bool), none)
+    return Lengths(
+        none, none, empty, empty, none.astype(bool), np.zeros((0, 3)), none.astype(bool), none
+    )
 
 
 def grid_experiment(n: int, points: int = 200, position_coefficients: int = 5) -> Design:
-    """Experiment 6.2.1 on an n x n grid, its four sides calibrated, with random evaluation points."""
+    """Experiment 6.2.1 on an n x n grid, its four sides calibrated, with random evaluation
+    points.
+    """
     balls = grid(n)
-    design = plate_design(balls, six_positions(), corner_sides(balls), position_coefficients=position_coefficients)
+    design = plate_design(
+        balls, six_positions(), corner_sides(balls), position_coefficients=position_coefficients
+    )
     return replace(design, points=np.random.default_rng(1).random((points, 3)))

@@ -1,4 +1,6 @@
-"""Experiments drawn at random, most of them deficient, as they might be written without knowing what is needed."""
+"""Experiments drawn at random, most of them deficient, as they might be written without knowing
+what is needed.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,14 @@ ARRANGEMENTS = ["MB1", "MB2", "FB1", "FB2", "FH1", "FH2", "MH1", "MH2", "CX1", "
 
 
 def random_text(seed: int) -> str:
-    """An experiment file: one or two plates, a bar or none, one to four positions, some certificate or none."""
+    """An experiment file: one or two plates, a bar or none, one to four positions, some certificate
+    or none.
+    """
     draw = np.random.default_rng(seed)
     rows, columns = draw.integers(2, 5, 2).tolist()
-    artefacts: dict[str, Any] = {"plate": {"kind": "grid", "balls": [rows, columns], "size": ["400 mm", "500 mm"]}}
+    artefacts: dict[str, Any] = {
+        "plate": {"kind": "grid", "balls": [rows, columns], "size": ["400 mm", "500 mm"]}
+    }
     if draw.random() < 0.3:
         artefacts["second"] = {"kind": "grid", "balls": [2, 3], "size": ["300 mm", "400 mm"]}
     positions = [_position(draw, k, "plate") for k in range(int(draw.integers(1, 5)))]
@@ -39,14 +45,21 @@ def random_text(seed: int) -> str:
     kind = draw.choice(["none", "sides", "all", "some"])
     uncertainty = str(draw.choice(["1 nm", "0.2 um", "1 um", "20 um"]))
     if kind == "sides":
-        calibration.append(_item("plate", "distances", pairs="corner sides", standard_uncertainty=uncertainty))
+        calibration.append(
+            _item("plate", "distances", pairs="corner sides", standard_uncertainty=uncertainty)
+        )
     elif kind in ("all", "some"):
         balls = "all" if kind == "all" else ["r1c1", "r1c2", "r2c1"]
-        calibration.append(_item("plate", "coordinates", balls=balls, standard_uncertainty=uncertainty))
+        calibration.append(
+            _item("plate", "coordinates", balls=balls, standard_uncertainty=uncertainty)
+        )
     if "bar" in artefacts and draw.random() < 0.7:
         calibration.append(_item("bar", "distances", pairs="all", standard_uncertainty="0.3 um"))
     if draw.random() < 0.15:
-        model: dict[str, Any] = {"kind": "empirical", "terms": str(draw.choice(["sums", "quadratic"]))}
+        model: dict[str, Any] = {
+            "kind": "empirical",
+            "terms": str(draw.choice(["sums", "quadratic"])),
+        }
     else:
         counts = draw.integers(2, 5, 2).tolist()
         model = {"kind": "kinematic", "arrangement": str(draw.choice(ARRANGEMENTS))}
@@ -59,7 +72,12 @@ def random_text(seed: int) -> str:
             "repeatability": str(draw.choice(["3 nm", "0.2 um", "2 um"])),
         },
         "error_model": model,
-        "true_machine": {"kind": "random", "position": "2 um", "rotation": "4 urad", "seed": int(seed)},
+        "true_machine": {
+            "kind": "random",
+            "position": "2 um",
+            "rotation": "4 urad",
+            "seed": int(seed),
+        },
         "probes": PROBES,
         "artefacts": artefacts,
         "positions": positions,

@@ -1,4 +1,6 @@
-"""Experiments with a plate of unknown shape and a length standard whose balls several lengths share."""
+"""Experiments with a plate of unknown shape and a length standard whose balls several lengths
+share.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,10 @@ from ballplate.simulator.experiment.model import Experiment
 
 PLATE: dict[str, Any] = {
     "title": "a plate and a length standard",
-    "machine": {"volume": ["600 mm", "500 mm", "500 mm"], "repeatability": ["1 um", "0.7 um", "1.3 um"]},
+    "machine": {
+        "volume": ["600 mm", "500 mm", "500 mm"],
+        "repeatability": ["1 um", "0.7 um", "1.3 um"],
+    },
     "error_model": {
         "kind": "kinematic",
         "arrangement": "MB2",
@@ -26,7 +31,13 @@ PLATE: dict[str, Any] = {
     "evaluation": {"points": {"random": 8, "seed": 1}, "probe": "down"},
 }
 PLATE_POSITIONS: list[dict[str, Any]] = [
-    {"name": "low", "plane": "z", "level": "50 mm", "corner": {"x": "0 mm", "y": "0 mm"}, "probes": ["down"]},
+    {
+        "name": "low",
+        "plane": "z",
+        "level": "50 mm",
+        "corner": {"x": "0 mm", "y": "0 mm"},
+        "probes": ["down"],
+    },
     {
         "name": "high",
         "plane": "z",
@@ -62,8 +73,13 @@ PLATE_POSITIONS: list[dict[str, Any]] = [
 
 def bar(balls: int, unequal: bool = True) -> dict[str, Any]:
     """Balls on one line, at distances that differ unless they are two."""
-    places = [round(300.0 * (k / (balls - 1)) ** (1.3 if unequal else 1.0), 3) for k in range(balls)]
-    return {"kind": "balls", "coordinates": {f"b{k}": [f"{x} mm", "0 mm", "0 mm"] for k, x in enumerate(places)}}
+    places = [
+        round(300.0 * (k / (balls - 1)) ** (1.3 if unequal else 1.0), 3) for k in range(balls)
+    ]
+    return {
+        "kind": "balls",
+        "coordinates": {f"b{k}": [f"{x} mm", "0 mm", "0 mm"] for k, x in enumerate(places)},
+    }
 
 
 def flat(balls: int) -> dict[str, Any]:
@@ -96,7 +112,9 @@ def experiment(
     places: list[dict[str, Any]] | None = None,
     **sections: Any,
 ) -> Experiment:
-    """The plate beside a standard in several poses; `places` (at most as many as `POSES`) add to its positions."""
+    """The plate beside a standard in several poses; `places` (at most as many as `POSES`) add to
+    its positions.
+    """
     given = [calibration] if isinstance(calibration, dict) else calibration
     every = places if places is not None else [{"probes": ["down"]}] * len(POSES)
     content = PLATE | {

@@ -1,4 +1,6 @@
-"""NISTIR 6517 as it stands: truncated powers, pseudo-inverses by singular values, pieces by recursion."""
+"""NISTIR 6517 as it stands: truncated powers, pseudo-inverses by singular values, pieces by
+recursion.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ Array = np.ndarray
 
 
 def powers(x: Array, knots: Array, derivative: int = 0) -> Array:
-    """1, x, x^2, x^3 and (x - t)+^3 for each knot, or their first derivatives, equations (2), (9), (13)."""
+    """1, x, x^2, x^3 and (x - t)+^3 for each knot, or their first derivatives, equations (2), (9),
+    (13).
+    """
     x = np.asarray(x, dtype=float)[:, None]
     beyond = np.where(x > knots, x - knots, 0.0)
     if derivative:
@@ -16,8 +20,12 @@ def powers(x: Array, knots: Array, derivative: int = 0) -> Array:
     return np.hstack([np.ones_like(x), x, x**2, x**3, beyond**3])
 
 
-def constrained(x: Array, y: Array, knots: Array, rows: Array, values: Array, tolerance: float) -> Array:
-    """c = B+ f + (A Z)+ (y - A B+ f), Z = I - B+ B, equations (25) and (26); singular values below are zero, (22)."""
+def constrained(
+    x: Array, y: Array, knots: Array, rows: Array, values: Array, tolerance: float
+) -> Array:
+    """c = B+ f + (A Z)+ (y - A B+ f), Z = I - B+ B, equations (25) and (26); singular values below
+    are zero, (22).
+    """
     a = powers(x, knots)
     inverse = np.linalg.pinv(rows, rcond=tolerance)
     z = np.eye(a.shape[1]) - inverse @ rows

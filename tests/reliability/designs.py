@@ -31,10 +31,17 @@ calibration:
 evaluation: {points: {random: 12, seed: 1}, probe: down}
 """
 
-# The same with a bar that is read three times, of which the certificate is one, and a probe that is estimated.
+# The same with a bar that is read three times, of which the certificate is one, and a probe that is
+# estimated.
 MIXED = (
-    PLATE.replace("left: [-50 mm, 0 mm, 0 mm]", "left: {offset: [-50 mm, 0 mm, 0 mm], standard_uncertainty: 0.5 um}")
-    .replace("positions:", "  bar: {kind: two_spheres, length: 500 mm, role: length_standard}\npositions:")
+    PLATE.replace(
+        "left: [-50 mm, 0 mm, 0 mm]",
+        "left: {offset: [-50 mm, 0 mm, 0 mm], standard_uncertainty: 0.5 um}",
+    )
+    .replace(
+        "positions:",
+        "  bar: {kind: two_spheres, length: 500 mm, role: length_standard}\npositions:",
+    )
     .replace("plane: ", "artefact: plate, plane: ")
     .replace(
         "calibration:",

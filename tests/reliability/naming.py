@@ -1,6 +1,8 @@
-"""How often a fit names the right cause: data sets with one mistake or one model error each, and a table of them.
+"""How often a fit names the right cause: data sets with one mistake or one model error each, and a
+table of them.
 
-Run as `python -m tests.reliability.naming` it prints a table; docs/how-to/reliability.md has it of fewer data sets.
+Run as `python -m tests.reliability.naming` it prints a table; docs/how-to/reliability.md has it of
+fewer data sets.
 """
 
 from __future__ import annotations
@@ -37,7 +39,9 @@ LOWER, UPPER = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True)
 class DataSet:
-    """What has been measured, and the true cause: a kind, what it is about, the first reading after a slip."""
+    """What has been measured, and the true cause: a kind, what it is about, the first reading after
+    a slip.
+    """
 
     design: Design
     readings: Readings
@@ -69,9 +73,13 @@ class World:
         return DataSet(certificate, readings, x, Cause("", ()))
 
     def detectable(self, change: Real) -> float:
-        """Size of a bias of which a unit changes scale readings by `change` (m, d), such as is found so often."""
+        """Size of a bias of which a unit changes scale readings by `change` (m, d), such as is
+        found so often.
+        """
         rows = (change / self.design.repeatability).ravel()
-        return self._detectable(np.concatenate([rows, np.zeros(len(self.search.left.residual) - len(rows))]))
+        return self._detectable(
+            np.concatenate([rows, np.zeros(len(self.search.left.residual) - len(rows))])
+        )
 
     def _detectable(self, rows: Real) -> float:
         left = self.search.start.of(rows[:, None])[:, 0]
@@ -79,14 +87,18 @@ class World:
 
     def of_certificate(self, distance: int) -> float:
         rows = np.zeros(len(self.search.left.residual))
-        rows[-len(self.design.distances) + distance] = 1.0 / self.design.distances.uncertainty[distance]
+        rows[-len(self.design.distances) + distance] = (
+            1.0 / self.design.distances.uncertainty[distance]
+        )
         return self._detectable(rows)
 
 
 Draw = Callable[[World, DataSet, Generator], DataSet]
 
 
-def biased(world: World, data: DataSet, change: Real, found: Cause, generator: Generator) -> DataSet:
+def biased(
+    world: World, data: DataSet, change: Real, found: Cause, generator: Generator
+) -> DataSet:
     size = world.detectable(change) * generator.choice([-1.0, 1.0])
     return replace(data, x=data.x + size * change, cause=found)
 
@@ -106,7 +118,10 @@ def a_reading(world: World, data: DataSet, generator: Generator) -> DataSet:
 def swapped_ball(world: World, data: DataSet, generator: Generator) -> DataSet:
     """From one position on another ball is in its place, somewhere else on the plate."""
     readings = data.readings
-    k, ball = int(generator.integers(1, len(world.design.position_names))), int(generator.integers(25))
+    k, ball = (
+        int(generator.integers(1, len(world.design.position_names))),
+        int(generator.integers(25)),
+    )
     later = (readings.ball == ball) & (readings.position >= k)
     change = np.zeros_like(data.x)
     change[later] = (world.design.rotations @ direction(generator))[readings.position[later]]
@@ -133,7 +148,9 @@ def slip(where: str) -> Draw:
         arm = places - places[rows].mean(axis=0)
         moved = np.zeros(len(data.x), bool)
         moved[rows[start:]] = True
-        turning = 2.0 * np.cross(direction(generator), arm) if generator.random() < 0.5 else np.zeros(3)
+        turning = (
+            2.0 * np.cross(direction(generator), arm) if generator.random() < 0.5 else np.zeros(3)
+        )
         change = moved[:, None] * (direction(generator) + turning)
         return biased(world, data, change, Cause("slip", (k,), int(rows[start])), generator)
 
@@ -182,14 +199,18 @@ def share(generator: Generator) -> float:
 
 def random_settings(generator: Generator, position: float, rotation: float) -> RandomSettings:
     seed = int(generator.integers(2**31))
-    return RandomSettings(kind="random", position=f"{position} m", rotation=f"{rotation} rad", seed=seed)
+    return RandomSettings(
+        kind="random", position=f"{position} m", rotation=f"{rotation} rad", seed=seed
+    )
 
 
 def wave(world: World, data: DataSet, generator: Generator) -> DataSet:
     """A scale that is wrong by a sine."""
     axis, length = int(generator.integers(3)), float(generator.uniform(0.05, 0.6))
     x = data.x.copy()
-    x[:, axis] += 1e-6 * share(generator) * np.sin(2.0 * np.pi * (x[:, axis] / length + generator.random()))
+    x[:, axis] += (
+        1e-6 * share(generator) * np.sin(2.0 * np.pi * (x[:, axis] / length + generator.random()))
+    )
     return replace(data, x=x)
 
 
@@ -224,7 +245,9 @@ def other_arrangement(world: World, generator: Generator) -> TrueMachine:
 
 
 def tilted_axes(world: World, data: DataSet, generator: Generator) -> DataSet:
-    """A machine that tilts with all that it carries, as one of its axes moves, by up to 10 urad at its end."""
+    """A machine that tilts with all that it carries, as one of its axes moves, by up to 10 urad at
+    its end.
+    """
     along, about = int(generator.integers(3)), int(generator.integers(3))
     angle = 10e-6 * share(generator) * data.x[:, along]
     turn = np.cross(np.eye(3)[about], data.x + world.design.probes[data.readings.probe])
@@ -266,7 +289,8 @@ OUTCOMES = ("right", "model", "nothing", "wrong")
 
 
 def outcome(data: DataSet, found: Diagnosis) -> str:
-    """What a diagnosis is worth: every cause that is told must be the true one, or cannot be told from it.
+    """What a diagnosis is worth: every cause that is told must be the true one, or cannot be told
+    from it.
 
     A slip must have come in the range that is told.
     """
@@ -275,15 +299,22 @@ def outcome(data: DataSet, found: Diagnosis) -> str:
     if not found:
         return "nothing"
     if not data.cause.kind:
-        of_model = found.suspects and not found.scatter and all(one.of_model for one in found.suspects)
+        of_model = (
+            found.suspects and not found.scatter and all(one.of_model for one in found.suspects)
+        )
         return "model" if of_model else "wrong"
     expanded: set[int] = set()
     for one in found.suspects:
-        told = [cause(one.patterns, np.array(columns)) for columns in (one.columns, *one.alternatives)]
+        told = [
+            cause(one.patterns, np.array(columns)) for columns in (one.columns, *one.alternatives)
+        ]
         if told[0].kind == data.cause.kind == "expansion":
             expanded |= set(told[0].subjects)
         elif told[0].kind == data.cause.kind == "slip":
-            if told[0].subjects != data.cause.subjects or not one.first <= data.cause.start <= one.last:
+            if (
+                told[0].subjects != data.cause.subjects
+                or not one.first <= data.cause.start <= one.last
+            ):
                 return "wrong"
         elif data.cause not in told:
             return "wrong"
@@ -297,7 +328,9 @@ def draw_one(world: World, make: Draw, seed: int) -> tuple[DataSet, Diagnosis]:
     data = make(world, world.drawn(world.machine(seed), generator), generator)
     observed = observe(data.design, data.readings, data.x)
     solution = estimate(observed.design, observed.x)
-    return data, diagnosis(linearised_fit(observed.design, solution), observed.x, world.freedom, True)
+    return data, diagnosis(
+        linearised_fit(observed.design, solution), observed.x, world.freedom, True
+    )
 
 
 def counts(world: World, kind: str, sets: int) -> Counter[str]:
@@ -317,10 +350,16 @@ def row(kind: str, found: Counter[str]) -> str:
 def main(arguments: Iterable[str] | None = None) -> None:
     parser = ArgumentParser()
     parser.add_argument("--sets", type=int, default=300, help="data sets of each kind")
-    parser.add_argument("--times", type=float, default=2.0, help="mistakes, in sizes that a fit finds with 80 %%")
+    parser.add_argument(
+        "--times", type=float, default=2.0, help="mistakes, in sizes that a fit finds with 80 %%"
+    )
     options = parser.parse_args(arguments)
     world = World(times=options.times)
-    print("| in the readings | right cause | the model | nothing | wrong cause |", "|---|---|---|---|---|", sep="\n")
+    print(
+        "| in the readings | right cause | the model | nothing | wrong cause |",
+        "|---|---|---|---|---|",
+        sep="\n",
+    )
     for kind in ("nothing wrong", *MODEL_ERRORS, *MISTAKES):
         print(row(kind, counts(world, kind, options.sets)), flush=True)
 

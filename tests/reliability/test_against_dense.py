@@ -1,4 +1,6 @@
-"""Redundancy, information, effects and patterns against explicit matrices, re-estimation and finite differences."""
+"""Redundancy, information, effects and patterns against explicit matrices, re-estimation and finite
+differences.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,11 @@ def quickstart() -> Design:
 
 def two_open_directions() -> Design:
     """Experiment 6.1.1 B, of rank deficiency 2, with 5 x 5 balls."""
-    text = Path("designs/npl/6.1.1.yaml").read_text(encoding="utf-8").replace("balls: [7, 7]", "balls: [5, 5]")
+    text = (
+        Path("designs/npl/6.1.1.yaml")
+        .read_text(encoding="utf-8")
+        .replace("balls: [7, 7]", "balls: [5, 5]")
+    )
     return lay_out(next(one for one in _loaded(text) if one.name == "B"))
 
 
@@ -64,7 +70,9 @@ def numeric(function: Callable[[Real], Real], count: int, scale: Real, step: flo
 
 
 def dense_jacobian(design: Design) -> Real:
-    """Derivative of all whitened residuals by balls and shared parameters, by central differences."""
+    """Derivative of all whitened residuals by balls and shared parameters, by central
+    differences.
+    """
     layout, state = shared_layout(design), nominal_state(design)
     x = expected_readings(design, state, design.readings)
     balls, s = design.plate_balls, len(layout)
@@ -73,7 +81,14 @@ def dense_jacobian(design: Design) -> Real:
         shift = np.zeros_like(design.balls)
         shift[balls] = step[s:].reshape(-1, design.dimension)
         there = moved(
-            design, state, layout.pose_columns, step[:s], shift, layout.model, layout.offset_columns, layout.lengths
+            design,
+            state,
+            layout.pose_columns,
+            step[:s],
+            shift,
+            layout.model,
+            layout.offset_columns,
+            layout.lengths,
         )
         return whitened_residuals(design, layout, there, x)
 
@@ -100,7 +115,9 @@ def check(result: Reliability, basis: Real, rows: NDArray[np.int64], tolerance: 
     square = (pattern**2).sum(axis=0)
     nil = result.information == 0.0
     assert (left[nil] <= 1e-8 * square[nil]).all()
-    np.testing.assert_allclose(result.information[~nil] / square[~nil], left[~nil] / square[~nil], atol=tolerance)
+    np.testing.assert_allclose(
+        result.information[~nil] / square[~nil], left[~nil] / square[~nil], atol=tolerance
+    )
     total = result.redundancy.sum() + result.among_repeats
     np.testing.assert_allclose(total, result.degrees_of_freedom, rtol=1e-9)
 
@@ -114,7 +131,15 @@ def test_small_designs_against_a_hat_matrix_by_differences(name: str, tmp_path: 
     check(result, orthonormal(jacobian, result.deficiency), np.arange(len(jacobian)), 1e-6)
     if name == "mixed":
         kinds = set(result.patterns.kind.tolist())
-        assert {"length", "prior", "coordinate", "distance", "ball", "length value", "scale"} <= kinds
+        assert {
+            "length",
+            "prior",
+            "coordinate",
+            "distance",
+            "ball",
+            "length value",
+            "scale",
+        } <= kinds
 
 
 @pytest.mark.parametrize("make", [quickstart, two_open_directions, certified_coordinates])
@@ -135,7 +160,9 @@ def test_plates_against_complex_steps(make: Callable[[], Design]) -> None:
 
 
 def test_repeats_and_lengths_that_share_a_certificate() -> None:
-    """Each repeat is a row of its own, and lengths are whitened otherwise, in the dense reference."""
+    """Each repeat is a row of its own, and lengths are whitened otherwise, in the dense
+    reference.
+    """
     design = shared_certificate()
     result = reliability_of(design)
     problem = dense.planned(design, 5, 5)
@@ -148,7 +175,9 @@ def test_repeats_and_lengths_that_share_a_certificate() -> None:
     of_means = np.zeros((len(of_plates), d))
     np.add.at(of_means, reading, hat[: d * len(reading)].reshape(-1, d))
     places = row_places(design)
-    np.testing.assert_allclose(result.redundancy[places.readings], 1.0 - of_means.ravel(), atol=1e-9)
+    np.testing.assert_allclose(
+        result.redundancy[places.readings], 1.0 - of_means.ravel(), atol=1e-9
+    )
     np.testing.assert_allclose(result.redundancy[places.distances], 1.0 - hat[-7:-3], atol=1e-9)
     # A bias of one length, and of the certificate that two of them share.
     given = design.lengths
@@ -156,31 +185,54 @@ def test_repeats_and_lengths_that_share_a_certificate() -> None:
     ends = 1.0 / design.readings.repeats[given.first] + 1.0 / design.readings.repeats[given.second]
     same = given.certificate[:, None] == given.certificate
     covariance = (
-        np.diag(noise * ends * given.with_repeatability) + np.outer(given.uncertainty, given.uncertainty) * same
+        np.diag(noise * ends * given.with_repeatability)
+        + np.outer(given.uncertainty, given.uncertainty) * same
     )
-    np.testing.assert_allclose(problem.length_root @ covariance @ problem.length_root.T, np.eye(3), atol=1e-9)
-    for kind, biases in (("length", np.eye(3)), ("length value", np.array([[-1.0], [0.0], [-1.0]]))):
+    np.testing.assert_allclose(
+        problem.length_root @ covariance @ problem.length_root.T, np.eye(3), atol=1e-9
+    )
+    for kind, biases in (
+        ("length", np.eye(3)),
+        ("length value", np.array([[-1.0], [0.0], [-1.0]])),
+    ):
         pattern = np.zeros((len(basis), biases.shape[1]))
         pattern[-3:] = problem.length_root @ biases
         left = ((pattern - basis @ (basis.T @ pattern)) ** 2).sum(axis=0)
         found = result.information[result.patterns.of_kind(kind)]  # type: ignore[arg-type]
         np.testing.assert_allclose(found, left, rtol=1e-7)
-    np.testing.assert_allclose(result.redundancy.sum() + result.among_repeats, len(hat) - hat.sum(), rtol=1e-9)
+    np.testing.assert_allclose(
+        result.redundancy.sum() + result.among_repeats, len(hat) - hat.sum(), rtol=1e-9
+    )
 
 
 def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Design, Real]:
-    """The design and its readings with a bias put in where it belongs, as an observer would see it."""
-    state, kind, subject, axis = nominal_state(design), given.kind[k], int(given.subject[k]), int(given.axis[k])
+    """The design and its readings with a bias put in where it belongs, as an observer would see
+    it.
+    """
+    state, kind, subject, axis = (
+        nominal_state(design),
+        given.kind[k],
+        int(given.subject[k]),
+        int(given.axis[k]),
+    )
     x = expected_readings(design, state, design.readings).copy()
-    readings, step = design.readings, size * np.eye(design.dimension)[max(axis, 0) % design.dimension]
+    readings, step = (
+        design.readings,
+        size * np.eye(design.dimension)[max(axis, 0) % design.dimension],
+    )
     here = readings.position == subject
     if kind == "reading":
         x[subject] += step
     elif kind == "ball":
-        x[(readings.ball == readings.ball[subject]) & (readings.position == readings.position[subject])] += step
+        x[
+            (readings.ball == readings.ball[subject])
+            & (readings.position == readings.position[subject])
+        ] += step
     elif kind == "moved":
         # Positions are read one after the other in these designs.
-        later = (readings.ball == readings.ball[subject]) & (readings.position >= readings.position[subject])
+        later = (readings.ball == readings.ball[subject]) & (
+            readings.position >= readings.position[subject]
+        )
         balls = design.balls.copy()
         balls[readings.ball[subject]] += step
         displaced = expected_readings(design, replace(state, balls=balls), readings)
@@ -211,12 +263,19 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         return replace(design, **{field: replace(items, value=value)}), x
     elif kind == "length value":
         same = design.lengths.certificate == design.lengths.certificate[subject]
-        return replace(design, lengths=replace(design.lengths, value=design.lengths.value + size * same)), x
+        return (
+            replace(
+                design, lengths=replace(design.lengths, value=design.lengths.value + size * same)
+            ),
+            x,
+        )
     elif kind == "scale":
         of_plate = design.artefact_names[subject] == "plate"
         assert of_plate
         larger = {
-            field: replace(getattr(design, field), value=getattr(design, field).value * (1.0 + size))
+            field: replace(
+                getattr(design, field), value=getattr(design, field).value * (1.0 + size)
+            )
             for field in ("distances", "coordinates")
         }
         return replace(design, **larger), x
@@ -232,16 +291,24 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
     given = patterns(design, state, None)
     matrix, seen = given.matrix.toarray(), set()
     # Some of each kind; those of single lengths are compared with the dense reference.
-    for k in [int(k) for kind in set(given.kind.tolist()) - {"length"} for k in _some(given.of_kind(kind), 4)]:
+    for k in [
+        int(k)
+        for kind in set(given.kind.tolist()) - {"length"}
+        for k in _some(given.of_kind(kind), 4)
+    ]:
         seen.add(given.kind[k])
         sides = []
         for sign in (1.0, -1.0):
             biased, x = changed(design, given, k, 1e-6 * sign)
             sides.append(whitened_residuals(biased, layout, state, x))
         expected = (sides[0] - sides[1]) / 2e-6
-        np.testing.assert_allclose(matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k])
+        np.testing.assert_allclose(
+            matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k]
+        )
     wanted = {"reading", "distance", "moved", "shift", "turn", "probe", "expansion", "scale"}
-    assert wanted <= seen and (text is not MIXED or {"ball", "length value", "coordinate", "prior"} <= seen)
+    assert wanted <= seen and (
+        text is not MIXED or {"ball", "length value", "coordinate", "prior"} <= seen
+    )
 
 
 def _some(indices: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -264,21 +331,34 @@ def distances_of(design: Design, state: State) -> tuple[Real, Real]:
 def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_path: Path) -> None:
     design = lay_out(experiment(tmp_path, text))
     result = reliability_of(design)
-    start, exact = nominal_state(design), expected_readings(design, nominal_state(design), design.readings)
+    start, exact = (
+        nominal_state(design),
+        expected_readings(design, nominal_state(design), design.readings),
+    )
     before = distances_of(design, gauss_newton(design, exact, start).state)
     given, size, tried = result.patterns, 1e-6, set()
     assert result.deficiency == 0
-    chosen = [k for kind in sorted(set(given.kind.tolist()) - {"length"}) for k in _some(given.of_kind(kind), 2)]
+    chosen = [
+        k
+        for kind in sorted(set(given.kind.tolist()) - {"length"})
+        for k in _some(given.of_kind(kind), 2)
+    ]
     for k in chosen:
         if given.kind[k] == "scale" and given.design.artefact_names[given.subject[k]] != "plate":
             continue
         biased, x = changed(design, given, k, size)
         found = gauss_newton(biased, x, start)
         assert found.status == "converged"
-        for symbol, was, now in zip(("U5", "U6"), before, distances_of(biased, found.state), strict=True):
+        for symbol, was, now in zip(
+            ("U5", "U6"), before, distances_of(biased, found.state), strict=True
+        ):
             largest = np.abs(now - was).max() / size
             np.testing.assert_allclose(
-                result.effects[symbol].change[k], largest, rtol=2e-3, atol=2e-6, err_msg=given.kind[k]
+                result.effects[symbol].change[k],
+                largest,
+                rtol=2e-3,
+                atol=2e-6,
+                err_msg=given.kind[k],
             )
         tried.add(given.kind[k])
     assert len(tried) >= (7 if text is PLATE else 11)

@@ -1,4 +1,6 @@
-"""What is told of the residuals of small designs: sizes of mistakes, scatter beside the model, and what is harmless."""
+"""What is told of the residuals of small designs: sizes of mistakes, scatter beside the model, and
+what is harmless.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,10 @@ def with_one_wrong(x: Real, reading: int, axis: int) -> Real:
 
 
 def is_finite(one: Suspect) -> bool:
-    return bool(np.isfinite(one.values).all() and ((one.standard_uncertainties > 1e-9) & (abs(one.values) < 1.0)).all())
+    return bool(
+        np.isfinite(one.values).all()
+        and ((one.standard_uncertainties > 1e-9) & (abs(one.values) < 1.0)).all()
+    )
 
 
 @pytest.mark.parametrize("name", ["ball-bar", "two-dimensions", "bryan-gauge"])
@@ -67,14 +72,18 @@ def test_sizes_are_finite_whatever_reading_is_wrong(name: str) -> None:
 
 
 @pytest.mark.parametrize(("reading", "axis"), [(0, 0), (1, 0), (10, 0), (10, 1), (12, 0), (13, 1)])
-def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(reading: int, axis: int) -> None:
+def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(
+    reading: int, axis: int
+) -> None:
     """Of a bar, most directions of a reading are taken up by the pose."""
     observed, estimated = certified("ball-bar")
     x = with_one_wrong(observed.x, reading, axis)
     solution, found = diagnosed(observed.design, x, estimated)
     assert found.suspects
     taken = jacobian(observed.design, solution.state, x)
-    residual = whitened_residuals(observed.design, shared_layout(observed.design), solution.state, x)
+    residual = whitened_residuals(
+        observed.design, shared_layout(observed.design), solution.state, x
+    )
     columns = np.concatenate([one.columns for one in found.suspects])
     for one in found.suspects:
         matrix = one.patterns.matrix[:, columns].toarray()
@@ -84,20 +93,31 @@ def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(readin
         mine = np.isin(columns, one.columns)
         np.testing.assert_allclose(one.values, (inverse @ residual)[mine], rtol=1e-4, atol=1e-9)
         np.testing.assert_allclose(
-            one.standard_uncertainties, np.sqrt((inverse**2).sum(axis=1))[mine], rtol=1e-4, atol=1e-12
+            one.standard_uncertainties,
+            np.sqrt((inverse**2).sum(axis=1))[mine],
+            rtol=1e-4,
+            atol=1e-12,
         )
 
 
 def drawn(
-    folder: Path, share: float, waves: float = 0.0, loud: float = 1.0, text: str = PLATE, seed: int = 8
+    folder: Path,
+    share: float,
+    waves: float = 0.0,
+    loud: float = 1.0,
+    text: str = PLATE,
+    seed: int = 8,
 ) -> tuple[Design, Real]:
-    """A small design with readings of a true machine: noise of a share of what is stated, more `loud` in one position,
-    and an error of the x scale of `waves` standard uncertainties, of that share too.
+    """A small design with readings of a true machine: noise of a share of what is stated, more
+    `loud` in one position, and an error of the x scale of `waves` standard uncertainties, of that
+    share too.
     """
     given = experiment(folder, text)
     design = lay_out(given)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(given.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(given.true_machine, design.model, *corners)
+    )
     readings, x = exact_readings(on_truth, truth)
     noise = np.random.default_rng(seed).standard_normal(x.shape)
     noise[readings.position == LOUD] *= loud
@@ -107,7 +127,9 @@ def drawn(
 
 
 def certified_wrongly(design: Design, ball: int, share: float) -> tuple[Design, list[int]]:
-    """The design with all certified distances of a ball too long by a share, and which these are."""
+    """The design with all certified distances of a ball too long by a share, and which these
+    are.
+    """
     given = design.distances
     mine = (given.first == ball) | (given.second == ball)
     value = given.value * np.where(mine, 1.0 + share, 1.0)
@@ -157,10 +179,17 @@ def is_explained(design: Design, solution: Solution) -> bool:
 
 
 @pytest.mark.parametrize("estimated", [True, False])
-def test_scatter_is_told_beside_the_model_in_the_size_of_all_residuals(estimated: bool, tmp_path: Path) -> None:
+def test_scatter_is_told_beside_the_model_in_the_size_of_all_residuals(
+    estimated: bool, tmp_path: Path
+) -> None:
     design, x = drawn(tmp_path, 1.0, waves=8.0, loud=60.0)
     solution, found = diagnosed(design, x, estimated)
-    assert found.scatter and found.scatter.of.position == LOUD and found.unexplained and not found.suspects
+    assert (
+        found.scatter
+        and found.scatter.of.position == LOUD
+        and found.unexplained
+        and not found.suspects
+    )
     freedom = design.observations - design.parameter_count
     size = float(np.sqrt(solution.factor.sum_of_squares / freedom))
     assert size > 5.0 and found.unexplained.times == pytest.approx(size, rel=1e-6)

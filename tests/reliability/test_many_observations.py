@@ -19,11 +19,14 @@ CERTIFIED = Path("designs/certified")
 
 
 def test_the_entries_are_those_that_are_kept() -> None:
-    """Of 25 balls, read ten times in three dimensions, four have calibrated distances: 754 observations."""
+    """Of 25 balls, read ten times in three dimensions, four have calibrated distances: 754
+    observations.
+    """
     (experiment,) = load(QUICKSTART)
     design = lay_out(experiment)
     assert entries(design)[0] == 25 * 10 * 3 + 4
-    # Of full rank, so that each parameter makes a column: those of the machine, of five poses, and of four balls.
+    # Of full rank, so that each parameter makes a column: those of the machine, of five poses, and
+    # of four balls.
     assert entries(design) == leftover(linearise(design), None, 1).common.shape
 
 
@@ -33,11 +36,11 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
     with pytest.raises(ExperimentError) as caught:
         reliability(experiment)
-    assert str(caught.value) == (
-        f"{QUICKSTART}:39:1: positions: "
-        f"{rows} observations, each co-ordinate counted, are too many to test for mistakes; "
-        f"at most {rows - 1} are possible with {columns} parameters of machine, poses and tied balls: "
-        "read fewer balls, or in fewer positions"
+    assert (
+        str(caught.value)
+        == f"{QUICKSTART}:39:1: positions: {rows} observations, each co-ordinate counted, are too"
+        f" many to test for mistakes; at most {rows - 1} are possible with {columns} parameters"
+        " of machine, poses and tied balls: read fewer balls, or in fewer positions"
     )
     monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
     reliability(experiment)
@@ -52,5 +55,8 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     assert tested.untested == "" and tested.doubts == ()
     monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
     found = fit(experiment, observed)
-    assert f"at most {rows - 1} are possible" in found.doubts[0] and "fit the means of repeated" in found.doubts[0]
+    assert (
+        f"at most {rows - 1} are possible" in found.doubts[0]
+        and "fit the means of repeated" in found.doubts[0]
+    )
     assert found.estimates == tested.estimates and not found.diagnosis

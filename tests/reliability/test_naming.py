@@ -1,4 +1,6 @@
-"""How often a fit names the right cause, a wrong one, or says that it is the model, and the table that tells so."""
+"""How often a fit names the right cause, a wrong one, or says that it is the model, and the table
+that tells so.
+"""
 
 from __future__ import annotations
 

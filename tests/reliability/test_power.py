@@ -1,4 +1,6 @@
-"""Rates of detection and of false alarms: of the linear model with thousands of draws, and of real fits."""
+"""Rates of detection and of false alarms: of the linear model with thousands of draws, and of real
+fits.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +66,9 @@ def test_power_of_students_test_against_scipy(freedom: int) -> None:
 
 
 def test_both_tails_count() -> None:
-    """At a large false alarm the other tail is no longer negligible: z + z would be 0.085 too large."""
+    """At a large false alarm the other tail is no longer negligible: z + z would be 0.085 too
+    large.
+    """
     bias = noncentrality(0.5, 0.6)
     np.testing.assert_allclose(chance_of_alarm(bias, alarm_limit(0.5)), 0.6, rtol=1e-9)
     assert abs(bias - (0.674490 + 0.253347)) > 0.05
@@ -104,14 +108,19 @@ def test_rates_of_the_linear_model(text: str, tmp_path: Path) -> None:
         alarms = (np.abs(statistic) > limit).sum(axis=0)
         spread = alarms.std(ddof=1) / np.sqrt(draws)
         assert abs(alarms.mean() - FALSE_ALARM * len(tested)) < 4.0 * spread
-    for kind in KINDS if text is MIXED else ["reading", "distance", "shift", "turn", "expansion", "scale"]:
+    for kind in (
+        KINDS if text is MIXED else ["reading", "distance", "shift", "turn", "expansion", "scale"]
+    ):
         for k in result.patterns.of_kind(kind)[::8]:  # type: ignore[call-overload]
             if information[k] <= 0.0:
                 continue
             left = matrix[:, k] - basis @ (basis.T @ matrix[:, k])
             for estimated in (False, True):
-                bias = noncentrality(FALSE_ALARM, POWER, freedom - 1 if estimated else np.inf) / np.sqrt(information[k])
-                # The residuals of a biased draw are those without the bias and what is left of its pattern.
+                bias = noncentrality(
+                    FALSE_ALARM, POWER, freedom - 1 if estimated else np.inf
+                ) / np.sqrt(information[k])
+                # The residuals of a biased draw are those without the bias and what is left of its
+                # pattern.
                 product = matrix[:, k] @ noise + bias * (matrix[:, k] @ left)
                 square = squares + 2.0 * bias * (left @ noise) + bias**2 * (left @ left)
                 statistic, limit = product / np.sqrt(information[k]), alarm_limit(FALSE_ALARM)
@@ -122,8 +131,12 @@ def test_rates_of_the_linear_model(text: str, tmp_path: Path) -> None:
                 assert within_chance(hits, draws, POWER), (kind, k, estimated, hits / draws)
 
 
-def biased(design: Design, x: Real, readings, given: Reliability, k: int, size: float) -> tuple[Design, Real]:  # type: ignore[no-untyped-def]
-    """Readings, one for each repeat, and certificates with a bias of the planned pattern `k` put in."""
+def biased(
+    design: Design, x: Real, readings, given: Reliability, k: int, size: float
+) -> tuple[Design, Real]:  # type: ignore[no-untyped-def]
+    """Readings, one for each repeat, and certificates with a bias of the planned pattern `k` put
+    in.
+    """
     patterns = given.patterns
     kind, subject, axis = patterns.kind[k], int(patterns.subject[k]), int(patterns.axis[k])
     planned, x = given.design.readings, x.copy()
@@ -134,13 +147,18 @@ def biased(design: Design, x: Real, readings, given: Reliability, k: int, size: 
     if kind == "reading":
         x[number == subject] += step
     elif kind == "ball":
-        x[(readings.ball == planned.ball[subject]) & (readings.position == planned.position[subject])] += step
+        x[
+            (readings.ball == planned.ball[subject])
+            & (readings.position == planned.position[subject])
+        ] += step
     elif kind == "shift":
         x[here & (number >= patterns.start[k])] += step
     elif kind == "turn":
         late = here & (number >= patterns.start[k])
         away = places - places[here].mean(axis=0)
-        x[late] += size * rotation_sensitivity(away[late])[:, :, axis if design.dimension == 3 else 0]
+        x[late] += (
+            size * rotation_sensitivity(away[late])[:, :, axis if design.dimension == 3 else 0]
+        )
     elif kind == "probe":
         # The machine reads with a tip that is not where it is said to be.
         x[readings.probe == subject] += step
@@ -150,15 +168,23 @@ def biased(design: Design, x: Real, readings, given: Reliability, k: int, size: 
         x[number == design.lengths.first[subject]] += size * design.lengths.direction[subject]
     elif kind == "length value":
         same = design.lengths.certificate == design.lengths.certificate[subject]
-        return replace(design, lengths=replace(design.lengths, value=design.lengths.value + size * same)), x
+        return (
+            replace(
+                design, lengths=replace(design.lengths, value=design.lengths.value + size * same)
+            ),
+            x,
+        )
     elif kind == "scale":
         value = design.distances.value * (1.0 + size)
         known = design.coordinates
-        return replace(
-            design,
-            distances=replace(design.distances, value=value),
-            coordinates=replace(known, value=known.value * (1.0 + size)),
-        ), x
+        return (
+            replace(
+                design,
+                distances=replace(design.distances, value=value),
+                coordinates=replace(known, value=known.value * (1.0 + size)),
+            ),
+            x,
+        )
     else:
         field = {"distance": "distances", "prior": "priors"}[kind]
         value = getattr(design, field).value.copy()
@@ -202,7 +228,9 @@ def studentised(statistic: Real, sum_of_squares: Real | float, freedom: int) -> 
 
 
 def matching(found: Patterns, planned: Reliability, k: int) -> int:
-    """The pattern of a fit that is the planned one, whose readings are rows of their own for each repeat."""
+    """The pattern of a fit that is the planned one, whose readings are rows of their own for each
+    repeat.
+    """
     names = planned.patterns
     kind, subject = names.kind[k], names.subject[k]
     same = found.of_kind(kind)
@@ -213,7 +241,10 @@ def matching(found: Patterns, planned: Reliability, k: int) -> int:
         for other in same.tolist():
             i = int(found.subject[other])
             at = (now.ball[i], now.position[i], now.probe[i])
-            if at == (was.ball[row], was.position[row], was.probe[row]) and found.axis[other] == names.axis[k]:
+            if (
+                at == (was.ball[row], was.position[row], was.probe[row])
+                and found.axis[other] == names.axis[k]
+            ):
                 return other
         raise AssertionError(kind)
     assert len(same) == len(names.of_kind(kind))
@@ -221,7 +252,9 @@ def matching(found: Patterns, planned: Reliability, k: int) -> int:
 
 
 def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[str, bool], int]:
-    """How often biases of the stated minimal detectable size are found, by kind and whether sigma is estimated."""
+    """How often biases of the stated minimal detectable size are found, by kind and whether sigma
+    is estimated.
+    """
     world = Fits(folder, text)
     hits: dict[tuple[str, bool], int] = {}
     for number, kind in enumerate(kinds):
@@ -242,7 +275,9 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
                 freedom = freedom_of(observed.design)
                 found = patterns(observed.design, solution.state, observed.x)
                 left = leftover(linearised_fit(observed.design, solution), observed.x, freedom)
-                statistic = Columns(found.matrix, [], left).statistics()[matching(found, planned, k)]
+                statistic = Columns(found.matrix, [], left).statistics()[
+                    matching(found, planned, k)
+                ]
                 limit = alarm_limit(FALSE_ALARM)
                 if estimated:
                     statistic = studentised(statistic, solution.factor.sum_of_squares, freedom)
@@ -255,11 +290,15 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
 def check_rates(hits: dict[tuple[str, bool], int], fits: int) -> None:
     for key, count in hits.items():
         assert within_chance(count, fits, POWER), (key, count / fits)
-    assert within_chance(sum(hits.values()), fits * len(hits), POWER), sum(hits.values()) / (fits * len(hits))
+    assert within_chance(sum(hits.values()), fits * len(hits), POWER), sum(hits.values()) / (
+        fits * len(hits)
+    )
 
 
 def test_rates_of_real_fits_in_the_plane(tmp_path: Path) -> None:
-    check_rates(rates(tmp_path, PLANE, ["reading", "distance", "shift", "turn", "expansion", "scale"], 8), 8)
+    check_rates(
+        rates(tmp_path, PLANE, ["reading", "distance", "shift", "turn", "expansion", "scale"], 8), 8
+    )
 
 
 @pytest.mark.long
@@ -268,13 +307,18 @@ def test_rates_of_real_fits(tmp_path: Path) -> None:
 
 
 def alarms(folder: Path, text: str, fits: int) -> dict[bool, int]:
-    """Fits of readings without any bias in which something is suspected, by whether sigma is estimated."""
+    """Fits of readings without any bias in which something is suspected, by whether sigma is
+    estimated.
+    """
     world, found = Fits(folder, text), {False: 0, True: 0}
     for r in range(fits):
         observed, solution = world.fitted(r)
         for estimated in found:
             told = diagnosis(
-                linearised_fit(observed.design, solution), observed.x, freedom_of(observed.design), estimated
+                linearised_fit(observed.design, solution),
+                observed.x,
+                freedom_of(observed.design),
+                estimated,
             )
             found[estimated] += bool(told)
     return found

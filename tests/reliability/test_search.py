@@ -1,4 +1,6 @@
-"""What causes explain of residuals, against least squares with the causes as parameters, and draws of noise."""
+"""What causes explain of residuals, against least squares with the causes as parameters, and draws
+of noise.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ def fitted(text: str, folder: Path) -> tuple[Design, State, Real]:
     given = experiment(folder, text)
     design = lay_out(given)
     corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
-    on_truth, truth = on_true_machine(design, true_machine(given.true_machine, design.model, *corners))
+    on_truth, truth = on_true_machine(
+        design, true_machine(given.true_machine, design.model, *corners)
+    )
     generator = np.random.default_rng(5)
     certificate = noisy_certificate(design, truth, generator)
     observed = observe(certificate, *noisy_readings(on_truth, truth, generator))
@@ -40,7 +44,9 @@ def fitted(text: str, folder: Path) -> tuple[Design, State, Real]:
 
 
 def jacobian(design: Design, state: State, x: Real) -> Real:
-    """Derivative of the whitened residuals by all parameters, by central differences, with columns of length one."""
+    """Derivative of the whitened residuals by all parameters, by central differences, with columns
+    of length one.
+    """
     layout, balls = shared_layout(design), design.plate_balls
     s = len(layout)
 
@@ -48,7 +54,14 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
         shift = np.zeros_like(design.balls)
         shift[balls] = step[s:].reshape(-1, design.dimension)
         there = moved(
-            design, state, layout.pose_columns, step[:s], shift, layout.model, layout.offset_columns, layout.lengths
+            design,
+            state,
+            layout.pose_columns,
+            step[:s],
+            shift,
+            layout.model,
+            layout.offset_columns,
+            layout.lengths,
         )
         return whitened_residuals(design, layout, there, x)
 
@@ -73,11 +86,18 @@ def smallest_left(columns: Real, own: Real) -> float:
 
 
 @pytest.mark.parametrize("text", [MIXED, PLANE], ids=["mixed", "plane"])
-def test_what_causes_explain_is_what_they_take_away_as_parameters(text: str, tmp_path: Path) -> None:
+def test_what_causes_explain_is_what_they_take_away_as_parameters(
+    text: str, tmp_path: Path
+) -> None:
     design, state, x = fitted(text, tmp_path)
-    search = Search(linearise(design, state, x), x, design.observations - design.parameter_count, True)
+    search = Search(
+        linearise(design, state, x), x, design.observations - design.parameter_count, True
+    )
     matrix = search.patterns.matrix.toarray()
-    residual, taken = whitened_residuals(design, shared_layout(design), state, x), jacobian(design, state, x)
+    residual, taken = (
+        whitened_residuals(design, shared_layout(design), state, x),
+        jacobian(design, state, x),
+    )
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
     generator, widths = np.random.default_rng(1), set()
     for step in range(2):
@@ -91,7 +111,9 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(text: str, tmp
                     assert smallest_left(taken, own) < 1e-4
                     continue
                 expected = before - left_by(np.column_stack([taken, own]), residual)
-                assert explained.square[place] == pytest.approx(expected, rel=1e-4, abs=1e-6 * before)
+                assert explained.square[place] == pytest.approx(
+                    expected, rel=1e-4, abs=1e-6 * before
+                )
                 widths.add(len(group[place]))
         # A cause that has been taken out explains nothing more, and others less.
         columns = search.groups[-2][len(search.groups[-2]) // 2]
@@ -103,8 +125,13 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(text: str, tmp
 
 def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path) -> None:
     design, state, x = fitted(PLANE, tmp_path)
-    search = Search(linearise(design, state, x), x, design.observations - design.parameter_count, True)
-    residual, taken = whitened_residuals(design, shared_layout(design), state, x), jacobian(design, state, x)
+    search = Search(
+        linearise(design, state, x), x, design.observations - design.parameter_count, True
+    )
+    residual, taken = (
+        whitened_residuals(design, shared_layout(design), state, x),
+        jacobian(design, state, x),
+    )
     before, seen = left_by(taken, residual), set()
     # An error in one axis along another has one value for each place on the latter's scale.
     for axis, component in ((0, 0), (0, 1), (1, 0), (1, 1)):
@@ -116,7 +143,9 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
         (one,) = (one for one in search.smooth if one.words == words)
         np.testing.assert_allclose(taken.T @ one.columns, 0.0, atol=1e-6)
         explained = float(((one.columns.T @ search.left.residual) ** 2).sum())
-        assert explained == pytest.approx(before - left_by(np.column_stack([taken, columns]), residual), rel=1e-4)
+        assert explained == pytest.approx(
+            before - left_by(np.column_stack([taken, columns]), residual), rel=1e-4
+        )
         seen.add(one.columns.shape[1])
     assert min(seen) > 2
 

@@ -1,4 +1,6 @@
-"""Mistakes in readings that several lengths share, and in their certificates, against the dense covariance."""
+"""Mistakes in readings that several lengths share, and in their certificates, against the dense
+covariance.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,12 @@ Real = NDArray[np.float64]
 
 KNOWN = {"pairs": "all", "standard_uncertainty": "0.2 um + L/200000"}
 COARSE: dict[str, Any] = {
-    "error_model": {"kind": "kinematic", "arrangement": "MB2", "position_coefficients": 3, "rotation_coefficients": 2}
+    "error_model": {
+        "kind": "kinematic",
+        "arrangement": "MB2",
+        "position_coefficients": 3,
+        "rotation_coefficients": 2,
+    }
 }
 
 
@@ -46,11 +53,15 @@ def bias_of_lengths(design: Design, kind: str, subject: int, axis: int) -> Real:
 
 
 @pytest.mark.parametrize("standard", [bar(3), bar(5), flat(3)], ids=["three", "five", "plate"])
-def test_detectable_biases_are_those_of_the_full_covariance(standard: dict[str, Any], tmp_path: Path) -> None:
+def test_detectable_biases_are_those_of_the_full_covariance(
+    standard: dict[str, Any], tmp_path: Path
+) -> None:
     design = lay_out(experiment(tmp_path, standard, KNOWN, **COARSE))
     result = reliability_of(design)
     problem = dense.planned(design, 3, 2)
-    basis = orthonormal(dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters), 0)
+    basis = orthonormal(
+        dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters), 0
+    )
     start = len(basis) - len(problem.length_root)
     tried = set()
     given = result.patterns
@@ -95,7 +106,9 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(tmp_path: Path) -
         after = distances_of(design, gauss_newton(design, x, start).state)
         for symbol, was, now in zip(("U5", "U6"), before, after, strict=True):
             largest = np.abs(now - was).max() / size
-            np.testing.assert_allclose(result.effects[symbol].change[k], largest, rtol=2e-3, atol=2e-6)
+            np.testing.assert_allclose(
+                result.effects[symbol].change[k], largest, rtol=2e-3, atol=2e-6
+            )
 
 
 def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
@@ -108,11 +121,15 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)
     freedom = design.observations - design.parameter_count
-    (first,) = diagnosis(linearised_fit(design, solution), x, freedom, sigma_is_estimated=False).suspects
+    (first,) = diagnosis(
+        linearised_fit(design, solution), x, freedom, sigma_is_estimated=False
+    ).suspects
     given, k = first.patterns, first.pattern
     assert (given.kind[k], int(given.subject[k])) == ("end", wrong)
     along_x = next(i for i, column in enumerate(first.columns) if given.axis[column] == 0)
-    assert first.values[along_x] == pytest.approx(3e-5, abs=4 * first.standard_uncertainties[along_x])
+    assert first.values[along_x] == pytest.approx(
+        3e-5, abs=4 * first.standard_uncertainties[along_x]
+    )
 
 
 def test_tables_hold_the_readings_of_standards(tmp_path: Path) -> None:

@@ -1,4 +1,6 @@
-"""A headless Chromium, spoken to through a pipe by the DevTools protocol; nothing is installed for it."""
+"""A headless Chromium, spoken to through a pipe by the DevTools protocol; nothing is installed for
+it.
+"""
 
 from __future__ import annotations
 
@@ -95,7 +97,13 @@ class Browser:
 
     def resize(self, width: int, height: int = 900) -> None:
         """Give the page a screen of this size."""
-        self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.ask(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
 
     def picture(self, file: Path) -> None:
         """Write the whole page as a picture."""
@@ -114,7 +122,15 @@ def browser(path: str, folder: Path) -> Iterator[Browser]:
         # A POSIX shell knows descriptors of one digit only.
         shell = f'exec "$0" "$@" 3</dev/fd/{to_child} 4>/dev/fd/{from_child}'
     process = subprocess.Popen(
-        ["/bin/sh", "-c", shell, path, *FLAGS, f"--user-data-dir={folder / 'profile'}", "about:blank"],
+        [
+            "/bin/sh",
+            "-c",
+            shell,
+            path,
+            *FLAGS,
+            f"--user-data-dir={folder / 'profile'}",
+            "about:blank",
+        ],
         pass_fds=(to_child, from_child),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

@@ -12,7 +12,10 @@ from ballplate.cli import main
 def plate_sizes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The store of the sweep that is shipped."""
     store = tmp_path_factory.mktemp("sweep") / "plate.sqlite"
-    assert main(["sweep", "designs/sweeps/plate-size.yaml", "--store", str(store), "--workers", "2"]) == 0
+    assert (
+        main(["sweep", "designs/sweeps/plate-size.yaml", "--store", str(store), "--workers", "2"])
+        == 0
+    )
     return store
 
 

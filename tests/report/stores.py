@@ -15,14 +15,26 @@ VERSIONS = (("ballplate", "0.1.0"), ("python", "3.11"))
 VOID = {"meta", "link", "br", "hr", "img", "input", "col"}
 
 
-def axis(name: str, labels: Sequence[str], values: Sequence[float] = (), unit: str = "") -> dict[str, Any]:
+def axis(
+    name: str, labels: Sequence[str], values: Sequence[float] = (), unit: str = ""
+) -> dict[str, Any]:
     """An axis as a store's definition has it."""
     column = f"{name}_{unit}" if unit in ("m", "rad") else name
-    return {"name": name, "column": column, "unit": unit, "labels": list(labels), "values": list(values)}
+    return {
+        "name": name,
+        "column": column,
+        "unit": unit,
+        "labels": list(labels),
+        "values": list(values),
+    }
 
 
 def made_up(
-    path: Path, title: str, axes: list[dict[str, Any]], rows: Iterable[Row], trials: int | None = None
+    path: Path,
+    title: str,
+    axes: list[dict[str, Any]],
+    rows: Iterable[Row],
+    trials: int | None = None,
 ) -> Store:
     """A store of a sweep over all combinations of the axes' values, without files."""
     store = open_store(path, create=True)
@@ -45,7 +57,16 @@ def made_up(
 
 def done(cell: int, figures: dict[str, float], **details: Any) -> Row:
     """A row of a cell that is done."""
-    return Row(cell, 0, f"key {cell}", "done", seed=cell, figures=figures, details=details, versions=VERSIONS)
+    return Row(
+        cell,
+        0,
+        f"key {cell}",
+        "done",
+        seed=cell,
+        figures=figures,
+        details=details,
+        versions=VERSIONS,
+    )
 
 
 def failed(cell: int, reason: str) -> Row:

@@ -32,7 +32,9 @@ def found() -> Campaign:
     gains = tuple(Gain(one, value, 6e-7) for one, value in zip(chosen, values, strict=True))
     left_out = (Gain(by_name["better sides"], 6e-7, 5e-7),)
     curve = tuple(
-        CurvePoint(Budget(3600.0 * hours), Spent(3500.0 * hours, 50, 2), chosen, 2.4e-6 / hours, bound)
+        CurvePoint(
+            Budget(3600.0 * hours), Spent(3500.0 * hours, 50, 2), chosen, 2.4e-6 / hours, bound
+        )
         for hours, bound in ((2.0, 6e-7), (4.0, 4e-7), (6.0, math.nan))
     )
     return Campaign(
@@ -42,15 +44,25 @@ def found() -> Campaign:
 
 
 def texts(campaign: Campaign, folder: Path) -> list[str]:
-    """The letters of a picture, which matplotlib tells in comments of a drawing whose letters are outlines."""
+    """The letters of a picture, which matplotlib tells in comments of a drawing whose letters are
+    outlines.
+    """
     path = folder / "picture.svg"
     draw_campaign(campaign, path)
     return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
 
 
-def test_a_picture_with_a_curve_has_marks_gains_and_positions(found: Campaign, tmp_path: Path) -> None:
+def test_a_picture_with_a_curve_has_marks_gains_and_positions(
+    found: Campaign, tmp_path: Path
+) -> None:
     drawn = texts(found, tmp_path)
-    for text in ("best choice found", "bound of any choice", "chosen: 0.600", "as drawn: 1.20", "hours allowed"):
+    for text in (
+        "best choice found",
+        "bound of any choice",
+        "chosen: 0.600",
+        "as drawn: 1.20",
+        "hours allowed",
+    ):
         assert text in drawn
     # Five times what is drawn is further off than the axis goes.
     assert "target: 5.70 (above)" in drawn
@@ -77,9 +89,13 @@ def test_the_same_campaign_gives_the_same_bytes(found: Campaign, tmp_path: Path)
 
 
 @pytest.mark.parametrize("curve", [True, False], ids=["curve", "no curve"])
-def test_what_is_undetermined_or_has_no_bound_is_drawn_as_such(found: Campaign, tmp_path: Path, curve: bool) -> None:
+def test_what_is_undetermined_or_has_no_bound_is_drawn_as_such(
+    found: Campaign, tmp_path: Path, curve: bool
+) -> None:
     gains = tuple(Gain(one.candidate, math.inf, math.inf) for one in found.gains)
-    nothing = replace(found, value=math.inf, bound=math.nan, drawn=math.inf, gains=gains, left_out=gains[:1])
+    nothing = replace(
+        found, value=math.inf, bound=math.nan, drawn=math.inf, gains=gains, left_out=gains[:1]
+    )
     nothing = nothing if curve else replace(nothing, curve=())
     drawn = texts(nothing, tmp_path)
     assert "–" in drawn and "needed" not in drawn
@@ -91,8 +107,18 @@ def test_what_is_undetermined_or_has_no_bound_is_drawn_as_such(found: Campaign, 
 
 
 def test_a_ratio_has_no_unit(found: Campaign, tmp_path: Path) -> None:
-    ratio = replace(found, criterion="condition", unit="1", value=310.0, bound=math.nan, drawn=900.0, target=None)
-    ratio = replace(ratio, curve=tuple(replace(point, value=1e3, bound=math.nan) for point in ratio.curve))
+    ratio = replace(
+        found,
+        criterion="condition",
+        unit="1",
+        value=310.0,
+        bound=math.nan,
+        drawn=900.0,
+        target=None,
+    )
+    ratio = replace(
+        ratio, curve=tuple(replace(point, value=1e3, bound=math.nan) for point in ratio.curve)
+    )
     drawn = texts(ratio, tmp_path)
     assert "chosen: 310" in drawn and not any("µm" in text for text in drawn)
     assert "chosen 310, as drawn 900" in words(ratio)
@@ -111,7 +137,11 @@ def test_many_chosen_ones_are_counted(found: Campaign, tmp_path: Path) -> None:
 
 
 def test_a_budget_of_positions_is_counted(found: Campaign, tmp_path: Path) -> None:
-    curve = tuple(replace(point, budget=Budget(positions=k)) for k, point in enumerate(found.curve, 2))
+    curve = tuple(
+        replace(point, budget=Budget(positions=k)) for k, point in enumerate(found.curve, 2)
+    )
     drawn = texts(replace(found, budget=Budget(positions=4), curve=curve), tmp_path)
     assert "positions allowed" in drawn
-    assert not any(re.fullmatch(r"\d\.5", text) for text in drawn[: drawn.index("positions allowed")])
+    assert not any(
+        re.fullmatch(r"\d\.5", text) for text in drawn[: drawn.index("positions allowed")]
+    )

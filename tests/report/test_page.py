@@ -1,4 +1,6 @@
-"""The page of a sweep: its figures are the store's, it needs nothing else, and it is the same each time."""
+"""The page of a sweep: its figures are the store's, it needs nothing else, and it is the same each
+time.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,10 @@ def assert_accessible(text: str) -> Page:
     """Structure that screen readers, keyboards and browsers without network need."""
     found = Page(text)
     assert found.of("html")[0]["lang"] == "en" and found.texts["title"][0]
-    assert found.of("a")[0] == {"class": "skip", "href": "#main"} and found.of("main")[0]["id"] == "main"
+    assert (
+        found.of("a")[0] == {"class": "skip", "href": "#main"}
+        and found.of("main")[0]["id"] == "main"
+    )
     ids = [attributes["id"] for _, attributes in found.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     for name in ("href", "aria-labelledby"):
@@ -57,7 +62,11 @@ def assert_accessible(text: str) -> Page:
     assert all("scope" in attributes for attributes in found.of("th"))
     assert len(found.of("figure")) == len(found.of("figcaption")) == len(found.of("svg"))
     assert all(one["aria-label"] and one["role"] == "img" for one in found.of("svg"))
-    scrolling = [attributes for _, attributes in found.tags if "scroll" in attributes.get("class", "").split()]
+    scrolling = [
+        attributes
+        for _, attributes in found.tags
+        if "scroll" in attributes.get("class", "").split()
+    ]
     assert all(one["tabindex"] == "0" and one["aria-labelledby"] for one in scrolling)
     assert not found.of("script") and not found.of("img") and not found.of("style")[1:]
     assert not re.search(r"https?://|@import|url\((?!#)|javascript:|\son\w+=", text)
@@ -83,10 +92,17 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
     found = assert_accessible(plate_sizes_page.read_text(encoding="utf-8"))
     assert_of_store(found, plate_sizes)
     told = {(place["data-cell"], place["data-figure"]) for place in found.places}
-    names = [f"{u}_{s}_m" for u in ("U1", "U4", "U5", "U6") for s in ("maximum", "average", "actual_average")]
-    wanted = {(str(cell), name) for cell in range(12) for name in names if "actual_maximum" not in name}
+    names = [
+        f"{u}_{s}_m"
+        for u in ("U1", "U4", "U5", "U6")
+        for s in ("maximum", "average", "actual_average")
+    ]
+    wanted = {
+        (str(cell), name) for cell in range(12) for name in names if "actual_maximum" not in name
+    }
     assert wanted <= told
-    # Two axes with numbers, four quantities; two designs with their probes; three levels of the error map.
+    # Two axes with numbers, four quantities; two designs with their probes; three levels of the
+    # error map.
     assert len(found.of("svg")) == 2 * 4 + 2 * 2 + 3
     assert "Smallest average of U6, 0.117 µm: cell 11, size 750 mm, balls 7" in found.texts["h3"]
 
@@ -99,7 +115,10 @@ def test_same_store_same_bytes(plate_sizes: Path, plate_sizes_page: Path, tmp_pa
 
 def test_variants_with_deficient_designs(tmp_path: Path) -> None:
     base = Path("designs/npl/6.1.1.yaml").resolve().as_posix()
-    text = f"title: <b>kinds</b> & $more$\nbase: {base}\naxes:\n  design: {{variants: all}}\nrecord: [U1, U4]\n"
+    text = (
+        f"title: <b>kinds</b> & $more$\nbase: {base}\naxes:\n  design: {{variants: all}}\nrecord:"
+        " [U1, U4]\n"
+    )
     store = sweep(tmp_path, text)
     found = assert_accessible(report(store))
     assert_of_store(found, store)
@@ -125,22 +144,35 @@ def test_failed_cells_and_two_dimensions(tmp_path: Path) -> None:
 
 
 def test_a_store_without_results(tmp_path: Path) -> None:
-    store = made_up(tmp_path / "none.sqlite", "nothing", [axis("k", ["1", "2"], [1.0, 2.0], "1")], [])
+    store = made_up(
+        tmp_path / "none.sqlite", "nothing", [axis("k", ["1", "2"], [1.0, 2.0], "1")], []
+    )
     found = assert_accessible(page(store, read_results(store, 1)))
     assert "0 of 2 cells done, 2 left." in found.texts["p"]
-    store = made_up(tmp_path / "bad.sqlite", "bad", [axis("k", ["1", "2"], [1.0, 2.0], "1")], [failed(0, "no <good>")])
+    store = made_up(
+        tmp_path / "bad.sqlite",
+        "bad",
+        [axis("k", ["1", "2"], [1.0, 2.0], "1")],
+        [failed(0, "no <good>")],
+    )
     found = assert_accessible(page(store, read_results(store, 1)))
     assert any(one.strip().startswith("no <good>") for one in found.texts["p"])
 
 
 def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
-    axes = [axis(name, [f"{k + 1}" for k in range(20)], [k + 1.0 for k in range(20)], "1") for name in ("a", "b", "c")]
+    axes = [
+        axis(name, [f"{k + 1}" for k in range(20)], [k + 1.0 for k in range(20)], "1")
+        for name in ("a", "b", "c")
+    ]
     names = ("U4_maximum_m", "U4_average_m", "U6_maximum_m", "U6_average_m")
 
     def rows():  # type: ignore[no-untyped-def]
         for k in range(20**3):
             size = 1e-7 * (1 + k % 20 + k // 400)
-            figures = {name: size for name in names} | {"U6_undetermined": 0.0, "rank_deficiency": float(k % 5 == 0)}
+            figures = {name: size for name in names} | {
+                "U6_undetermined": 0.0,
+                "rank_deficiency": float(k % 5 == 0),
+            }
             lines = [f"EXX by {k} um: changes no observation"] if k % 5 == 0 else []
             yield done(k, figures | {"as_expected": 1.0}, undetermined=lines)
 
@@ -151,23 +183,31 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
     assert "7800 cells more are not shown here; ballplate export gives all." in found.texts["p"]
     assert any("Median, with bars" in one for one in found.texts["figcaption"])
     groups = ranks(read_results(store, 1)).shown
-    assert [group.count for group in groups] == [1600, 6400] and "amounts of cell 0" in groups[0].heading
+    assert [group.count for group in groups] == [1600, 6400] and "amounts of cell 0" in groups[
+        0
+    ].heading
 
 
 def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     mark = tmp_path / "has run"
     module = (
-        "from pathlib import Path\n"
-        "from ballplate.simulator.machines.settings import KinematicSettings, build_error_model\n"
-        "def build(lower, upper):\n"
-        f"    Path({str(mark)!r}).touch()\n"
-        "    return build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower, upper)\n"
+        "from pathlib import Path\nfrom ballplate.simulator.machines.settings import"
+        " KinematicSettings, build_error_model\ndef build(lower, upper):\n   "
+        f" Path({str(mark)!r}).touch()\n    return"
+        " build_error_model(KinematicSettings(kind='kinematic', arrangement='MB2'), lower,"
+        " upper)\n"
     )
     base = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
-    base = re.sub(r"(?m)^error_model:.*\n(  .*\n)+", "error_model: {kind: python, object: 'own_model:build'}\n", base)
+    base = re.sub(
+        r"(?m)^error_model:.*\n(  .*\n)+",
+        "error_model: {kind: python, object: 'own_model:build'}\n",
+        base,
+    )
     own = "title: own\nbase: base.yaml\naxes:\n  k: {path: machine.repeatability, values: [1 um]}\n"
     figures = {"U4_maximum_m": 2e-6, "U4_average_m": 1e-6, "U4_undetermined": 0.0}
-    store = made_up(tmp_path / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)])
+    store = made_up(
+        tmp_path / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)]
+    )
     contents = {"made-up.yaml": own, "base.yaml": base, "own_model.py": module}
     rows = [(1, name, content.encode()) for name, content in contents.items()]
     store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
@@ -176,7 +216,17 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
     page_file = tmp_path / "own.html"
-    command = [sys.executable, "-m", "ballplate", "report", store.path, "--run-modules", "--force", "-o", page_file]
+    command = [
+        sys.executable,
+        "-m",
+        "ballplate",
+        "report",
+        store.path,
+        "--run-modules",
+        "--force",
+        "-o",
+        page_file,
+    ]
     subprocess.run(command, check=True)
     assert mark.exists() and "cannot be drawn" not in page_file.read_text(encoding="utf-8")
 
@@ -187,7 +237,9 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
         with store.connection:
             store.connection.execute("DELETE FROM bundle")
             rows = [(1, "made-up.yaml", b""), (1, "base.yaml", b""), (1, name, b"x")]
-            store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
+            store.connection.executemany(
+                "INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows
+            )
         with pytest.raises(NoExperimentError, match="leads out of the folder"):
             experiments(store, read_results(store, 1), [0])
         assert not (tmp_path / "out.yaml").exists()
@@ -202,7 +254,9 @@ def test_a_base_other_than_the_one_told_is_not_loaded(tmp_path: Path) -> None:
     with store.connection:
         store.connection.execute("DELETE FROM bundle")
         rows = [(1, "made-up.yaml", sweep), (1, "base.yaml", good), (1, "evil.yaml", evil)]
-        store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
+        store.connection.executemany(
+            "INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows
+        )
     sys.modules.pop("this", None)
     (found,) = experiments(store, read_results(store, 1), [0])
     assert found.error_model.kind == "kinematic" and "this" not in sys.modules
@@ -220,7 +274,10 @@ def test_the_error_map_is_u4_on_a_grid() -> None:
 
 
 def test_missing_packages_are_named(
-    plate_sizes: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    plate_sizes: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     monkeypatch.setitem(sys.modules, "jinja2", None)
     assert main(["report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 3

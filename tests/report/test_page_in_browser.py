@@ -1,4 +1,6 @@
-"""The page in a browser: it opens without errors, asks no network for anything, and fits small screens."""
+"""The page in a browser: it opens without errors, asks no network for anything, and fits small
+screens.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ CHROMIUM = program()
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(
-        CHROMIUM is None, reason="no Chromium on this machine; install it, or name it in BALLPLATE_CHROMIUM"
+        CHROMIUM is None,
+        reason="no Chromium on this machine; install it, or name it in BALLPLATE_CHROMIUM",
     ),
 ]
 
@@ -31,18 +34,30 @@ def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
             assert tab.value(OUTSIDE) == []
         assert tab.value("document.title") == "size of the plate and number of its balls"
         assert tab.value("document.querySelectorAll('svg').length") == 15
-        assert tab.value("getComputedStyle(document.querySelector('svg path[style*=stroke]')).stroke") != "none"
+        assert (
+            tab.value("getComputedStyle(document.querySelector('svg path[style*=stroke]')).stroke")
+            != "none"
+        )
         colours = []
         for scheme in ("light", "dark"):
-            tab.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            tab.ask(
+                "Emulation.setEmulatedMedia",
+                features=[{"name": "prefers-color-scheme", "value": scheme}],
+            )
             colours.append(tab.value("getComputedStyle(document.body).backgroundColor"))
         assert colours[0] == "rgb(255, 255, 255)" and colours[1] != colours[0]
         # The skip link is the first thing that the keyboard reaches, and shows itself then.
         tab.value("document.querySelector('.skip').focus()")
         assert tab.value("document.querySelector('.skip').getBoundingClientRect().left") >= 0
         tab.ask("Emulation.setEmulatedMedia", media="print", features=[])
-        assert tab.value("getComputedStyle(document.querySelector('.scroll')).overflowX") == "visible"
-        asked = [one["params"]["request"]["url"] for one in tab.events if one["method"] == "Network.requestWillBeSent"]
+        assert (
+            tab.value("getComputedStyle(document.querySelector('.scroll')).overflowX") == "visible"
+        )
+        asked = [
+            one["params"]["request"]["url"]
+            for one in tab.events
+            if one["method"] == "Network.requestWillBeSent"
+        ]
         assert asked and all(url.startswith(("file:", "data:")) for url in asked)
         wrong = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
         assert [one for one in tab.events if one["method"] in wrong] == []

@@ -1,4 +1,6 @@
-"""Results that draw themselves: a figure, a file, what a notebook shows, and what is said where that cannot be."""
+"""Results that draw themselves: a figure, a file, what a notebook shows, and what is said where
+that cannot be.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,15 @@ from ballplate.results.fit import Fit
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
-REAL = Path("designs/hocken_borchardt/real.yaml"), Path("designs/hocken_borchardt/real-readings.csv")
-PLACES = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
+REAL = (
+    Path("designs/hocken_borchardt/real.yaml"),
+    Path("designs/hocken_borchardt/real-readings.csv"),
+)
+PLACES = {
+    "planes": ["z"],
+    "levels": ["100 mm", "400 mm"],
+    "corners": {"x": ["50 mm"], "y": ["50 mm"]},
+}
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +33,17 @@ def planar() -> Fit:
 
 
 def test_a_figure_is_the_picture_of_the_command(planar: Fit, tmp_path: Path) -> None:
-    """The same bytes from the method, and from the figure that it gives back when a notebook shows it."""
-    arguments = ["fit", *map(str, REAL), "--variant", "with scale", "--plot", str(tmp_path / "command.svg")]
+    """The same bytes from the method, and from the figure that it gives back when a notebook shows
+    it.
+    """
+    arguments = [
+        "fit",
+        *map(str, REAL),
+        "--variant",
+        "with scale",
+        "--plot",
+        str(tmp_path / "command.svg"),
+    ]
     assert main(arguments) == 0
     figure = planar.plot(tmp_path / "method.svg")
     assert (tmp_path / "method.svg").read_bytes() == (tmp_path / "command.svg").read_bytes()
@@ -71,7 +89,9 @@ def test_what_cannot_be_drawn_is_refused(planar: Fit, tmp_path: Path) -> None:
         planar.plot(tmp_path / "picture.jpg")
 
 
-def test_a_missing_matplotlib_is_named_with_the_command(planar: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_matplotlib_is_named_with_the_command(
+    planar: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in [one for one in sys.modules if one.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)

@@ -50,9 +50,16 @@ def figures(size: float, is_open: bool = False) -> dict[str, float]:
 
 @pytest.fixture
 def small(tmp_path: Path) -> Store:
-    """Two axes with names that mean something to every format; a cell is open, one has failed, one is left."""
-    axes = [axis("size", ["450 mm", "550 mm"], [0.45, 0.55], "m"), axis("a_b|c & 5 %", ["x*", "y$", "[z]"])]
-    rows = [done(k, figures(k + 1.0, is_open=k == 2)) for k in range(4)] + [failed(4, "made_up.yaml:1:1: too <large>")]
+    """Two axes with names that mean something to every format; a cell is open, one has failed, one
+    is left.
+    """
+    axes = [
+        axis("size", ["450 mm", "550 mm"], [0.45, 0.55], "m"),
+        axis("a_b|c & 5 %", ["x*", "y$", "[z]"]),
+    ]
+    rows = [done(k, figures(k + 1.0, is_open=k == 2)) for k in range(4)] + [
+        failed(4, "made_up.yaml:1:1: too <large>")
+    ]
     return made_up(tmp_path / "small.sqlite", "sizes # & <kinds>", axes, rows, trials=100)
 
 
@@ -66,7 +73,14 @@ def test_tables_are_the_golden_ones(small: Store, form: str) -> None:
 def test_csv_is_read_back(small: Store) -> None:
     results = read_results(small, 1)
     first, second = as_rows(FORMATS["csv"]("", report_tables(results)))
-    assert first[0] == ["size", "figure", "unit", "a_b|c & 5 % x*", "a_b|c & 5 % y$", "a_b|c & 5 % [z]"]
+    assert first[0] == [
+        "size",
+        "figure",
+        "unit",
+        "a_b|c & 5 % x*",
+        "a_b|c & 5 % y$",
+        "a_b|c & 5 % [z]",
+    ]
     assert {len(row) for row in first + second} == {6}
     assert ["550 mm", "U4 average", "um", "0.402", "failed", "left"] in first
 
@@ -82,7 +96,12 @@ def test_the_best_cell_leaves_nothing_open(small: Store) -> None:
 def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
     values = [0.001 * (k + 1) for k in range(MOST_ROWS + 50)]
     axes = [axis("level", [f"{1000 * value:g} mm" for value in values], values, "m")]
-    store = made_up(tmp_path / "many.sqlite", "levels", axes, (done(k, figures(1.0 + k)) for k in range(len(values))))
+    store = made_up(
+        tmp_path / "many.sqlite",
+        "levels",
+        axes,
+        (done(k, figures(1.0 + k)) for k in range(len(values))),
+    )
     best, table, *_ = report_tables(read_results(store, 1))
     assert (best.name, best.size) == ("best", MOST_BEST)
     assert [row.headings[0] for row in best.blocks[0].rows] == [str(k) for k in range(MOST_BEST)]
@@ -92,8 +111,13 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
 
 
 def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> None:
-    """Of the cell in the middle 600 values are but one undetermined: it is neither shaded, drawn nor told unmarked."""
-    axes = [axis("size", ["1 mm", "2 mm", "3 mm"], [1e-3, 2e-3, 3e-3], "m"), axis("way", ["a", "b"])]
+    """Of the cell in the middle 600 values are but one undetermined: it is neither shaded, drawn
+    nor told unmarked.
+    """
+    axes = [
+        axis("size", ["1 mm", "2 mm", "3 mm"], [1e-3, 2e-3, 3e-3], "m"),
+        axis("way", ["a", "b"]),
+    ]
     rows = []
     for cell in range(6):
         is_partial = cell == 2
@@ -116,25 +140,48 @@ def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> No
     ]  # fmt: skip
     assert heat.shades[1][0] == -1 and heat.shades[0][0] == 0 and heat.shades[2][1] == SHADES - 1
     assert "*" in heat.note
-    lines = [line for plot in plots(results) if plot.symbol == "U4" for line in plot.panels[0].lines]
-    assert [np.isnan(line.y).tolist() for line in lines] == [[False, True, False], [False, False, False]]
+    lines = [
+        line for plot in plots(results) if plot.symbol == "U4" for line in plot.panels[0].lines
+    ]
+    assert [np.isnan(line.y).tolist() for line in lines] == [
+        [False, True, False],
+        [False, False, False],
+    ]
 
 
-def test_the_command_writes_tables(small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_command_writes_tables(
+    small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     assert main(["report", str(small.path), "--format", "text"]) == 0
     assert capsys.readouterr().out == (GOLDEN / "text.txt").read_text(encoding="utf-8")
     for suffix, form in ((".md", "markdown"), (".tex", "latex"), (".csv", "csv"), (".txt", "text")):
         file = tmp_path / f"tables{suffix}"
         assert main(["report", str(small.path), "-o", str(file)]) == 0
-        assert file.read_text(encoding="utf-8") == (GOLDEN / f"{form}.txt").read_text(encoding="utf-8")
+        assert file.read_text(encoding="utf-8") == (GOLDEN / f"{form}.txt").read_text(
+            encoding="utf-8"
+        )
 
 
-def test_wrong_usage_is_told(small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_wrong_usage_is_told(
+    small: Store, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     assert main(["report", str(small.path), "-o", str(small.path)]) == 2
     assert "would overwrite" in capsys.readouterr().err
     assert main(["report", str(small.path), "--sweep", "7", "--format", "text"]) == 3
     assert "there is no such sweep; it has 1" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "none.sqlite"), "--format", "text"]) == 3
     assert "there is no such store" in capsys.readouterr().err
-    assert main(["report", str(small.path), "-o", str(tmp_path / "no folder" / "a.html"), "--format", "csv"]) == 3
+    assert (
+        main(
+            [
+                "report",
+                str(small.path),
+                "-o",
+                str(tmp_path / "no folder" / "a.html"),
+                "--format",
+                "csv",
+            ]
+        )
+        == 3
+    )
     assert "cannot be written" in capsys.readouterr().err

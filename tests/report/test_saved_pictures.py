@@ -20,7 +20,9 @@ def drawn(path: Path) -> bytes:
     return path.read_bytes()
 
 
-@pytest.mark.parametrize(("ending", "start"), [("svg", b"<?xml"), ("PNG", b"\x89PNG"), ("pdf", b"%PDF")])
+@pytest.mark.parametrize(
+    ("ending", "start"), [("svg", b"<?xml"), ("PNG", b"\x89PNG"), ("pdf", b"%PDF")]
+)
 def test_the_same_figure_gives_the_same_bytes(tmp_path: Path, ending: str, start: bytes) -> None:
     found = drawn(tmp_path / f"one.{ending}")
     assert found.startswith(start) and b"a rising line" in found

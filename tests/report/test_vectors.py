@@ -31,7 +31,8 @@ def test_vectors_are_the_residuals() -> None:
     assert np.abs(every).max() == pytest.approx(abs(found.largest[0].value))
     assert (every**2).sum() / 0.0254e-6**2 == pytest.approx(found.solution.factor.sum_of_squares)
     np.testing.assert_array_equal(first.places, observed.x[observed.design.readings.position == 1])
-    # The reversal has the residuals of both positions in the first: as much each, and so twice as much there.
+    # The reversal has the residuals of both positions in the first: as much each, and so twice as
+    # much there.
     (both,) = fit_reversal(experiment, observed).residual_vectors()
     np.testing.assert_array_equal(both.places, first.places)
     np.testing.assert_allclose(both.residuals, 2 * first.residuals, rtol=0, atol=5e-9)
@@ -44,7 +45,9 @@ def test_the_longest_vector_takes_its_part_of_the_drawing(size: float) -> None:
 
 
 def test_no_residuals_at_all(tmp_path: Path) -> None:
-    draw_vectors((Vectors("perfect", np.eye(2), np.zeros((2, 2))),), "nothing", tmp_path / "none.svg")
+    draw_vectors(
+        (Vectors("perfect", np.eye(2), np.zeros((2, 2))),), "nothing", tmp_path / "none.svg"
+    )
     assert ElementTree.parse(tmp_path / "none.svg").getroot().tag.endswith("svg")
 
 
@@ -67,5 +70,18 @@ def test_fit_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert main(["fit", *REAL, "--plot", str(tmp_path / "none" / "a.svg")]) == 3
     assert "cannot be written" in capsys.readouterr().err
     for wrong in (["designs/quickstart.yaml"], [str(FOLDER / "real.yaml"), "--estimator", "kruth"]):
-        assert main(["fit", wrong[0], REAL[1], *REAL[2:4][: 2 * (len(wrong) > 1)], *wrong[1:], "--plot", "a.svg"]) == 2
+        assert (
+            main(
+                [
+                    "fit",
+                    wrong[0],
+                    REAL[1],
+                    *REAL[2:4][: 2 * (len(wrong) > 1)],
+                    *wrong[1:],
+                    "--plot",
+                    "a.svg",
+                ]
+            )
+            == 2
+        )
         assert "--plot draws residuals" in capsys.readouterr().err

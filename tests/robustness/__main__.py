@@ -1,4 +1,6 @@
-"""Tries cases alone, keeps their folders and tells all that comes of them: `python -m tests.robustness NUMBER`."""
+"""Tries cases alone, keeps their folders and tells all that comes of them: `python -m
+tests.robustness NUMBER`.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,10 @@ def main(numbers: list[str]) -> int:
             # The same again in another folder, to be shown.
             lay_out(root / "kit", one, root / f"shown-{number}")
             status, out, err = outcome(one.arguments, root / f"shown-{number}" / "in")
-            print(f"status {status}\n--- standard output\n{out[:3000]}\n--- standard error\n{err[:3000]}")
+            print(
+                f"status {status}\n--- standard output\n{out[:3000]}\n--- standard"
+                f" error\n{err[:3000]}"
+            )
         else:
             line = shlex.join(("ballplate", *shortest(root / "kit", root, one, fault)))
             print(f"fault:\n{fault}\nthe same by: {line}")

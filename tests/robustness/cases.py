@@ -1,6 +1,8 @@
-"""Cases: a command line in a folder with a file of every kind, and a change or two of the line, a file or a store.
+"""Cases: a command line in a folder with a file of every kind, and a change or two of the line, a
+file or a store.
 
-A number gives the same case wherever it is drawn. Alone, and with all that it prints, a case is tried by
+A number gives the same case wherever it is drawn. Alone, and with all that it prints, a case is
+tried by
 
     python -m tests.robustness NUMBER
 """
@@ -66,7 +68,9 @@ REPEATING = ("reach", "plan", "compare", "sweep", "reproduce")
 
 @dataclass(frozen=True)
 class Case:
-    """A command line, what has been changed, and the changed files by name; all others are as in the kit."""
+    """A command line, what has been changed, and the changed files by name; all others are as in
+    the kit.
+    """
 
     number: int
     arguments: tuple[str, ...]
@@ -79,7 +83,10 @@ class Case:
 
     def __str__(self) -> str:
         line = shlex.join(("ballplate", *self.arguments))
-        return f"case {self.number} ({', '.join(self.changes)}): {line if len(line) < 1000 else line[:1000] + '…'}"
+        return (
+            f"case {self.number} ({', '.join(self.changes)}):"
+            f" {line if len(line) < 1000 else line[:1000] + '…'}"
+        )
 
 
 def case(kit: Path, number: int) -> Case:
@@ -125,7 +132,9 @@ def _tree(path: Path) -> str:
 
 
 def _words(name: str) -> Vocabulary:
-    return MACHINE_WORDS if name in MACHINES else SWEEP_WORDS if name in SWEEPS else EXPERIMENT_WORDS
+    return (
+        MACHINE_WORDS if name in MACHINES else SWEEP_WORDS if name in SWEEPS else EXPERIMENT_WORDS
+    )
 
 
 def _of_file(random: Random, kit: Path, number: int, line: list[str], name: str) -> Case:
@@ -145,14 +154,20 @@ def _of_file(random: Random, kit: Path, number: int, line: list[str], name: str)
         beside = name + random.choice(("-wal", "-journal"))
         contents.append((beside, random.randbytes(random.choice((1, 32, 4152)))))
         changes = [*changes, f"{beside} left behind"]
-    return Case(number, tuple(quick(line)), tuple(f"{name}: {one}" for one in changes), tuple(contents))
+    return Case(
+        number, tuple(quick(line)), tuple(f"{name}: {one}" for one in changes), tuple(contents)
+    )
 
 
 def lay_out(kit: Path, case: Case, folder: Path) -> None:
-    """Fill a new folder with the case's files: in `in` what the command is given, in `tmp` room for temporary files."""
+    """Fill a new folder with the case's files: in `in` what the command is given, in `tmp` room for
+    temporary files.
+    """
     special = ("pipe.csv",)
     inside = folder / "in"
-    shutil.copytree(kit, inside, symlinks=True, ignore=lambda _, names: [one for one in names if one in special])
+    shutil.copytree(
+        kit, inside, symlinks=True, ignore=lambda _, names: [one for one in names if one in special]
+    )
     os.mkfifo(inside / "pipe.csv")
     (folder / "tmp").mkdir()
     for name, content in case.contents:
@@ -219,7 +234,9 @@ def _of_status(status: int, out: str, err: str) -> Iterator[str]:
 
 
 def _of_files(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes]) -> Iterator[str]:
-    """Nothing is changed but what the line says is to be written, and nothing else is left behind."""
+    """Nothing is changed but what the line says is to be written, and nothing else is left
+    behind.
+    """
     allowed = _outputs(arguments, folder, before)
     after = _contents(folder)
     for name in before.keys() - after.keys():
@@ -235,7 +252,9 @@ def _of_files(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes]
 
 
 def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes]) -> set[str]:
-    """Names in the folder that the line may write: what options name that are no inputs, and the store of a sweep."""
+    """Names in the folder that the line may write: what options name that are no inputs, and the
+    store of a sweep.
+    """
     options = parsed(arguments)
     if options is None:
         return set()
@@ -243,7 +262,9 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     read, written = set[Path](), set[Path]()
     for action in grammar()[command]:
         found = getattr(options, action.dest, None)
-        paths = [one for one in (found if isinstance(found, list) else [found]) if isinstance(one, Path)]
+        paths = [
+            one for one in (found if isinstance(found, list) else [found]) if isinstance(one, Path)
+        ]
         is_read = not action.option_strings and command != "init" or action.dest in READ
         is_read |= (command, action.dest) == ("fit", "certificate")
         (read if is_read else written).update(paths)
@@ -258,7 +279,9 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     for path in stores:
         name = _name(path, folder)
         allowed |= {name + end for end in BESIDE_STORES}
-        if command == "sweep" and (not before.get(name) or b"ballplate sweep store" in before[name]):
+        if command == "sweep" and (
+            not before.get(name) or b"ballplate sweep store" in before[name]
+        ):
             allowed.add(name)
     return allowed
 

@@ -1,4 +1,6 @@
-"""Changes of command lines, drawn from the parser's own grammar: a new option is tried without being named here."""
+"""Changes of command lines, drawn from the parser's own grammar: a new option is tried without
+being named here.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,43 @@ from ballplate.cli import parser
 
 # Tried with every option; those that its type takes are what it is for.
 PLAUSIBLE = (
-    *("1", "2", "3", "0", "0.5", "7", "2,2,2", "3,2", "50%", "100%", "5 mm", "1 um", "0.5 um + L/1000000", "2 um/mm"),
-    *("U6", "U6 average 1 um", "tasks", "lengths", "A", "EXX", "EAX", "y = 300 mm, z = 200 mm", "start", "end", "none"),
-    *("10 mm, 20 mm", "0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm", "1-9", "position", "error", "finish_error"),
+    *(
+        "1",
+        "2",
+        "3",
+        "0",
+        "0.5",
+        "7",
+        "2,2,2",
+        "3,2",
+        "50%",
+        "100%",
+        "5 mm",
+        "1 um",
+        "0.5 um + L/1000000",
+        "2 um/mm",
+    ),
+    *(
+        "U6",
+        "U6 average 1 um",
+        "tasks",
+        "lengths",
+        "A",
+        "EXX",
+        "EAX",
+        "y = 300 mm, z = 200 mm",
+        "start",
+        "end",
+        "none",
+    ),
+    *(
+        "10 mm, 20 mm",
+        "0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm",
+        "1-9",
+        "position",
+        "error",
+        "finish_error",
+    ),
     *(
         "down",
         "right",
@@ -30,11 +66,38 @@ PLAUSIBLE = (
         "weak",
         "deficient",
     ),
-    *("value", "slope", "out.csv", "out.svg", "out.html", "out.yaml", "out.md", "out.parquet", "out.txt", "new.sqlite"),
+    *(
+        "value",
+        "slope",
+        "out.csv",
+        "out.svg",
+        "out.html",
+        "out.yaml",
+        "out.md",
+        "out.parquet",
+        "out.txt",
+        "new.sqlite",
+    ),
 )
 # No pipe, as writing into one waits for its reader, and rightly so.
 ODD = (
-    *("", " ", "nan", "NaN", "inf", "-inf", "-1", "-0", "-5 mm", "1e300", "1e-300", "1e999", "9" * 400, "0x10", "1_0"),
+    *(
+        "",
+        " ",
+        "nan",
+        "NaN",
+        "inf",
+        "-inf",
+        "-1",
+        "-0",
+        "-5 mm",
+        "1e300",
+        "1e-300",
+        "1e999",
+        "9" * 400,
+        "0x10",
+        "1_0",
+    ),
     *(
         "１",
         "٣",
@@ -50,8 +113,35 @@ ODD = (
         "%s%n",
         "{}",
     ),
-    *("--", "-", "---", "-h", "@small.yaml", "a,b", ",", "1,", "0 mm", "1e300 m", "1e300 mm", "NaN mm", "5 parsec"),
-    *("1,5 mm", "5 deg", "U9", "U6 average", "U6 average 0 um", "100.1%", "0%", "%", "1 um\x00"[:-1], "all", "*", "["),
+    *(
+        "--",
+        "-",
+        "---",
+        "-h",
+        "@small.yaml",
+        "a,b",
+        ",",
+        "1,",
+        "0 mm",
+        "1e300 m",
+        "1e300 mm",
+        "NaN mm",
+        "5 parsec",
+    ),
+    *(
+        "1,5 mm",
+        "5 deg",
+        "U9",
+        "U6 average",
+        "U6 average 0 um",
+        "100.1%",
+        "0%",
+        "%",
+        "1 um\x00"[:-1],
+        "all",
+        "*",
+        "[",
+    ),
     *(
         ".",
         "..",
@@ -63,15 +153,51 @@ ODD = (
         "loop.csv",
         "missing",
     ),
-    *("old.csv", "old.yaml", "old.svg", "old.html", "empty.txt", "junk.bin", "foreign.sqlite", "CON", "a:b.csv", "~"),
-    *("é.csv", "a\nb.svg", "\x1b.yaml", "x" * 300 + ".csv", ".csv", ".svg", "OUT.SVG", "missing.yaml", "missing.csv"),
+    *(
+        "old.csv",
+        "old.yaml",
+        "old.svg",
+        "old.html",
+        "empty.txt",
+        "junk.bin",
+        "foreign.sqlite",
+        "CON",
+        "a:b.csv",
+        "~",
+    ),
+    *(
+        "é.csv",
+        "a\nb.svg",
+        "\x1b.yaml",
+        "x" * 300 + ".csv",
+        ".csv",
+        ".svg",
+        "OUT.SVG",
+        "missing.yaml",
+        "missing.csv",
+    ),
 )
 FILES = (
-    *("small.yaml", "tables.yaml", "splines.yaml", "pool.yaml", "dummy.yaml", "bar-bell.yaml", "sweep.yaml"),
-    *("machine.yaml", "gec-like.yaml", "small-readings.csv", "tables-readings.csv", "small-certificate.csv"),
+    *(
+        "small.yaml",
+        "tables.yaml",
+        "splines.yaml",
+        "pool.yaml",
+        "dummy.yaml",
+        "bar-bell.yaml",
+        "sweep.yaml",
+    ),
+    *(
+        "machine.yaml",
+        "gec-like.yaml",
+        "small-readings.csv",
+        "tables-readings.csv",
+        "small-certificate.csv",
+    ),
     *("curve.csv", "balls.csv", "sweep.sqlite", "trials.sqlite", "results.json", "planned.yaml"),
 )
-# Options whose values may be large without much work; of others a large one is meant to take long, and may.
+# Options whose values may be large without much work; of others a large one is meant to take long,
+# and may.
 LARGE = (
     "seed",
     "calibration",
@@ -97,9 +223,13 @@ def _parser() -> argparse.ArgumentParser:
 @cache
 def grammar() -> Grammar:
     """Options and arguments of every command."""
-    commands = next(one for one in _parser()._actions if isinstance(one, argparse._SubParsersAction))
+    commands = next(
+        one for one in _parser()._actions if isinstance(one, argparse._SubParsersAction)
+    )
     return {
-        name: tuple(action for action in command._actions if not isinstance(action, argparse._HelpAction))
+        name: tuple(
+            action for action in command._actions if not isinstance(action, argparse._HelpAction)
+        )
         for name, command in commands.choices.items()
     }
 
@@ -186,7 +316,9 @@ def _value_replaced(random: Random, line: list[str], actions: Sequence[argparse.
 
 
 def _removed(random: Random, line: list[str], _: Sequence[argparse.Action]) -> None:
-    del line[random.randrange(1 if random.random() < 0.95 else 0, len(line)) if len(line) > 1 else 0]
+    del line[
+        random.randrange(1 if random.random() < 0.95 else 0, len(line)) if len(line) > 1 else 0
+    ]
 
 
 def _repeated(random: Random, line: list[str], _: Sequence[argparse.Action]) -> None:
@@ -204,7 +336,11 @@ def _inserted(random: Random, line: list[str], _: Sequence[argparse.Action]) -> 
 
 
 def _files_swapped(random: Random, line: list[str], _: Sequence[argparse.Action]) -> None:
-    places = [k for k, text in enumerate(line) if Path(text).suffix in (".yaml", ".csv", ".sqlite", ".svg", ".json")]
+    places = [
+        k
+        for k, text in enumerate(line)
+        if Path(text).suffix in (".yaml", ".csv", ".sqlite", ".svg", ".json")
+    ]
     if places:
         line[random.choice(places)] = random.choice(FILES if random.random() < 0.6 else ODD)
 
@@ -213,9 +349,15 @@ def _written_over(random: Random, line: list[str], actions: Sequence[argparse.Ac
     """An output that is an input, with and without leave to overwrite."""
     inputs = [text for text in line[1:] if Path(text).suffix in (".yaml", ".csv", ".sqlite")]
     outputs = [action for action in actions if action.option_strings and action.type is not None]
-    outputs = [action for action in outputs if any(text == "out.svg" or text == "out.csv" for text in fitting(action))]
+    outputs = [
+        action
+        for action in outputs
+        if any(text == "out.svg" or text == "out.csv" for text in fitting(action))
+    ]
     if inputs and outputs:
-        name = random.choice(inputs) if random.random() < 0.7 else f"folder/../{random.choice(inputs)}"
+        name = (
+            random.choice(inputs) if random.random() < 0.7 else f"folder/../{random.choice(inputs)}"
+        )
         line += [random.choice(outputs).option_strings[-1], name]
     if any("--force" in action.option_strings for action in actions) and random.random() < 0.7:
         line.append("--force")
@@ -244,9 +386,15 @@ def changed_line(random: Random, line: Sequence[str]) -> tuple[str, list[str]]:
 
 
 def quick(line: Sequence[str]) -> list[str]:
-    """The same line, in one process where the command might start others and does not say how many."""
+    """The same line, in one process where the command might start others and does not say how
+    many.
+    """
     actions = {action.dest: action for action in grammar().get(line[0], ())} if line else {}
-    alone = [] if "workers" not in actions or any(one.startswith("--w") for one in line) else ["--workers=1"]
+    alone = (
+        []
+        if "workers" not in actions or any(one.startswith("--w") for one in line)
+        else ["--workers=1"]
+    )
     return [*line[:1], *alone, *line[1:]]
 
 

@@ -1,4 +1,6 @@
-"""Runs commands in one process and writes what they said, with the kernel that linear algebra used, as JSON."""
+"""Runs commands in one process and writes what they said, with the kernel that linear algebra used,
+as JSON.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +11,15 @@ from contextlib import redirect_stderr, redirect_stdout
 
 
 def architectures() -> list[str]:
-    """Processors that the OpenBLAS of NumPy and SciPy takes this one for; none of another library."""
+    """Processors that the OpenBLAS of NumPy and SciPy takes this one for; none of another
+    library.
+    """
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_info
 
-    return sorted({one["architecture"] for one in threadpool_info() if one["internal_api"] == "openblas"})
+    return sorted(
+        {one["architecture"] for one in threadpool_info() if one["internal_api"] == "openblas"}
+    )
 
 
 def outcome(arguments: list[str]) -> tuple[int, str, str]:

@@ -1,4 +1,5 @@
-"""One folder with a valid file of every kind that a command reads, all of small designs, and things that are no files.
+"""One folder with a valid file of every kind that a command reads, all of small designs, and things
+that are no files.
 
 Each case is tried in a copy of it of its own.
 """
@@ -93,7 +94,8 @@ squareness: {EC0Y: 21 urad}
 """
 
 CURVE = "position_mm,error_um,u_um\n" + "".join(
-    f"{20 * k},{error},0.2\n" for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
+    f"{20 * k},{error},0.2\n"
+    for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
 )
 
 VARIANTS = {
@@ -112,15 +114,32 @@ def make_kit(folder: Path) -> None:
     for source in (*FILES.glob("*.csv"), *FILES.glob("*.yaml"), *(FILES / "sweeps").glob("*.yaml")):
         shutil.copy(source, folder)
     copied = (
-        *("quickstart.yaml", "hurt_foss/bar-bell.yaml", "hurt_foss/bryan-gauge.yaml", "gilsinn/table-1.csv"),
-        *("hocken_borchardt/dummy.yaml", "hocken_borchardt/angles.yaml", "park/machines/gec-like.yaml"),
+        *(
+            "quickstart.yaml",
+            "hurt_foss/bar-bell.yaml",
+            "hurt_foss/bryan-gauge.yaml",
+            "gilsinn/table-1.csv",
+        ),
+        *(
+            "hocken_borchardt/dummy.yaml",
+            "hocken_borchardt/angles.yaml",
+            "park/machines/gec-like.yaml",
+        ),
         *("park/machines/measured/exx.csv", "certified/deficient.yaml"),
     )
     for name in copied:
         shutil.copy(DESIGNS / name, folder)
-    shutil.copytree(DESIGNS / "certified", folder / "certified", ignore=_all_but("weak", "deficient"))
+    shutil.copytree(
+        DESIGNS / "certified", folder / "certified", ignore=_all_but("weak", "deficient")
+    )
     shutil.copytree(DESIGNS / "npl", folder / "npl", ignore=_all_but("5."))
-    texts = {"small.yaml": SMALL, "pool.yaml": POOL, "sweep.yaml": SWEEP, "machine.yaml": MACHINE, "curve.csv": CURVE}
+    texts = {
+        "small.yaml": SMALL,
+        "pool.yaml": POOL,
+        "sweep.yaml": SWEEP,
+        "machine.yaml": MACHINE,
+        "curve.csv": CURVE,
+    }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     _make_readings(folder)
@@ -149,21 +168,33 @@ def _ballplate(folder: Path, *arguments: str) -> None:
 def _make_readings(folder: Path) -> None:
     for name in READINGS_OF:
         variant = ["--variant", VARIANTS[name]] if name in VARIANTS else []
-        certificate = [] if name in WITHOUT_CERTIFICATE else ["--certificate", f"{name}-certificate.csv"]
-        _ballplate(folder, "simulate", f"{name}.yaml", "-o", f"{name}-readings.csv", *variant, *certificate)
-    _ballplate(folder, "plan", "pool.yaml", "--positions", "2", "--workers", "1", "-o", "planned.yaml")
+        certificate = (
+            [] if name in WITHOUT_CERTIFICATE else ["--certificate", f"{name}-certificate.csv"]
+        )
+        _ballplate(
+            folder, "simulate", f"{name}.yaml", "-o", f"{name}-readings.csv", *variant, *certificate
+        )
+    _ballplate(
+        folder, "plan", "pool.yaml", "--positions", "2", "--workers", "1", "-o", "planned.yaml"
+    )
     _ballplate(folder, "simulate", "planned.yaml", "-o", "planned-readings.csv")
 
 
 def _make_stores(folder: Path) -> None:
-    """A store of a sweep that is done but for one cell, one with data sets, and one that is another program's."""
+    """A store of a sweep that is done but for one cell, one with data sets, and one that is another
+    program's.
+    """
     (folder / "trials.yaml").write_text(SWEEP + "trials: 4\n", encoding="utf-8")
     for name in ("sweep", "trials"):
         _ballplate(folder, "sweep", f"{name}.yaml", "--workers", "1")
-        with closing(sqlite3.connect(folder / f"{name}.sqlite", isolation_level=None)) as connection:
+        with closing(
+            sqlite3.connect(folder / f"{name}.sqlite", isolation_level=None)
+        ) as connection:
             # What would differ from one time to another, as the same number is to be the same case.
             connection.execute("UPDATE result SET seconds = 0.5")
-            connection.execute("DELETE FROM result WHERE key = (SELECT key FROM cell WHERE number = 0)")
+            connection.execute(
+                "DELETE FROM result WHERE key = (SELECT key FROM cell WHERE number = 0)"
+            )
             connection.execute("PRAGMA journal_mode = DELETE")
             connection.execute("VACUUM")
             connection.execute("PRAGMA journal_mode = WAL")

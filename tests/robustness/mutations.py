@@ -1,6 +1,7 @@
 """Mutants of YAML files: the same numbers give the same mutants, whatever the files are.
 
-A mutant has one to three changes, either of the text (lines, characters, bytes) or of the tree that the text means.
+A mutant has one to three changes, either of the text (lines, characters, bytes) or of the tree that
+the text means.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ class Raw:
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """Words of a file format: keys, values with a meaning of their own, and values that fit certain keys badly."""
+    """Words of a file format: keys, values with a meaning of their own, and values that fit certain
+    keys badly.
+    """
 
     keys: tuple[str, ...]
     words: tuple[str, ...] = ()
@@ -55,7 +58,9 @@ def vocabulary(schema: dict[str, Any], wild: dict[str, Sequence[Any]]) -> Vocabu
         if isinstance(part, dict):
             properties = part.get("properties", {})
             keys.update(dict.fromkeys(properties))
-            words.update(dict.fromkeys(str(one) for one in (*part.get("enum", ()), part.get("const", "all"))))
+            words.update(
+                dict.fromkeys(str(one) for one in (*part.get("enum", ()), part.get("const", "all")))
+            )
             for one in (*part.values(), *properties.values()):
                 collect(one)
         elif isinstance(part, list):
@@ -63,7 +68,9 @@ def vocabulary(schema: dict[str, Any], wild: dict[str, Sequence[Any]]) -> Vocabu
                 collect(one)
 
     collect(schema)
-    return Vocabulary(tuple(keys), tuple(words), tuple((key, tuple(values)) for key, values in wild.items()))
+    return Vocabulary(
+        tuple(keys), tuple(words), tuple((key, tuple(values)) for key, values in wild.items())
+    )
 
 
 def bomb(levels: int, width: int) -> Raw:
@@ -193,11 +200,15 @@ STRUCTURES: tuple[Callable[[Random], Any], ...] = (
     lambda random: _nested(random.choice((3, 45, 55, 1000, 20_000)), "{a: ", "}"),
     lambda random: [random.choice(("0 mm", 1, "a", None))] * random.choice((3, 1000, 60_000)),
     lambda random: [str(k) for k in range(random.choice((3, 1000, 30_000)))],
-    lambda random: {f"k{k}": random.choice((1, "0 mm", None)) for k in range(random.choice((3, 1000, 30_000)))},
+    lambda random: {
+        f"k{k}": random.choice((1, "0 mm", None)) for k in range(random.choice((3, 1000, 30_000)))
+    },
     lambda random: [[f"{k} mm", "0 mm"] for k in range(random.choice((3, 1000, 30_000)))],
     lambda random: ["1 mm"] * random.randrange(5),
     lambda random: [random.choice(SCALARS) for _ in range(random.randrange(5))],
-    lambda random: Raw("&shared " + emit(random.choice(("1 mm", [1, 2], {"x": "0 mm", "y": "0 mm"})))),
+    lambda random: Raw(
+        "&shared " + emit(random.choice(("1 mm", [1, 2], {"x": "0 mm", "y": "0 mm"})))
+    ),
     lambda _: Raw("*shared"),
 )
 
@@ -258,7 +269,9 @@ def change_tree(random: Random, tree: Any, words: Vocabulary) -> str:
     if not places:
         return "nothing"
     node, key = random.choice(places)
-    what = random.choice(("replace",) * 8 + ("delete", "copy", "exchange", "rename", "add", "add", "wrap", "number"))
+    what = random.choice(
+        ("replace",) * 8 + ("delete", "copy", "exchange", "rename", "add", "add", "wrap", "number")
+    )
     name = f"{what} {str(key)[:30]}"
     if what == "replace":
         node[key] = wild_value(random, key, words)
@@ -283,11 +296,17 @@ def change_tree(random: Random, tree: Any, words: Vocabulary) -> str:
         node[new] = wild_value(random, new, words)
         name += f" beside: {new}"
     elif what == "wrap":
-        node[key] = random.choice(([node[key]], {"kind": node[key]}, [node[key]] * 50, {str(key): node[key]}))
+        node[key] = random.choice(
+            ([node[key]], {"kind": node[key]}, [node[key]] * 50, {str(key): node[key]})
+        )
     elif what == "number" and isinstance(node[key], str):
         digits = [i for i, letter in enumerate(node[key]) if letter.isdigit()]
         at = random.choice(digits) if digits else 0
-        node[key] = node[key][:at] + random.choice(("", "0", "-", "e9", "e300", "e-300", ".", ",")) + node[key][at:]
+        node[key] = (
+            node[key][:at]
+            + random.choice(("", "0", "-", "e9", "e300", "e-300", ".", ","))
+            + node[key][at:]
+        )
     else:
         node[key] = wild_value(random, key, words)
     return name
@@ -367,7 +386,9 @@ def _number(random: Random, content: bytes) -> bytes:
     j = i
     while content[j : j + 1].isdigit():
         j += 1
-    new = random.choice((b"0", b"-1", b"1e9", b"100000", b"1000000000000", b"1e300", b"1e-300", b".nan", b"9" * 400))
+    new = random.choice(
+        (b"0", b"-1", b"1e9", b"100000", b"1000000000000", b"1e300", b"1e-300", b".nan", b"9" * 400)
+    )
     return content[:i] + new + content[j:]
 
 
@@ -384,7 +405,9 @@ TEXT_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
     "truncated": _truncate,
     "BOM": lambda _, content: b"\xef\xbb\xbf" + content,
     "UTF-16": lambda _, content: content.decode("utf-8", "replace").encode("utf-16"),
-    "Latin 1": lambda _, content: content.decode("utf-8", "replace").encode("latin-1", "replace") + b"# \xe9\n",
+    "Latin 1": lambda _, content: (
+        content.decode("utf-8", "replace").encode("latin-1", "replace") + b"# \xe9\n"
+    ),
     "CRLF": lambda _, content: content.replace(b"\n", b"\r\n"),
     "CR": lambda _, content: content.replace(b"\n", b"\r"),
     "tabs": lambda _, content: content.replace(b"  ", b"\t"),
@@ -394,7 +417,9 @@ TEXT_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
         random.choice((b"%YAML 1.1\n---\n", b"%YAML 3.0\n---\n", b"%A b\n")) + content
     ),
     "one line": lambda _, content: content.replace(b"\n", b" "),
-    "emptied": lambda random, _: random.choice((b"", b"\n", b"# nothing\n", b"---\n", b"null", b"...", b"\0")),
+    "emptied": lambda random, _: random.choice(
+        (b"", b"\n", b"# nothing\n", b"---\n", b"null", b"...", b"\0")
+    ),
 }
 
 
@@ -416,7 +441,9 @@ def tree_of(content: bytes) -> str:
 
 
 def mutant(files: Sequence[Path], words: Vocabulary, seed: int, number: int) -> Mutant:
-    """One mutant of one of the files; of several variants, trees keep one at most, which saves time."""
+    """One mutant of one of the files; of several variants, trees keep one at most, which saves
+    time.
+    """
     random = Random(f"{seed}-{number}")
     origin = random.choice(files)
     content, tree_text = _read(origin)
@@ -424,8 +451,12 @@ def mutant(files: Sequence[Path], words: Vocabulary, seed: int, number: int) -> 
     return Mutant(origin, number, tuple(changes), content)
 
 
-def changed_yaml(random: Random, content: bytes, tree_text: str, words: Vocabulary) -> tuple[list[str], bytes]:
-    """A file with one to three changes, and what these are; `tree_text` is JSON of what the file means."""
+def changed_yaml(
+    random: Random, content: bytes, tree_text: str, words: Vocabulary
+) -> tuple[list[str], bytes]:
+    """A file with one to three changes, and what these are; `tree_text` is JSON of what the file
+    means.
+    """
     changes = []
     if random.random() < 0.65:
         tree = json.loads(tree_text)
@@ -450,13 +481,17 @@ def changed_yaml(random: Random, content: bytes, tree_text: str, words: Vocabula
     return changes, content
 
 
-def mutants(files: Sequence[Path], words: Vocabulary, seed: int, numbers: range) -> Iterator[Mutant]:
+def mutants(
+    files: Sequence[Path], words: Vocabulary, seed: int, numbers: range
+) -> Iterator[Mutant]:
     """Mutants of the files, one for each number."""
     for number in numbers:
         yield mutant(files, words, seed, number)
 
 
-def _by_cells(change: Callable[[Random, list[list[bytes]]], None]) -> Callable[[Random, bytes], bytes]:
+def _by_cells(
+    change: Callable[[Random, list[list[bytes]]], None],
+) -> Callable[[Random, bytes], bytes]:
     def changed(random: Random, content: bytes) -> bytes:
         rows = [line.split(b",") for line in content.splitlines()] or [[b""]]
         change(random, rows)
@@ -487,14 +522,65 @@ def _columns_exchanged(random: Random, rows: list[list[bytes]]) -> None:
 
 
 def _heading(random: Random, rows: list[list[bytes]]) -> None:
-    names = (b"u_um", b"x_MM", b"x", b"x_in", b"x_m", b"probe", b"", b"x_um", b"y_pm", b"position", b'"x_mm"', b"\x1b")
+    names = (
+        b"u_um",
+        b"x_MM",
+        b"x",
+        b"x_in",
+        b"x_m",
+        b"probe",
+        b"",
+        b"x_um",
+        b"y_pm",
+        b"position",
+        b'"x_mm"',
+        b"\x1b",
+    )
     rows[0][_column(random, rows)] = random.choice(names)
 
 
 CELLS = (
-    *(b"", b"nan", b"inf", b"1e300", b"1e-300", b"1e999999", b"-1e9", b"0", b"9" * 5000, b"1e6", b"-500", b"1;5"),
-    *(b'"', b'""', b'"a', b'a"b', b'"1,5"', b"1,5", b"0x10", b"1_0", b"\xd9\xa1", b"\xe2\x80\xa8", b"\0", b"\xff"),
-    *(b"# comment", b"x" * 100_000, b"r1c1", b"\r", b"\n", b"\t", b" ", b"=1+1", b"a", b"z low", b"down"),
+    *(
+        b"",
+        b"nan",
+        b"inf",
+        b"1e300",
+        b"1e-300",
+        b"1e999999",
+        b"-1e9",
+        b"0",
+        b"9" * 5000,
+        b"1e6",
+        b"-500",
+        b"1;5",
+    ),
+    *(
+        b'"',
+        b'""',
+        b'"a',
+        b'a"b',
+        b'"1,5"',
+        b"1,5",
+        b"0x10",
+        b"1_0",
+        b"\xd9\xa1",
+        b"\xe2\x80\xa8",
+        b"\0",
+        b"\xff",
+    ),
+    *(
+        b"# comment",
+        b"x" * 100_000,
+        b"r1c1",
+        b"\r",
+        b"\n",
+        b"\t",
+        b" ",
+        b"=1+1",
+        b"a",
+        b"z low",
+        b"down",
+    ),
 )
 
 
@@ -535,7 +621,9 @@ TABLE_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
     "semicolons": lambda _, content: content.replace(b",", b";"),
     "tabs between": lambda _, content: content.replace(b",", b"\t"),
     "in quotes": lambda _, content: b'"' + content.replace(b",", b'","').replace(b"\n", b'"\n"'),
-    "a million columns": lambda random, content: random.choice((b",", b"a,", b"x_mm,")) * 10**6 + content,
+    "a million columns": lambda random, content: (
+        random.choice((b",", b"a,", b"x_mm,")) * 10**6 + content
+    ),
     "a hundred copies": lambda _, content: content * 100,
 }
 
@@ -571,13 +659,19 @@ def trees(words: Vocabulary) -> st.SearchStrategy[Any]:
         st.integers(),
         st.floats(),
         st.text(max_size=20),
-        st.builds("{} {}".format, st.integers(-5, 2000), st.sampled_from(("mm", "m", "um", "deg", "urad", "ppm"))),
+        st.builds(
+            "{} {}".format,
+            st.integers(-5, 2000),
+            st.sampled_from(("mm", "m", "um", "deg", "urad", "ppm")),
+        ),
         *(st.sampled_from(values) for _, values in words.wild),
     )
     keys = st.one_of(st.sampled_from(words.keys or ("a",)), st.text(max_size=5))
     below = st.recursive(
         scalars,
-        lambda inner: st.one_of(st.lists(inner, max_size=5), st.dictionaries(keys, inner, max_size=5)),
+        lambda inner: st.one_of(
+            st.lists(inner, max_size=5), st.dictionaries(keys, inner, max_size=5)
+        ),
         max_leaves=30,
     )
     return st.dictionaries(st.sampled_from(words.keys or ("a",)), below, max_size=10)

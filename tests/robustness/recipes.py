@@ -18,8 +18,14 @@ RECIPES = (
     "run bar-bell.yaml --variant 'length known' --until 30% --trials 20 --workers 1",
     "plan pool.yaml --positions 2 --workers 1 -o out.yaml --sheet sheet.html",
     "plan pool.yaml --hours 2 --criterion A --curve --workers 1 --sheet sheet.csv",
-    "plan pool.yaml --done planned-readings.csv --from planned.yaml --positions 1 --workers 1 --json",
-    "plan pool.yaml --done planned-readings.csv --moved --readings 12 --workers 1 --sheet sheet.md -o out.yaml",
+    (
+        "plan pool.yaml --done planned-readings.csv --from planned.yaml --positions 1 --workers 1"
+        " --json"
+    ),
+    (
+        "plan pool.yaml --done planned-readings.csv --moved --readings 12 --workers 1 --sheet"
+        " sheet.md -o out.yaml"
+    ),
     "reach small.yaml --by repeatability --goal 'U6 average 1 um' --fail",
     "reach small.yaml --by certificate --target '5 um' --json",
     "reach bar-bell.yaml --variant 'length known' --by certificate --calibration 0 --artefact bar",
@@ -33,15 +39,27 @@ RECIPES = (
     "simulate tables.yaml -o - --exact",
     "simulate splines.yaml --variant plain -o old.csv --force",
     "fit small.yaml small-readings.csv --certificate small-certificate.csv",
-    "fit tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma estimated --json",
+    (
+        "fit tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma estimated"
+        " --json"
+    ),
     "fit splines.yaml splines-readings.csv --variant plain --monomials",
     "fit small.yaml small-readings.csv --estimator distances --pairs corners --across-probes",
     "fit bar-bell.yaml bar-bell-readings.csv --variant 'length known' --estimator length-equations",
-    "fit bryan-gauge.yaml bryan-gauge-readings.csv --variant 'radius known' --estimator sphere-then-metric --json",
-    "fit dummy.yaml dummy-readings.csv --variant 'with scale' --estimator reversal --scale x --no-offsets",
+    (
+        "fit bryan-gauge.yaml bryan-gauge-readings.csv --variant 'radius known' --estimator"
+        " sphere-then-metric --json"
+    ),
+    (
+        "fit dummy.yaml dummy-readings.csv --variant 'with scale' --estimator reversal --scale x"
+        " --no-offsets"
+    ),
     "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
-    "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator length-equations --json",
+    (
+        "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"
+        " length-equations --json"
+    ),
     "sweep sweep.yaml --workers 1",
     "sweep sweep.yaml --workers 1 --store new.sqlite --retry-failed --fail-fast",
     "sweep trials.yaml --workers 1 --beside --folder folder",
@@ -62,10 +80,16 @@ RECIPES = (
     "map gec-like.yaml --grid 2,2,2 --plot out.svg --magnification 1000",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
     "spline curve.csv --evaluate '10 mm, 50 mm' --coefficients out.csv --powers global",
-    "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0 --plot out.svg",
+    (
+        "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"
+        " --plot out.svg"
+    ),
     "spline curve.csv --knots '50 mm, 100 mm' --order 3 --json --sigma estimated --period '240 mm'",
     "spline table-1.csv --x arc_length --y finish_error --boundary '100 mm' --points 1-30 --json",
-    "spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg --magnification 500",
+    (
+        "spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg"
+        " --magnification 500"
+    ),
     "reproduce npl --designs npl --experiment 5.2 --quick",
     "reproduce certified --designs certified --experiment weak --json",
     "reproduce certified --designs certified --experiment weak --results results.json",

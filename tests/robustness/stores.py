@@ -18,16 +18,84 @@ VERSIONS = slice(18, 20)
 
 VALUES: tuple[Any, ...] = (
     *(None, 0, -1, 1, 7, 10**9, 2**62, -(2**63), 1.5, 1e308, -1e308, float("inf"), 5e-324),
-    *("", " ", "done", "failed", "é" * 300, "x" * 100_000, "a\nb", "\x1b[31mred", "\0", "\u2028", "=1+1", "<b>&"),
-    *("null", "[]", "{}", "5", '"a"', "[1, 2", "{", "NaN", "[" * 3000 + "]" * 3000, '{"a": NaN}', "[[]]", "[null]"),
-    *(b"", b"\0", b"\xff\xfe", b"\0" * 7, b"\0" * 8, b"\xff" * 8, b"\0" * 800, b"\xff" * 801, b"{}\n", b"x" * 9999),
-    *("../../outside.yaml", "/no-such-folder/outside.yaml", "C:\\a.yaml", ".", "con", "ballplate sweep store 2"),
+    *(
+        "",
+        " ",
+        "done",
+        "failed",
+        "é" * 300,
+        "x" * 100_000,
+        "a\nb",
+        "\x1b[31mred",
+        "\0",
+        "\u2028",
+        "=1+1",
+        "<b>&",
+    ),
+    *(
+        "null",
+        "[]",
+        "{}",
+        "5",
+        '"a"',
+        "[1, 2",
+        "{",
+        "NaN",
+        "[" * 3000 + "]" * 3000,
+        '{"a": NaN}',
+        "[[]]",
+        "[null]",
+    ),
+    *(
+        b"",
+        b"\0",
+        b"\xff\xfe",
+        b"\0" * 7,
+        b"\0" * 8,
+        b"\xff" * 8,
+        b"\0" * 800,
+        b"\xff" * 801,
+        b"{}\n",
+        b"x" * 9999,
+    ),
+    *(
+        "../../outside.yaml",
+        "/no-such-folder/outside.yaml",
+        "C:\\a.yaml",
+        ".",
+        "con",
+        "ballplate sweep store 2",
+    ),
 )
 WORDS = Vocabulary(
-    ("title", "source", "base", "axes", "cells", "trials", "seed", "record", "labels", "values", "unit", "name"),
+    (
+        "title",
+        "source",
+        "base",
+        "axes",
+        "cells",
+        "trials",
+        "seed",
+        "record",
+        "labels",
+        "values",
+        "unit",
+        "name",
+    ),
     ("m", "rad", "1", "", "U1", "U6", "text"),
     (
-        ("cells", ([], [[0, 0]], [[9, 9]] * 6, [[-1, 0]] * 6, [[0]] * 6, [["a", "b"]] * 6, [[0, 0, 0]] * 6)),
+        (
+            "cells",
+            (
+                [],
+                [[0, 0]],
+                [[9, 9]] * 6,
+                [[-1, 0]] * 6,
+                [[0]] * 6,
+                [["a", "b"]] * 6,
+                [[0, 0, 0]] * 6,
+            ),
+        ),
         ("values", ([], [1.0], ["a"] * 3, [None] * 3, [1e308] * 3, [[1]] * 3)),
         ("unit", ("m", "rad", "1", "", "mm", None, 5, "x" * 300)),
         ("column", ("cell", "status", "reason", "fingerprint", "", None, 5, "a\nb", "=a")),
@@ -94,8 +162,15 @@ BYTES: dict[str, Callable[[Random, bytes], bytes]] = {
 
 
 def _places(connection: sqlite3.Connection) -> list[tuple[str, str]]:
-    tables = [name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
-    return [(table, row[1]) for table in tables for row in connection.execute(f'PRAGMA table_info("{table}")')]
+    tables = [
+        name
+        for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+    ]
+    return [
+        (table, row[1])
+        for table in tables
+        for row in connection.execute(f'PRAGMA table_info("{table}")')
+    ]
 
 
 def _place(random: Random, connection: sqlite3.Connection) -> tuple[str, str]:
@@ -112,12 +187,23 @@ def _loosened(connection: sqlite3.Connection, table: str) -> None:
     connection.execute(f'ALTER TABLE loose RENAME TO "{table}"')
 
 
-def _set(random: Random, connection: sqlite3.Connection, table: str, column: str, value: Any) -> None:
-    """Enter a value in one row or in all; as NULL, or twice, it may need a table without constraints."""
+def _set(
+    random: Random, connection: sqlite3.Connection, table: str, column: str, value: Any
+) -> None:
+    """Enter a value in one row or in all; as NULL, or twice, it may need a table without
+    constraints.
+    """
     rows = connection.execute(f'SELECT count(*) FROM "{table}"').fetchone()[0]
     one = random.randrange(max(rows, 1)) if random.random() < 0.6 else None
-    keys = ", ".join(row[1] for row in connection.execute(f'PRAGMA table_info("{table}")') if row[5]) or "rowid"
-    where = "" if one is None else f' WHERE ({keys}) = (SELECT {keys} FROM "{table}" LIMIT 1 OFFSET {one})'
+    keys = (
+        ", ".join(row[1] for row in connection.execute(f'PRAGMA table_info("{table}")') if row[5])
+        or "rowid"
+    )
+    where = (
+        ""
+        if one is None
+        else f' WHERE ({keys}) = (SELECT {keys} FROM "{table}" LIMIT 1 OFFSET {one})'
+    )
     try:
         connection.execute(f'UPDATE "{table}" SET "{column}" = ?{where}', [value])
     except sqlite3.Error:
@@ -145,8 +231,12 @@ def _ill_text(random: Random, connection: sqlite3.Connection) -> str:
 
 def _json(random: Random, connection: sqlite3.Connection) -> str:
     """Another tree in a text that is JSON: of a definition, of details, of names and versions."""
-    table, column = random.choice((("sweep", "definition"),) * 4 + (("result", "details"), ("text", "value")))
-    rows = connection.execute(f'SELECT rowid, "{column}" FROM "{table}"') if table != "result" else []
+    table, column = random.choice(
+        (("sweep", "definition"),) * 4 + (("result", "details"), ("text", "value"))
+    )
+    rows = (
+        connection.execute(f'SELECT rowid, "{column}" FROM "{table}"') if table != "result" else []
+    )
     known = list(rows) or list(connection.execute("SELECT key, details FROM result"))
     key, text = random.choice(known)
     tree = json.loads(text)

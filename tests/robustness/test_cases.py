@@ -1,4 +1,5 @@
-"""Whatever command lines, files and stores say, there is a result or what is wrong, soon and in bounded memory.
+"""Whatever command lines, files and stores say, there is a result or what is wrong, soon and in
+bounded memory.
 
 `cases` says what is tried, and how to try one case alone.
 """
@@ -108,7 +109,13 @@ def write_outside(folder: Path) -> None:
         (0, "", "", nothing, "nothing is said or done"),
         (0, "well\n", "", overwrite, "small.yaml has been changed"),
         (0, "well\n", "", delete, "points.csv has been deleted"),
-        (3, "", "small.yaml:1:1: is wrong; mend it\n", leave_behind, "rest.tmp has been left behind"),
+        (
+            3,
+            "",
+            "small.yaml:1:1: is wrong; mend it\n",
+            leave_behind,
+            "rest.tmp has been left behind",
+        ),
         (0, "well\n", "", write_outside, "intruder"),
     ],
 )

@@ -1,7 +1,8 @@
 """What is told does not depend on the kernels of linear algebra, which round in other ways.
 
-OpenBLAS has kernels for many processors and takes those that the variable OPENBLAS_CORETYPE names. Symmetrical designs
-are the hard ones: of what is equal but for rounding anything could be told first, and a null space in any basis.
+OpenBLAS has kernels for many processors and takes those that the variable OPENBLAS_CORETYPE names.
+Symmetrical designs are the hard ones: of what is equal but for rounding anything could be told
+first, and a null space in any basis.
 """
 
 from __future__ import annotations
@@ -58,12 +59,21 @@ COMMANDS = [
 
 
 def designs(folder: Path) -> None:
-    """Write the designs: as symmetrical as they can be, of full rank, deficient, and with weak directions."""
+    """Write the designs: as symmetrical as they can be, of full rank, deficient, and with weak
+    directions.
+    """
     quickstart = (ROOT / "designs" / "quickstart.yaml").read_text(encoding="utf-8")
     centred, count = re.subn(r"positions:\n(  - .*\n)+", CENTRED, quickstart)
     assert count == 1
-    target, calibration = "target_accuracy: 0.5 um + L/1000000", re.compile(r"calibration:.*?\n\n", re.DOTALL)
-    for text, one in ((quickstart, target), (centred, "_coefficients: 5"), (centred, "balls: [5, 5]")):
+    target, calibration = (
+        "target_accuracy: 0.5 um + L/1000000",
+        re.compile(r"calibration:.*?\n\n", re.DOTALL),
+    )
+    for text, one in (
+        (quickstart, target),
+        (centred, "_coefficients: 5"),
+        (centred, "balls: [5, 5]"),
+    ):
         assert one in text
     assert calibration.search(centred)
     written = {
@@ -73,7 +83,11 @@ def designs(folder: Path) -> None:
         "known": calibration.sub("", centred),
         "alone": re.sub(r"  - \{name: [xy],.*\n", "", centred),
         "weak": quickstart.replace(target, "target_accuracy: 0.02 um"),
-        "small": centred.replace("_coefficients: 5", "_coefficients: 3").replace("balls: [5, 5]", "balls: [4, 4]"),
+        "small": (
+            centred.replace("_coefficients: 5", "_coefficients: 3").replace(
+                "balls: [5, 5]", "balls: [4, 4]"
+            )
+        ),
         "pool": POOL,
     }
     for name, text in written.items():
@@ -88,7 +102,11 @@ def why_not(kernel: str) -> str:
     if not architectures():
         return "NumPy has no OpenBLAS"
     try:
-        features = set(re.findall(r"^flags\s*:(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)[0].split())
+        features = set(
+            re.findall(r"^flags\s*:(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)[
+                0
+            ].split()
+        )
     except (OSError, IndexError):
         return "what this processor can do is not known"
     missing = KERNELS[kernel][1] - features
@@ -133,7 +151,9 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[int, 
 
 
 def assert_same_text(one: str, other: str, of: str) -> None:
-    """Line by line; the bound of a plan, an iteration's, which ends within a thousandth, to that."""
+    """Line by line; the bound of a plan, an iteration's, which ends within a thousandth, to
+    that.
+    """
     lines, others = one.splitlines(), other.splitlines()
     assert len(lines) == len(others), of
     for line, same in zip(lines, others, strict=True):
@@ -152,13 +172,17 @@ def split(line: str) -> tuple[list[float], str]:
 
 
 def assert_same_data(one: Any, other: Any, place: str = "") -> None:
-    """JSON: the same words, counts and keys in the same order; numbers to six digits, beside what is rounding."""
+    """JSON: the same words, counts and keys in the same order; numbers to six digits, beside what
+    is rounding.
+    """
     assert type(one) is type(other), place
     if isinstance(one, dict):
         assert list(one) == list(other), place
         for key in one:
             if key == "singular_values":
-                assert one[key] == pytest.approx(other[key], rel=1e-6, abs=1e-13 * one[key][0]), place
+                assert one[key] == pytest.approx(other[key], rel=1e-6, abs=1e-13 * one[key][0]), (
+                    place
+                )
             else:
                 assert_same_data(one[key], other[key], f"{place}.{key}")
     elif isinstance(one, list):
@@ -172,15 +196,38 @@ def assert_same_data(one: Any, other: Any, place: str = "") -> None:
 
 
 @pytest.mark.parametrize("kernel", list(KERNELS))
-def test_the_same_is_told_with_every_kernel(kernel: str, said: dict[str, list[tuple[int, str, str]]]) -> None:
+def test_the_same_is_told_with_every_kernel(
+    kernel: str, said: dict[str, list[tuple[int, str, str]]]
+) -> None:
     if why_not(kernel):
         pytest.skip(why_not(kernel))
     first = next(iter(said))
     if kernel == first:
         # To be compared with; what the commands are about must show in it.
         text = "".join(out for _, out, _ in said[kernel])
-        assert [status for status, _, _ in said[kernel]] == [0, 1, 1, 0, 1, 1, 1, 0, 0, 0, 0, 0, 1, 1, 0]
-        for words in ("undetermined 2: ", "weakly determined 2: ", "bound of any choice", "cannot be detected"):
+        assert [status for status, _, _ in said[kernel]] == [
+            0,
+            1,
+            1,
+            0,
+            1,
+            1,
+            1,
+            0,
+            0,
+            0,
+            0,
+            0,
+            1,
+            1,
+            0,
+        ]
+        for words in (
+            "undetermined 2: ",
+            "weakly determined 2: ",
+            "bound of any choice",
+            "cannot be detected",
+        ):
             assert words in text, words
     for command, one, other in zip(COMMANDS, said[first], said[kernel], strict=True):
         assert one[0] == other[0], command

@@ -1,4 +1,6 @@
-"""Whatever stands in a file, there is a result or what is wrong with the file, soon and in bounded memory."""
+"""Whatever stands in a file, there is a result or what is wrong with the file, soon and in bounded
+memory.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ ENOUGH = 5
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Where mutants are tried, with the tables that they name, and other things that can be named."""
+    """Where mutants are tried, with the tables that they name, and other things that can be
+    named.
+    """
     for table in FILES.glob("*.csv"):
         shutil.copy(table, tmp_path)
     shutil.copy(QUICKSTART, tmp_path)
@@ -69,7 +73,9 @@ def try_experiments(trial: Any, files: list[Path], numbers: range, folder: Path)
 def try_sweeps(numbers: range, folder: Path) -> None:
     # Data sets of designs that hardly determine anything take long, and rightly so.
     with Worker(sweep, [Path("designs/sweeps/plate-size.yaml")], seconds=60.0) as worker:
-        found = list(islice(faults(worker, mutants(SWEEPS, SWEEP_WORDS, SEED, numbers), folder), ENOUGH))
+        found = list(
+            islice(faults(worker, mutants(SWEEPS, SWEEP_WORDS, SEED, numbers), folder), ENOUGH)
+        )
     assert not found, "\n\n".join(found)
 
 
@@ -109,7 +115,8 @@ def try_trees(count: int, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("trial", "numbers"), [(check, range(40)), (run, range(20_000, 20_008)), (simulate, range(30_000, 30_008))]
+    ("trial", "numbers"),
+    [(check, range(40)), (run, range(20_000, 20_008)), (simulate, range(30_000, 30_008))],
 )
 def test_some_mutants(trial: Any, numbers: range, folder: Path) -> None:
     try_experiments(trial, QUICK, numbers, folder)

@@ -37,14 +37,19 @@ def test_case_of_drives_and_folders_makes_no_difference() -> None:
 
 
 def test_files_on_two_drives_have_no_names() -> None:
-    paths: list[PurePath] = [PureWindowsPath("C:/plan/sweep.yaml"), PureWindowsPath("D:/plan/base.yaml")]
+    paths: list[PurePath] = [
+        PureWindowsPath("C:/plan/sweep.yaml"),
+        PureWindowsPath("D:/plan/base.yaml"),
+    ]
     with pytest.raises(ValueError, match="several drives"):
         names_of(paths)
 
 
 def test_names_that_differ_in_case_only_are_not_mixed_up(tmp_path: Path) -> None:
     """Here the same name stands for it twice, as a file system that does not tell case has it."""
-    bundle = Bundle("s.yaml", "b.yaml", (("s.yaml", b"1"), ("b.yaml", b"2"), ("x.csv", b"3"), ("x.csv", b"4")))
+    bundle = Bundle(
+        "s.yaml", "b.yaml", (("s.yaml", b"1"), ("b.yaml", b"2"), ("x.csv", b"3"), ("x.csv", b"4"))
+    )
     with pytest.raises(ValueError, match="differs in case only"):
         unpack(bundle, tmp_path)
     assert (tmp_path / "x.csv").read_bytes() == b"3"
@@ -57,7 +62,9 @@ def test_a_plan_on_another_drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         raise ValueError(f"path is on mount 'C:', start on mount 'D:' ({path}, {start})")
 
     (tmp_path / "balls.csv").write_text(
-        "ball,x_mm,y_mm\n" + "".join(f"{c}{r},{100 * c},{100 * r}\n" for r in range(4) for c in range(4)), "utf-8"
+        "ball,x_mm,y_mm\n"
+        + "".join(f"{c}{r},{100 * c},{100 * r}\n" for r in range(4) for c in range(4)),
+        "utf-8",
     )
     text, count = re.subn(r"(?m)^  plate: .*$", "  plate: {kind: balls, file: balls.csv}", TEXT)
     assert count == 1
@@ -66,7 +73,16 @@ def test_a_plan_on_another_drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     (tmp_path / "other").mkdir()
     monkeypatch.setattr(os.path, "relpath", relpath)
     chosen = tmp_path / "other/chosen.yaml"
-    plan = ["plan", str(tmp_path / "pool.yaml"), "--positions", "3", "--workers", "1", "-o", str(chosen)]
+    plan = [
+        "plan",
+        str(tmp_path / "pool.yaml"),
+        "--positions",
+        "3",
+        "--workers",
+        "1",
+        "-o",
+        str(chosen),
+    ]
     assert main(plan) in (0, 1)
     assert (tmp_path / "balls.csv").resolve().as_posix() in chosen.read_text(encoding="utf-8")
     load(chosen)
@@ -100,10 +116,22 @@ def test_messages_name_the_same_places_in_files_of_windows(
 
 def test_files_of_windows_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Line ends and byte order marks of experiments, readings, machines and error tables."""
-    assert main(["simulate", str(ROOT / "designs/quickstart.yaml"), "-o", str(tmp_path / "unix-readings.csv")]) == 0
+    assert (
+        main(
+            [
+                "simulate",
+                str(ROOT / "designs/quickstart.yaml"),
+                "-o",
+                str(tmp_path / "unix-readings.csv"),
+            ]
+        )
+        == 0
+    )
     shutil.copy(ROOT / "designs/quickstart.yaml", tmp_path / "unix.yaml")
     points = "".join(f"{10 * k},{k % 3}\n" for k in range(30))
-    (tmp_path / "unix-errors.csv").write_text(f"# by hand\nposition_mm,error_um\n{points}", encoding="utf-8")
+    (tmp_path / "unix-errors.csv").write_text(
+        f"# by hand\nposition_mm,error_um\n{points}", encoding="utf-8"
+    )
     for name in (".yaml", "-readings.csv", "-errors.csv"):
         content = (tmp_path / f"unix{name}").read_bytes()
         assert b"\r" not in content
@@ -116,7 +144,15 @@ def test_files_of_windows_say_the_same(tmp_path: Path, capsys: pytest.CaptureFix
     ):
         told = []
         for name in ("unix", "dos"):
-            assert main([str(tmp_path / one.replace("NAME", name)) if "NAME" in one else one for one in command]) == 0
+            assert (
+                main(
+                    [
+                        str(tmp_path / one.replace("NAME", name)) if "NAME" in one else one
+                        for one in command
+                    ]
+                )
+                == 0
+            )
             told.append(capsys.readouterr().out.replace(name, ""))
         assert told[0] == told[1] != ""
 
@@ -131,7 +167,18 @@ def test_a_plan_from_a_file_of_windows_has_line_feeds(tmp_path: Path) -> None:
         schema = "# yaml-language-server: $schema=schema.json\n"
         (folder / "pool.yaml").write_bytes((schema + TEXT).replace("\n", end).encode("utf-8"))
         chosen = folder / "chosen.yaml"
-        assert main(["plan", str(folder / "pool.yaml"), "--positions", "3", "--workers", "1", "-o", str(chosen)]) in (
+        assert main(
+            [
+                "plan",
+                str(folder / "pool.yaml"),
+                "--positions",
+                "3",
+                "--workers",
+                "1",
+                "-o",
+                str(chosen),
+            ]
+        ) in (
             0,
             1,
         )
@@ -147,13 +194,16 @@ def test_processes_may_be_started_anyhow(tmp_path: Path) -> None:
     assert methods
     script = tmp_path / "command.py"
     script.write_text(
-        "import multiprocessing, sys\nfrom ballplate.cli import main\n"
-        'if __name__ == "__main__":\n    multiprocessing.set_start_method(sys.argv.pop(1))\n    sys.exit(main())\n',
+        'import multiprocessing, sys\nfrom ballplate.cli import main\nif __name__ == "__main__":\n '
+        "   multiprocessing.set_start_method(sys.argv.pop(1))\n    sys.exit(main())\n",
         encoding="utf-8",
     )
     command = ["run", ROOT / "designs/quickstart.yaml", "--trials", "512", "--json", "--workers"]
     found = []
-    for start, workers in ((["-m", "ballplate"], "1"), *(([script, method], "2") for method in methods)):
+    for start, workers in (
+        (["-m", "ballplate"], "1"),
+        *(([script, method], "2") for method in methods),
+    ):
         ended = subprocess.run(
             [sys.executable, *start, *command, workers],
             env={**os.environ, "PYTHONPATH": str(ROOT)},
@@ -173,12 +223,20 @@ def test_nothing_is_loaded_that_windows_lacks() -> None:
     """Every module of the packages, in a Python without those of POSIX."""
     missing = "".join(f"sys.modules[{name!r}] = None\n" for name in conftest.MODULES)
     modules = []
-    for folder, package in (("analysis", ("ballplate",)), ("simulator", ("ballplate", "simulator"))):
+    for folder, package in (
+        ("analysis", ("ballplate",)),
+        ("simulator", ("ballplate", "simulator")),
+    ):
         for path in sorted((ROOT / folder).rglob("*.py")):
             if path.name != "__main__.py":
-                modules.append(".".join((*package, *path.relative_to(ROOT / folder).with_suffix("").parts)))
+                modules.append(
+                    ".".join((*package, *path.relative_to(ROOT / folder).with_suffix("").parts))
+                )
     assert len(modules) > 200
-    code = f"import importlib, sys\n{missing}for name in {modules!r}:\n    importlib.import_module(name)\n"
+    code = (
+        f"import importlib, sys\n{missing}for name in {modules!r}:\n   "
+        " importlib.import_module(name)\n"
+    )
     found = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert found.returncode == 0, found.stderr
 

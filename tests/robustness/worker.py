@@ -1,4 +1,6 @@
-"""Tries files in a process of its own, with bounds on time and memory, which a process that hangs cannot overstep."""
+"""Tries files in a process of its own, with bounds on time and memory, which a process that hangs
+cannot overstep.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from typing import Any
 from unicodedata import category
 
 Trial = Callable[[Any], str | None]
-"""Tries a file, or a command, and says what is wrong with what came of it, None where nothing is."""
+"""Tries a file, or a command, and says what is wrong with what came of it, None where nothing
+is.
+"""
 
 GIGABYTE = 2**30
 WAIT = 6.0
@@ -26,12 +30,15 @@ WAIT = 6.0
 # Control characters, half characters, and ends of lines and paragraphs.
 CONTROL = ("Cc", "Cs", "Zl", "Zp")
 
-# Of an error in a file after its name: where, what, and what would be right, which what was expected is.
+# Of an error in a file after its name: where, what, and what would be right, which what was
+# expected is.
 FORM = r".*?(:[1-9][0-9]*:[1-9][0-9]*)?: .*(\S; \S|expected .*[^:] found \S|: expected one of: ).*"
 
 
 class OutOfTimeError(BaseException):
-    """A trial takes too long; derived so that nothing under test takes it for an error of its own."""
+    """A trial takes too long; derived so that nothing under test takes it for an error of its
+    own.
+    """
 
 
 def outcome(arguments: Sequence[str], folder: Path = Path()) -> tuple[int, str, str]:
@@ -63,14 +70,20 @@ def complaint(arguments: Sequence[str], files: Path) -> str | None:
     # Every kind of line end counts.
     lines = err.splitlines()
     form = re.compile(re.escape(str(files)) + FORM)
-    ill = [line for line in lines if not form.fullmatch(line) or any(category(letter) in CONTROL for letter in line)]
+    ill = [
+        line
+        for line in lines
+        if not form.fullmatch(line) or any(category(letter) in CONTROL for letter in line)
+    ]
     if not lines:
         return "status 3, and no error"
     return f"not in the stated form: {ill[0][:600]!r}" if ill else None
 
 
 def _serve(connection: Connection, trial: Trial, memory: int) -> None:
-    """Try files until told to end. What was imported before is not counted, what is used together is."""
+    """Try files until told to end. What was imported before is not counted, what is used together
+    is.
+    """
     import ballplate.estimators.distances
     import ballplate.montecarlo.experiments
     import ballplate.results.study  # noqa: F401
@@ -78,7 +91,8 @@ def _serve(connection: Connection, trial: Trial, memory: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGPROF, _out_of_time)
     warnings.simplefilter("error")
-    # As in pyproject.toml: older releases of matplotlib use names that newer ones of pyparsing are giving up.
+    # As in pyproject.toml: older releases of matplotlib use names that newer ones of pyparsing are
+    # giving up.
     deprecated = r"'\w+' (argument is )?deprecated(,| -) use '\w+'"
     warnings.filterwarnings("ignore", deprecated, DeprecationWarning, "matplotlib")
     for request in connection.recv():
@@ -106,7 +120,9 @@ def _serve(connection: Connection, trial: Trial, memory: int) -> None:
 
 
 def _peak() -> int:
-    """Most memory that the process has had, in bytes; what getrusage tells is also of the process that started it."""
+    """Most memory that the process has had, in bytes; what getrusage tells is also of the process
+    that started it.
+    """
     if sys.platform != "linux":
         return 0
     found = re.search(r"VmHWM:\s*([0-9]+) kB", Path("/proc/self/status").read_text())
@@ -118,13 +134,16 @@ def _out_of_time(*_: Any) -> None:
 
 
 class Worker:
-    """A process that tries one request after the other; those of `warm_up` are good, and tried before bounds are set.
+    """A process that tries one request after the other; those of `warm_up` are good, and tried
+    before bounds are set.
 
-    `seconds` are of processor time, which does not depend on what else the computer does; the process is waited for
-    six times as long.
+    `seconds` are of processor time, which does not depend on what else the computer does; the
+    process is waited for six times as long.
     """
 
-    def __init__(self, trial: Trial, warm_up: Sequence[Any], seconds: float = 10.0, memory: int = GIGABYTE) -> None:
+    def __init__(
+        self, trial: Trial, warm_up: Sequence[Any], seconds: float = 10.0, memory: int = GIGABYTE
+    ) -> None:
         self.trial, self.warm_up, self.seconds, self.memory = trial, warm_up, seconds, memory
         self.peak = 0
         self._start()
@@ -140,7 +159,8 @@ class Worker:
         self.connection.recv()
 
     def __call__(self, request: Any, seconds: float | None = None) -> str | None:
-        """What is wrong with what comes of a request, for which there may be more time than for others.
+        """What is wrong with what comes of a request, for which there may be more time than for
+        others.
 
         A process that does not answer any more is replaced.
         """

@@ -26,7 +26,9 @@ def noisy(count: int, lower: float, upper: float, seed: int = 1) -> tuple[np.nda
     return lower + (upper - lower) * t, np.sin(5 * t) + 0.1 * generator.standard_normal(count)
 
 
-def clamped(space: SplineSpace, values: tuple[float, float], slopes: tuple[float, float]) -> tuple[Constraint, ...]:
+def clamped(
+    space: SplineSpace, values: tuple[float, float], slopes: tuple[float, float]
+) -> tuple[Constraint, ...]:
     """The document's four conditions, equation (12)."""
     ends = (space.lower, space.upper)
     return tuple(
@@ -39,19 +41,26 @@ def clamped(space: SplineSpace, values: tuple[float, float], slopes: tuple[float
 def document_rows(space: SplineSpace) -> np.ndarray:
     """Equation (14)."""
     knots, ends = np.array(space.knots), np.array([space.lower, space.upper])
-    return np.vstack([truncated_powers.powers(ends, knots), truncated_powers.powers(ends, knots, 1)])
+    return np.vstack(
+        [truncated_powers.powers(ends, knots), truncated_powers.powers(ends, knots, 1)]
+    )
 
 
 @pytest.mark.parametrize("every", [4, 5, 8])
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_pseudo_inverses_give_the_same_curve_where_truncated_powers_are_well_conditioned(every: int, seed: int) -> None:
+def test_pseudo_inverses_give_the_same_curve_where_truncated_powers_are_well_conditioned(
+    every: int, seed: int
+) -> None:
     x, y = noisy(40, 0.0, 1.0, seed)
     space = SplineSpace(4, 0.0, 1.0, at_every(x, every, 0.0, 1.0))
     fitted = fit(space, x, y, None, clamped(space, (0.1, -0.9), (4.0, 0.5)))
     knots, conditions = np.array(space.knots), document_rows(space)
-    c = truncated_powers.constrained(x, y, knots, conditions, np.array([0.1, -0.9, 4.0, 0.5]), 1e-12)
+    c = truncated_powers.constrained(
+        x, y, knots, conditions, np.array([0.1, -0.9, 4.0, 0.5]), 1e-12
+    )
     design = truncated_powers.powers(x, knots)
-    # What rounding does to a pseudo-inverse solution: the condition times the solution, its square times the residual.
+    # What rounding does to a pseudo-inverse solution: the condition times the solution, its square
+    # times the residual.
     reduced = design @ (np.eye(space.count) - np.linalg.pinv(conditions) @ conditions)
     found = np.linalg.svd(reduced, compute_uv=False)[: space.count - 4]
     size = np.linalg.norm(c) + np.linalg.norm(fitted.residuals) / found[-1]
@@ -60,7 +69,9 @@ def test_pseudo_inverses_give_the_same_curve_where_truncated_powers_are_well_con
     np.testing.assert_allclose(design @ c, fitted.values(x), rtol=0, atol=bound)
 
 
-@pytest.mark.parametrize(("lower", "upper"), [(0.0, 1.0), (0.0, 6e4), (1000.0, 1060.0), (-0.06, 0.0)])
+@pytest.mark.parametrize(
+    ("lower", "upper"), [(0.0, 1.0), (0.0, 6e4), (1000.0, 1060.0), (-0.06, 0.0)]
+)
 def test_the_documents_formula_with_sixty_digits_gives_the_same_curve_for_any_abscissa(
     lower: float, upper: float
 ) -> None:
@@ -72,7 +83,9 @@ def test_the_documents_formula_with_sixty_digits_gives_the_same_curve_for_any_ab
     knots = np.array(space.knots)
     with mpmath.workdps(60):
         design = _exact_powers(x, knots)
-        conditions = mpmath.matrix([*_exact_powers([lower, upper], knots).tolist(), *_slopes([lower, upper], knots)])
+        conditions = mpmath.matrix(
+            [*_exact_powers([lower, upper], knots).tolist(), *_slopes([lower, upper], knots)]
+        )
         inverse = _pseudo_inverse(conditions)
         z = mpmath.eye(design.cols) - inverse * conditions
         start = inverse * mpmath.matrix([0.1, -0.9, slope, 0.0])
@@ -82,13 +95,20 @@ def test_the_documents_formula_with_sixty_digits_gives_the_same_curve_for_any_ab
 
 
 def _exact_powers(x: object, knots: np.ndarray) -> mpmath.matrix:
-    points, places = [mpmath.mpf(float(value)) for value in x], [mpmath.mpf(float(t)) for t in knots]  # type: ignore[attr-defined]
-    return mpmath.matrix([[p**0, p, p**2, p**3, *(max(p - t, 0) ** 3 for t in places)] for p in points])
+    points, places = (
+        [mpmath.mpf(float(value)) for value in x],
+        [mpmath.mpf(float(t)) for t in knots],
+    )  # type: ignore[attr-defined]
+    return mpmath.matrix(
+        [[p**0, p, p**2, p**3, *(max(p - t, 0) ** 3 for t in places)] for p in points]
+    )
 
 
 def _slopes(x: list[float], knots: np.ndarray) -> list[list[mpmath.mpf]]:
     points, places = [mpmath.mpf(value) for value in x], [mpmath.mpf(float(t)) for t in knots]
-    return [[p * 0, p**0, 2 * p, 3 * p**2, *(3 * max(p - t, 0) ** 2 for t in places)] for p in points]
+    return [
+        [p * 0, p**0, 2 * p, 3 * p**2, *(3 * max(p - t, 0) ** 2 for t in places)] for p in points
+    ]
 
 
 def _pseudo_inverse(matrix: mpmath.matrix) -> mpmath.matrix:
@@ -103,7 +123,9 @@ def _pseudo_inverse(matrix: mpmath.matrix) -> mpmath.matrix:
 def test_double_precision_pseudo_inverses_fail_far_from_zero_and_in_small_units(
     lower: float, upper: float, worst: float
 ) -> None:
-    """Cubes of the abscissa leave a condition beyond the tolerance that tells zero singular values."""
+    """Cubes of the abscissa leave a condition beyond the tolerance that tells zero singular
+    values.
+    """
     x, y = noisy(20, lower, upper)
     space = SplineSpace(4, lower, upper, at_every(x, 5, lower, upper))
     slope = 3.0 / (upper - lower)
@@ -140,7 +162,9 @@ def test_as_many_constraints_as_freedom_is_interpolation() -> None:
 
     y[-1] = y[0]
     closed = fit(space, x[:-1], y[:-1], None, periodic(space))
-    np.testing.assert_allclose(closed.values(places), CubicSpline(x, y, bc_type="periodic")(places), atol=1e-12)
+    np.testing.assert_allclose(
+        closed.values(places), CubicSpline(x, y, bc_type="periodic")(places), atol=1e-12
+    )
 
     ends = (*clamped(space, (0.0, 1.0), (0.0, 0.0)), prescribed(0.0, 2, 0.0))
     alone = SplineSpace(4, 0.0, 4.0, (2.0,))
@@ -150,15 +174,23 @@ def test_as_many_constraints_as_freedom_is_interpolation() -> None:
 
 
 @st.composite
-def problems(draw: st.DrawFn) -> tuple[SplineSpace, np.ndarray, np.ndarray, np.ndarray, tuple[Constraint, ...]]:
+def problems(
+    draw: st.DrawFn,
+) -> tuple[SplineSpace, np.ndarray, np.ndarray, np.ndarray, tuple[Constraint, ...]]:
     order = draw(st.integers(2, 6))
     lower = draw(st.sampled_from([0.0, -3.0, 1e3]))
     length = draw(st.sampled_from([1.0, 1e-3, 60.0]))
     places = draw(st.lists(st.integers(1, 9), max_size=4, unique=True))
-    knots = sorted(lower + length * k / 10 for k in places for _ in range(draw(st.integers(1, order - 1))))
+    knots = sorted(
+        lower + length * k / 10 for k in places for _ in range(draw(st.integers(1, order - 1)))
+    )
     space = SplineSpace(order, lower, lower + length, tuple(knots))
     generator = np.random.default_rng(draw(st.integers(0, 99)))
-    x = np.sort(np.concatenate([lower + length * np.linspace(0, 1, 41), lower + length * generator.random(20)]))
+    x = np.sort(
+        np.concatenate(
+            [lower + length * np.linspace(0, 1, 41), lower + length * generator.random(20)]
+        )
+    )
     x = np.clip(x, space.lower, space.upper)
     y, u = generator.standard_normal(61), generator.uniform(0.5, 2.0, 61)
     found = []
@@ -183,16 +215,19 @@ def test_constraints_hold_and_nothing_that_meets_them_fits_better(
             # Straight lines and parabolas without knots cannot meet all four.
             assert len(constraints) > space.count - 2
             return
-        # Between two knots of full multiplicity there may be fewer points than the piece has coefficients.
+        # Between two knots of full multiplicity there may be fewer points than the piece has
+        # coefficients.
         matrix, _ = rows(space, constraints)
         whole = np.vstack([space.rows(x), matrix.reshape(-1, space.count)])
-        assert "lacks" in str(error) and np.linalg.matrix_rank(whole / np.abs(whole).max(axis=1, keepdims=True)) < (
-            space.count
-        )
+        assert "lacks" in str(error) and np.linalg.matrix_rank(
+            whole / np.abs(whole).max(axis=1, keepdims=True)
+        ) < (space.count)
         return
     scale = np.abs(fitted.coefficients).max() + np.abs(y).max()
     for constraint in constraints:
-        assert abs(fitted.violation(constraint)) * space.length**constraint.derivative < 1e-12 * scale
+        assert (
+            abs(fitted.violation(constraint)) * space.length**constraint.derivative < 1e-12 * scale
+        )
     # The gradient is a combination of the constraints' rows: Lagrange's conditions.
     design = space.rows(x) / u[:, None]
     gradient = design.T @ (design @ fitted.coefficients - y / u)
@@ -203,7 +238,9 @@ def test_constraints_hold_and_nothing_that_meets_them_fits_better(
     if not fitted.redundant:
         n, m = space.count, len(constraints)
         whole = np.block([[design.T @ design, matrix.T], [matrix, np.zeros((m, m))]])
-        np.testing.assert_allclose(fitted.root @ fitted.root.T, np.linalg.inv(whole)[:n, :n], atol=1e-8)
+        np.testing.assert_allclose(
+            fitted.root @ fitted.root.T, np.linalg.inv(whole)[:n, :n], atol=1e-8
+        )
 
 
 @settings(max_examples=30)
@@ -229,18 +266,25 @@ def test_powers_of_x_are_those_of_the_documents_recursion() -> None:
     knots, values = np.array(space.knots), np.array([0.0, 0.0, 1.0, 0.0])
     c = truncated_powers.constrained(x, y, knots, document_rows(space), values, 1e-12)
     wanted = truncated_powers.pieces(c, knots)
-    np.testing.assert_allclose(pieces(fitted, "global").coefficients, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
+    np.testing.assert_allclose(
+        pieces(fitted, "global").coefficients, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max()
+    )
 
 
 def test_sigma_and_the_band_cover_as_they_say() -> None:
-    """1200 data sets of a curve within the space: spread of the fitted curve and mean of sigma squared."""
+    """1200 data sets of a curve within the space: spread of the fitted curve and mean of sigma
+    squared.
+    """
     x = np.linspace(0.0, 1.0, 15)
     space = SplineSpace(4, 0.0, 1.0, (0.5,))
     ends = (prescribed(0.0, 1, 0.0),)
     truth = fit(space, x, np.sin(3 * x), None, ends)
     generator = np.random.default_rng(np.random.SeedSequence(7))
     places = np.array([0.0, 0.3, 1.0])
-    found = [fit(space, x, truth.values(x) + 0.1 * generator.standard_normal(15), None, ends) for _ in range(1200)]
+    found = [
+        fit(space, x, truth.values(x) + 0.1 * generator.standard_normal(15), None, ends)
+        for _ in range(1200)
+    ]
     curves = np.array([one.values(places) for one in found])
     np.testing.assert_allclose(curves.std(axis=0), 0.1 * truth.spread(places), rtol=0.08)
     assert np.mean([one.sigma**2 for one in found]) == pytest.approx(0.01, rel=0.05)
@@ -260,12 +304,19 @@ def test_features_share_value_and_slope_and_no_more() -> None:
     x, y = noisy(60, 0.0, 3.0)
     y += 3 * np.abs(x - 1.0) ** 2 * (x > 1.0)
     boundaries = (1.0, 2.5)
-    space = SplineSpace(4, 0.0, 3.0, with_boundaries(at_every(x, 8, 0.0, 3.0, boundaries), boundaries, 4))
+    space = SplineSpace(
+        4, 0.0, 3.0, with_boundaries(at_every(x, 8, 0.0, 3.0, boundaries), boundaries, 4)
+    )
     fitted = fit(space, x, y, None, straight(space, 2.5, 3.0))
     for k, largest in ((0, 1e-12), (1, 1e-11)):
-        jumps = fitted.values(np.array(boundaries), k) - fitted.values(np.array(boundaries), k, "below")
+        jumps = fitted.values(np.array(boundaries), k) - fitted.values(
+            np.array(boundaries), k, "below"
+        )
         assert np.abs(jumps).max() < largest
-    assert np.abs(fitted.values(np.array([1.0]), 2) - fitted.values(np.array([1.0]), 2, "below"))[0] > 1.0
+    assert (
+        np.abs(fitted.values(np.array([1.0]), 2) - fitted.values(np.array([1.0]), 2, "below"))[0]
+        > 1.0
+    )
     line = np.array([2.5, 2.75, 3.0])
     np.testing.assert_allclose(fitted.values(line, 1), fitted.values(line[:1], 1)[0], atol=1e-12)
     # Two cubics with knots and a line, less value and slope at each boundary.
@@ -279,7 +330,8 @@ def test_a_band_of_points_that_leaves_the_curve_open_is_named() -> None:
         fit(SplineSpace(4, 0.0, 1.0, (0.35, 0.5, 0.6, 0.7, 0.8)), x, x)
     told = [problem.told(lambda place: f"{1e3 * place:g} mm") for problem in error.value.problems]
     assert told == [
-        "the curve lacks 3 points between 350 mm and 1000 mm, where it has 2; leave out knots or prescribe more"
+        "the curve lacks 3 points between 350 mm and 1000 mm, where it has 2; leave out knots or"
+        " prescribe more"
     ]
     with pytest.raises(SplineError, match="lacks 1 point between 0.5 and 1, where it has 1"):
         fit(SplineSpace(2, 0.0, 1.0, (0.5,)), np.array([0.0, 0.2, 0.5]), np.zeros(3))
@@ -290,12 +342,23 @@ def test_contradictions_and_repetitions_are_told() -> None:
     space = SplineSpace(4, 0.0, 1.0)
     twice = (prescribed(0.0, 1, 0.5), prescribed(0.0, 1, 0.5))
     assert fit(space, x, y, None, twice).redundant == (twice[1],)
-    with pytest.raises(SplineError, match="^the slope at 0 is prescribed twice, differently; leave one of them out$"):
+    with pytest.raises(
+        SplineError,
+        match="^the slope at 0 is prescribed twice, differently; leave one of them out$",
+    ):
         fit(space, x, y, None, (prescribed(0.0, 1, 0.5), prescribed(0.0, 1, 0.6)))
     line = SplineSpace(2, 0.0, 1.0)
     with pytest.raises(SplineError, match=r"contradicts the \w+ at [01], the \w+ at [01]; leave"):
-        fit(line, x, y, None, (prescribed(0.0, 0, 0.0), prescribed(1.0, 0, 1.0), prescribed(0.0, 1, 2.0)))
-    with pytest.raises(SplineError, match="the second derivative at 0 is zero for every spline of this order"):
+        fit(
+            line,
+            x,
+            y,
+            None,
+            (prescribed(0.0, 0, 0.0), prescribed(1.0, 0, 1.0), prescribed(0.0, 1, 2.0)),
+        )
+    with pytest.raises(
+        SplineError, match="the second derivative at 0 is zero for every spline of this order"
+    ):
         fit(line, x, y, None, (prescribed(0.0, 2, 1.0),))
 
 
@@ -303,7 +366,9 @@ def test_nothing_is_extrapolated() -> None:
     x, y = noisy(12, 0.0, 1.0)
     fitted = fit(SplineSpace(4, 0.0, 1.0), x, y)
     for ask in (fitted.values, fitted.spread):
-        with pytest.raises(SplineError, match=r"1.1 is outside the curve, from 0 to 1; it is not extrapolated"):
+        with pytest.raises(
+            SplineError, match=r"1.1 is outside the curve, from 0 to 1; it is not extrapolated"
+        ):
             ask(np.array([0.5, 1.1]))
     with pytest.raises(SplineError, match="-0.5 is outside"):
         fit(fitted.space, np.append(x, -0.5), np.append(y, 0.0))

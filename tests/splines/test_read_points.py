@@ -26,16 +26,28 @@ def told(path: Path, text: str, x: str | None = None, y: str | None = None) -> l
 def test_an_abscissa_and_an_error(write: Path) -> None:
     write.write_text("# laser\nposition_mm,EXX_um,note\n0,0,start\n 250,0.8,\n", encoding="utf-8")
     points = read_points(write)
-    assert points.x is not None and points.x.tolist() == [0.0, 0.25] and points.y.tolist() == [0.0, 8e-7]
+    assert (
+        points.x is not None
+        and points.x.tolist() == [0.0, 0.25]
+        and points.y.tolist() == [0.0, 8e-7]
+    )
     assert points.names == ("1", "2") and points.places is None and points.uncertainties is None
-    assert points.x_column == Column("position", "mm", 1e-3, "length") and points.y_column.words == "EXX"
+    assert (
+        points.x_column == Column("position", "mm", 1e-3, "length")
+        and points.y_column.words == "EXX"
+    )
 
 
 def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
-    write.write_text("point,x_mm,z_in,first_um,second_um,u_nm\na,1,1,2,3,50\nb,2,1,2,4,60\n", encoding="utf-8")
+    write.write_text(
+        "point,x_mm,z_in,first_um,second_um,u_nm\na,1,1,2,3,50\nb,2,1,2,4,60\n", encoding="utf-8"
+    )
     points = read_points(write, y="second_um")
     assert points.x is None and points.x_column == Column("arc_length", "mm", 1e-3, "length")
-    assert points.places is not None and points.places.tolist() == [[0.001, 0.0254], [0.002, 0.0254]]
+    assert points.places is not None and points.places.tolist() == [
+        [0.001, 0.0254],
+        [0.002, 0.0254],
+    ]
     np.testing.assert_allclose(points.uncertainties, [5e-8, 6e-8])
     assert points.names == ("a", "b") and points.y.tolist() == [3e-6, 4e-6]
     along_z = read_points(write, x="z", y="first")
@@ -46,7 +58,9 @@ def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
 
 
 def test_normals_of_the_drawing(write: Path) -> None:
-    write.write_text("x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,3,4\n2,1,2,-1,0\n", encoding="utf-8")
+    write.write_text(
+        "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,3,4\n2,1,2,-1,0\n", encoding="utf-8"
+    )
     points = read_points(write)
     assert points.normals is not None
     np.testing.assert_allclose(points.normals, [[0.6, 0.8], [-1.0, 0.0]])
@@ -66,23 +80,54 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
         'data.csv:3:5: "x" is not a number; write for example "500.0003"',
         'data.csv:3:1: a second point "1", as in line 2; rename one',
         "data.csv:4:5: no error; write a number, or remove the line",
-        "data.csv:5:1: 2 columns instead of 4; write one line per row, its columns separated by commas",
+        (
+            "data.csv:5:1: 2 columns instead of 4; write one line per row, its columns separated by"
+            " commas"
+        ),
         'data.csv:6:7: "0" is no standard uncertainty; give one above zero',
-        'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m',
+        (
+            'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of'
+            " 1e-18 m to 1e+06 m"
+        ),
     ]
 
 
 @pytest.mark.parametrize(
     ("text", "x", "y", "message"),
     [
-        ("", None, None, "data.csv: the file is empty; its first line should be position_mm,error_um"),
+        (
+            "",
+            None,
+            None,
+            "data.csv: the file is empty; its first line should be position_mm,error_um",
+        ),
         ("position_mm;error_um\n", None, None, "the columns are not separated by commas"),
-        ("position,error_um\n1,2\n", None, None, "there is no abscissa beside the error; position has no unit"),
-        ("position_mm,error\n1,2\n", None, None, "there is no abscissa beside the error; error has no unit"),
+        (
+            "position,error_um\n1,2\n",
+            None,
+            None,
+            "there is no abscissa beside the error; position has no unit",
+        ),
+        (
+            "position_mm,error\n1,2\n",
+            None,
+            None,
+            "there is no abscissa beside the error; error has no unit",
+        ),
         ("position_mm\n1\n", None, None, "there is no abscissa beside the error"),
-        ("position,error\n1,2\n", None, None, "no column is left for the error; its name needs a unit"),
+        (
+            "position,error\n1,2\n",
+            None,
+            None,
+            "no column is left for the error; its name needs a unit",
+        ),
         ("a_mm,b_um,c_um\n1,2,3\n", None, "d", 'no column "d" for --y; known: a, b, c'),
-        ("a_mm,error,c_um\n1,2,3\n", None, "error", 'the column "error" has no unit of length or angle'),
+        (
+            "a_mm,error,c_um\n1,2,3\n",
+            None,
+            "error",
+            'the column "error" has no unit of length or angle',
+        ),
         ("a_mm,b_um\n1,2\n", "b", "b", "b is chosen for x and for y"),
         ("a_mm,b_um\n1,2\n", "arc_length", "b", "the arc length needs a profile"),
         ("a_mm,a_um\n1,2\n", None, None, 'a second column "a_um"; remove one of them'),
@@ -90,14 +135,19 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
         ("a_mm,b_um\n", None, None, "no rows below the names of the columns"),
     ],
 )
-def test_files_that_cannot_be_used(write: Path, text: str, x: str | None, y: str | None, message: str) -> None:
+def test_files_that_cannot_be_used(
+    write: Path, text: str, x: str | None, y: str | None, message: str
+) -> None:
     found = told(write, text, x, y)
     assert len(found) == 1 and message in found[0]
 
 
 def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
     assert told(write, 'position_mm,error_um\n10,2\n30,4,11\n40,"5,3"\n50;6\n60,7;8\n') == [
-        "data.csv:3:1: 3 columns instead of 2; if a comma is meant as the decimal point, write a point, as in 4.11",
+        (
+            "data.csv:3:1: 3 columns instead of 2; if a comma is meant as the decimal point, write"
+            " a point, as in 4.11"
+        ),
         'data.csv:4:4: "5,3" has a decimal comma; write 5.3',
         "data.csv:5:1: 1 columns instead of 2; separate them by commas",
         'data.csv:6:4: "7;8" is no number; separate the columns by commas',
@@ -107,12 +157,16 @@ def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
 def test_an_experiment_is_no_table(tmp_path: Path) -> None:
     path = tmp_path / "mine.yml"
     path.write_text("title: t\n", encoding="utf-8")
-    with pytest.raises(ExperimentError, match="this is YAML, not a table; give a CSV file that begins with"):
+    with pytest.raises(
+        ExperimentError, match="this is YAML, not a table; give a CSV file that begins with"
+    ):
         read_points(path)
 
 
 def test_points_by_name(write: Path) -> None:
-    write.write_text("point,a_mm,b_um\n" + "".join(f"{k},1,0\n" for k in (1, 2, 3, 7, "end")), encoding="utf-8")
+    write.write_text(
+        "point,a_mm,b_um\n" + "".join(f"{k},1,0\n" for k in (1, 2, 3, 7, "end")), encoding="utf-8"
+    )
     points = read_points(write)
     assert choose_points(points, "2-7", "data.csv") == [1, 2, 3]
     assert choose_points(points, "end, 1,2-3", "data.csv") == [0, 1, 2, 4]

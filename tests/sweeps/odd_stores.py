@@ -68,7 +68,9 @@ def of_the_first_format(path: Path) -> None:
     connection.executescript(FIRST)
     connection.execute("ATTACH ? AS newer", [str(newer)])
     for table in ("sweep", "bundle", "cell", "text", "result"):
-        names = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA main.table_info({table})"))
+        names = ", ".join(
+            name for _, name, *_ in connection.execute(f"PRAGMA main.table_info({table})")
+        )
         connection.execute(f"INSERT INTO {table} ({names}) SELECT {names} FROM newer.{table}")
     connection.execute("INSERT INTO about VALUES ('format', 'ballplate sweep store 1')")
     connection.close()
@@ -112,7 +114,9 @@ def page_of(table: str) -> Damage:
     def apply(path: Path) -> None:
         settled(path)
         connection = sqlite3.connect(path)
-        (page,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", [table]).fetchone()
+        (page,) = connection.execute(
+            "SELECT rootpage FROM sqlite_master WHERE name = ?", [table]
+        ).fetchone()
         (size,) = connection.execute("PRAGMA page_size").fetchone()
         connection.close()
         overwritten((page - 1) * size, b"\xa5" * size)(path)
@@ -155,7 +159,9 @@ def loop(path: Path) -> None:
 # What is no store, whatever a command wants of it.
 NO_STORES: dict[str, Damage] = {
     "text": replaced(lambda path: path.write_text("nonsense\n" * 1000, encoding="utf-8")),
-    "yaml": replaced(lambda path: path.write_text("title: t\nbase: e.yaml\naxes: {}\n", encoding="utf-8")),
+    "yaml": replaced(
+        lambda path: path.write_text("title: t\nbase: e.yaml\naxes: {}\n", encoding="utf-8")
+    ),
     "zeros": replaced(lambda path: path.write_bytes(b"SQLite format 3\0" + b"\0" * 5000)),
     "foreign": replaced(foreign),
     "folder": replaced(Path.mkdir),
@@ -174,8 +180,8 @@ NO_STORES: dict[str, Damage] = {
     "column missing": by_sql("ALTER TABLE result DROP COLUMN details"),
     "view": by_sql(
         "ALTER TABLE cell RENAME TO real_cell",
-        "CREATE VIEW cell AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT 1 AS sweep, "
-        "x AS number, 'key' AS key FROM n",
+        "CREATE VIEW cell AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT"
+        " 1 AS sweep, x AS number, 'key' AS key FROM n",
     ),
     "trigger": by_sql("CREATE TRIGGER odd AFTER INSERT ON cell BEGIN DELETE FROM result; END"),
     "generated": by_sql("ALTER TABLE result ADD COLUMN more AS (hex(zeroblob(100000000)))"),
@@ -190,7 +196,10 @@ NO_STORES: dict[str, Damage] = {
 # What is a store still, in parts.
 DAMAGED: dict[str, Damage] = {
     **{f"cut to {share}": cut(share) for share in (0.3, 0.5, 0.7, 0.9, 0.99)},
-    **{f"first page of {table}": page_of(table) for table in ("sweep", "bundle", "cell", "text", "result")},
+    **{
+        f"first page of {table}": page_of(table)
+        for table in ("sweep", "bundle", "cell", "text", "result")
+    },
     "no definition": by_sql("DELETE FROM sweep"),
     "no keys": by_sql("DELETE FROM cell"),
     "no texts": by_sql("DELETE FROM text"),
@@ -215,12 +224,16 @@ DAMAGED: dict[str, Damage] = {
     "figures none": by_sql("UPDATE result SET figures = x'' WHERE rowid = 1"),
     "figures a text": by_sql("UPDATE result SET figures = 'text' WHERE rowid = 1"),
     "figures a number": by_sql("UPDATE result SET figures = 3 WHERE rowid = 1"),
-    "figures others": by_sql("UPDATE result SET figures = zeroblob(length(figures)) WHERE rowid = 1"),
+    "figures others": by_sql(
+        "UPDATE result SET figures = zeroblob(length(figures)) WHERE rowid = 1"
+    ),
     "status unknown": by_sql("UPDATE result SET status = 'DONE' WHERE rowid = 1"),
     "status of bytes": by_sql("UPDATE result SET status = x'fffe' WHERE rowid = 1"),
     "status a number": by_sql("UPDATE result SET status = 4 WHERE rowid = 1"),
     "reason of bytes": by_sql("UPDATE result SET reason = x'1b5b33316dff' WHERE rowid = 1"),
-    "reason no text": by_sql("UPDATE result SET reason = CAST(x'1b5b33316dff' AS TEXT) WHERE rowid = 1"),
+    "reason no text": by_sql(
+        "UPDATE result SET reason = CAST(x'1b5b33316dff' AS TEXT) WHERE rowid = 1"
+    ),
     "reason long": by_sql("UPDATE result SET reason = hex(zeroblob(3000000)) WHERE rowid = 1"),
     "seed a text": by_sql("UPDATE result SET seed = 'x' WHERE rowid = 1"),
     "seed infinite": by_sql("UPDATE result SET seed = 9e999 WHERE rowid = 1"),
@@ -230,7 +243,9 @@ DAMAGED: dict[str, Damage] = {
     "details no JSON": by_sql("UPDATE result SET details = '{' WHERE rowid = 1"),
     "details a list": by_sql("UPDATE result SET details = '[]' WHERE rowid = 1"),
     "details nested": by_sql(f"UPDATE result SET details = '{'[' * 100_000}' WHERE rowid = 1"),
-    "details of numbers": by_sql('UPDATE result SET details = \'{"weak": 3, "flags": [1]}\' WHERE rowid = 1'),
+    "details of numbers": by_sql(
+        'UPDATE result SET details = \'{"weak": 3, "flags": [1]}\' WHERE rowid = 1'
+    ),
     "details of bytes": by_sql("UPDATE result SET details = x'ff' WHERE rowid = 1"),
     "block a text": by_sql("UPDATE result SET block = 'x' WHERE rowid = 1"),
     "tally no tally": by_sql("UPDATE result SET tally = x'00' WHERE rowid = 1"),
@@ -253,10 +268,14 @@ DAMAGED: dict[str, Damage] = {
     "unit odd": by_definition(lambda found: found["axes"][0].update(unit="furlong")),
     "values texts": by_definition(lambda found: found["axes"][0].update(values=["a", "b"])),
     "values too few": by_definition(lambda found: found["axes"][0].update(values=[1.0])),
-    "values infinite": by_definition(lambda found: found["axes"][1].update(values=[float("inf")] * 2)),
+    "values infinite": by_definition(
+        lambda found: found["axes"][1].update(values=[float("inf")] * 2)
+    ),
     "labels none": by_definition(lambda found: found["axes"][0].update(labels=[])),
     "column taken": by_definition(lambda found: found["axes"][0].update(column="status")),
-    "columns equal": by_definition(lambda found: found["axes"][0].update(column=found["axes"][1]["column"])),
+    "columns equal": by_definition(
+        lambda found: found["axes"][0].update(column=found["axes"][1]["column"])
+    ),
     "cells beyond": by_definition(lambda found: found.update(cells=[[7, 7]] * 4)),
     "cells negative": by_definition(lambda found: found.update(cells=[[-1, 0]] * 4)),
     "cells ragged": by_definition(lambda found: found.update(cells=[[0], [0, 1]])),

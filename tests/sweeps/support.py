@@ -39,12 +39,16 @@ def command(*arguments: object) -> list[str]:
 
 
 def hearing_interruptions() -> None:
-    """For `preexec_fn`: what shells start in the background ignores interruptions, and so does all that it starts."""
+    """For `preexec_fn`: what shells start in the background ignores interruptions, and so does all
+    that it starts.
+    """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def run(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*arguments), cwd=ROOT, capture_output=True, text=True, timeout=240, **options)
+    return subprocess.run(
+        command(*arguments), cwd=ROOT, capture_output=True, text=True, timeout=240, **options
+    )
 
 
 def stored(path: Path) -> int:

@@ -55,7 +55,9 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
     def begin(*arguments: str) -> subprocess.Popen[bytes]:
         with (tmp_path / "log").open("ab") as log:
-            process = subprocess.Popen([sys.executable, *arguments], stdout=log, stderr=log, cwd=ROOT)
+            process = subprocess.Popen(
+                [sys.executable, *arguments], stdout=log, stderr=log, cwd=ROOT
+            )
         processes.append(process)
         return process
 
@@ -69,7 +71,15 @@ def start(tmp_path: Path) -> Iterator[Start]:
 def scheduler(tmp_path: Path, start: Start) -> tuple[str, subprocess.Popen[bytes]]:
     """Address and process of a scheduler without workers."""
     file = tmp_path / "scheduler.json"
-    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+    options = [
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    ]
     process = start("-m", "distributed.cli.dask_scheduler", *options)
     end = time.monotonic() + 60
     while not file.exists():
@@ -88,27 +98,41 @@ def ended(path: Path, address: str) -> str:
 
 @pytest.mark.parametrize(
     ("worker", "words"),
-    [(WITHOUT, "no ballplate"), (OTHER, "ballplate 0.0.7"), (OTHER_CODE, "other code of ballplate 0.1.0")],
+    [
+        (WITHOUT, "no ballplate"),
+        (OTHER, "ballplate 0.0.7"),
+        (OTHER_CODE, "other code of ballplate 0.1.0"),
+    ],
     ids=["no ballplate", "another version", "other code"],
 )
 def test_workers_with_other_code_are_refused(
-    worker: str, words: str, tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+    worker: str,
+    words: str,
+    tmp_path: Path,
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    start: Start,
 ) -> None:
     address, _ = scheduler
     start("-c", worker + SERVE, address)
     err = ended(small_sweep(tmp_path, 2), address)
-    assert f" has {words}, and this is ballplate 0.1.0; install the same wherever a worker runs" in err
+    assert (
+        f" has {words}, and this is ballplate 0.1.0; install the same wherever a worker runs" in err
+    )
     assert err.startswith("the worker tcp://127.0.0.1:")
     assert stored(tmp_path / "small.sqlite") == 0
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_ends(tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start) -> None:
+def test_a_scheduler_that_ends(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+) -> None:
     address, process = scheduler
     start("-c", SERVE, address)
     path, store = small_sweep(tmp_path, 100, "trials: 50\n"), tmp_path / "small.sqlite"
     arguments = command("sweep", path, "--scheduler", address)
-    with subprocess.Popen(arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as sweep:
+    with subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as sweep:
         end = time.monotonic() + 100
         while sweep.poll() is None and stored(store) < 2 and time.monotonic() < end:
             time.sleep(0.02)
@@ -129,7 +153,9 @@ def test_no_worker(
     with (
         cluster._quiet(),
         Client(scheduler[0], set_as_default=False) as client,
-        pytest.raises(ClusterError, match="the cluster has no workers; start some with: dask worker"),
+        pytest.raises(
+            ClusterError, match="the cluster has no workers; start some with: dask worker"
+        ),
     ):
         cluster._check_versions(client)
 
@@ -141,6 +167,7 @@ def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
 
 def test_all_workers_that_differ_are_counted() -> None:
     with pytest.raises(
-        ClusterError, match="the worker b has no ballplate, and this is ballplate 1, and 1 more differ;"
+        ClusterError,
+        match="the worker b has no ballplate, and this is ballplate 1, and 1 more differ;",
     ):
         _refuse({"a": "ballplate 1", "b": "no ballplate", "c": "ballplate 2"}, "ballplate 1")

@@ -1,4 +1,6 @@
-"""Whatever stands in the place of a store, or in it: one line that says so, and what can be read is not lost."""
+"""Whatever stands in the place of a store, or in it: one line that says so, and what can be read is
+not lost.
+"""
 
 from __future__ import annotations
 
@@ -61,14 +63,18 @@ def commands(store: Path, *kinds: str) -> list[list[str]]:
 
 
 def assert_told_in_lines(err: str, store: Path) -> None:
-    """Each line begins with the store, or goes on about failed cells, and none holds a control character."""
+    """Each line begins with the store, or goes on about failed cells, and none holds a control
+    character.
+    """
     assert err.endswith("\n") and "Traceback" not in err
     assert err.startswith(f"{store}: "), err
     assert all(line.isprintable() for line in err.splitlines()), err
 
 
 @pytest.mark.parametrize("name", NO_STORES)
-def test_what_is_no_store_is_refused_in_one_line(name: str, store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_store_is_refused_in_one_line(
+    name: str, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     NO_STORES[name](store)
     before = store.read_bytes() if store.is_file() else b""
     for arguments in commands(store):
@@ -134,7 +140,9 @@ def test_names_of_tables_that_are_no_text(store: Path, capsys: pytest.CaptureFix
     content = store.read_bytes()
     assert b"CREATE TABLE result" in content
     store.write_bytes(
-        content.replace(b"CREATE TABLE result", b"CREATE TABLX\xf1result").replace(b"resultresult", b"resu\xf1tresult")
+        content.replace(b"CREATE TABLE result", b"CREATE TABLX\xf1result").replace(
+            b"resultresult", b"resu\xf1tresult"
+        )
     )
     for arguments in commands(store):
         assert main(arguments) == 3
@@ -172,7 +180,12 @@ def many(path: Path, count: int) -> Store:
     store = open_store(path, create=True)
     made_up = (
         Row(
-            k, 0, f"2 {k:040d}", "done", figures={"U4_average_m": k / 7, "U4_undetermined": 0.0}, versions=(("a", "b"),)
+            k,
+            0,
+            f"2 {k:040d}",
+            "done",
+            figures={"U4_average_m": k / 7, "U4_undetermined": 0.0},
+            versions=(("a", "b"),),
         )
         for k in range(count)
     )
@@ -202,7 +215,9 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
     assert told is not None and int(told[1]) == 1000 - len(table)
     # Of those on one page, not of any other.
     assert 1 <= int(told[1]) <= size // 40
-    assert (table["U4_average_m"] == table["cell"] / 7).all() and (table["k"] == table["cell"]).all()
+    assert (table["U4_average_m"] == table["cell"] / 7).all() and (
+        table["k"] == table["cell"]
+    ).all()
     assert main(["report", str(path), "--format", "text", "-o", str(tmp_path / "t.txt")]) == 3
     assert "unreadable" in (tmp_path / "t.txt").read_text() or len(table) > 200
 
@@ -235,7 +250,9 @@ def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFix
         assert_told_in_lines(err, store)
 
 
-def test_names_of_figures_are_found_in_the_index(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_of_figures_are_found_in_the_index(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     right = rows(store)
     page_of("text")(store)
     assert main(commands(store, "csv")[0]) == 3
@@ -244,7 +261,9 @@ def test_names_of_figures_are_found_in_the_index(store: Path, capsys: pytest.Cap
     assert len(table) == 4
 
 
-def test_rows_of_the_first_format_are_read_and_go_on(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_of_the_first_format_are_read_and_go_on(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     right = rows(store)
     of_the_first_format(store)
     content = store.read_bytes()
@@ -261,12 +280,18 @@ def test_rows_of_the_first_format_are_read_and_go_on(store: Path, capsys: pytest
     assert "(3 of them before)" in capsys.readouterr().out
     assert_same(rows(store), right)
     connection = sqlite3.connect(store)
-    assert connection.execute("SELECT value FROM about").fetchall() == [("ballplate sweep store 2",)]
-    assert connection.execute("SELECT count(*) FROM result WHERE digest IS NOT NULL").fetchone() == (1,)
+    assert connection.execute("SELECT value FROM about").fetchall() == [
+        ("ballplate sweep store 2",)
+    ]
+    assert connection.execute(
+        "SELECT count(*) FROM result WHERE digest IS NOT NULL"
+    ).fetchone() == (1,)
     connection.close()
 
 
-def test_an_unreadable_definition_costs_no_figure(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unreadable_definition_costs_no_figure(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     right = rows(store)
     by_sql("UPDATE sweep SET definition = 'lost'")(store)
     assert main(commands(store, "csv")[0]) == 3
@@ -306,7 +331,11 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
     out, err = capsys.readouterr()
     assert "done" not in out
     line = err.splitlines()[-1]
-    assert line.startswith(f"{store}: has been ") and "while the sweep ran" in line and "Traceback" not in err
+    assert (
+        line.startswith(f"{store}: has been ")
+        and "while the sweep ran" in line
+        and "Traceback" not in err
+    )
     if what == "replaced":
         assert store.read_bytes() == other
     if what == "moved":
@@ -321,7 +350,9 @@ def test_a_store_that_vanishes_at_the_end_is_not_called_done(
 
     with monkeypatch.context() as patched:
         real = execute.run_sweep
-        patched.setattr("ballplate.sweeps.running.run_sweep", lambda *a, **o: _gone(real(*a, **o), store))
+        patched.setattr(
+            "ballplate.sweeps.running.run_sweep", lambda *a, **o: _gone(real(*a, **o), store)
+        )
         assert main(commands(store, "sweep")[0]) == 3
     out, err = capsys.readouterr()
     assert out == "" and "has been deleted or moved" in err
@@ -382,7 +413,9 @@ def test_a_folder_that_cannot_be_written() -> None:
             # Nothing is forbidden to root.
             os.seteuid(65534)
         try:
-            with pytest.raises(StoreError, match="its folder cannot be written; name another with --store"):
+            with pytest.raises(
+                StoreError, match="its folder cannot be written; name another with --store"
+            ):
                 open_store(folder / "s.sqlite", create=True)
         finally:
             if is_root:
@@ -420,9 +453,21 @@ def test_text_of_a_store_is_escaped(store: Path, capsys: pytest.CaptureFixture[s
 
 @pytest.mark.parametrize(
     "name",
-    ["../../out.yaml", "/tmp/out.yaml", "C:out.yaml", "C:\\out.yaml", "a\0b", "", ".", "x" * 300, "quickstart.yaml/in"],
+    [
+        "../../out.yaml",
+        "/tmp/out.yaml",
+        "C:out.yaml",
+        "C:\\out.yaml",
+        "a\0b",
+        "",
+        ".",
+        "x" * 300,
+        "quickstart.yaml/in",
+    ],
 )
-def test_names_of_files_in_a_store_lead_nowhere(name: str, store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_of_files_in_a_store_lead_nowhere(
+    name: str, store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = {path for path in store.parent.parent.rglob("*")}
     connection = sqlite3.connect(store)
     connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, ?, x'00')", [name])
@@ -431,7 +476,9 @@ def test_names_of_files_in_a_store_lead_nowhere(name: str, store: Path, capsys: 
     assert main(commands(store, "html")[0]) == 0
     page = (store.parent / "report.html").read_text(encoding="utf-8")
     assert "the store is not to be trusted" in page or "cannot be unpacked" in page
-    assert {path for path in store.parent.parent.rglob("*")} - before <= {store.parent / "report.html"}
+    assert {path for path in store.parent.parent.rglob("*")} - before <= {
+        store.parent / "report.html"
+    }
 
 
 @pytest.mark.parametrize("where", ["base", "axis", "machine"])
@@ -441,15 +488,24 @@ def test_a_report_reads_no_file_outside_the_store(where: str, target: str, store
     files = dict(connection.execute("SELECT path, content FROM bundle").fetchall())
     base, sweep = files["quickstart.yaml"].decode(), files["small.yaml"].decode()
     if where == "base":
-        base = base.replace("{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}", f"{{kind: balls, file: {target}}}")
+        base = base.replace(
+            "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}",
+            f"{{kind: balls, file: {target}}}",
+        )
         assert target in base
     elif where == "axis":
-        sweep = sweep.replace("axes:\n", f"axes:\n  f: {{path: artefacts.plate.file, values: ['{target}', b.csv]}}\n")
+        sweep = sweep.replace(
+            "axes:\n", f"axes:\n  f: {{path: artefacts.plate.file, values: ['{target}', b.csv]}}\n"
+        )
     else:
         machine = f"tables: {{file: '{target}'}}\n"
-        connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, 'm.yaml', ?)", [machine.encode()])
+        connection.execute(
+            "INSERT INTO bundle (sweep, path, content) VALUES (1, 'm.yaml', ?)", [machine.encode()]
+        )
     for name, text in (("quickstart.yaml", base), ("small.yaml", sweep)):
-        connection.execute("UPDATE bundle SET content = ?, digest = NULL WHERE path = ?", [text.encode(), name])
+        connection.execute(
+            "UPDATE bundle SET content = ?, digest = NULL WHERE path = ?", [text.encode(), name]
+        )
     connection.commit()
     connection.close()
     assert main(commands(store, "html")[0]) == 0
@@ -462,19 +518,27 @@ def test_no_code_of_a_store_is_run(kind: str, store: Path) -> None:
     mark = store.parent / "ran"
     code = f"open({str(mark)!r}, 'w')\n".encode()
     connection = sqlite3.connect(store)
-    (base,) = connection.execute("SELECT content FROM bundle WHERE path = 'quickstart.yaml'").fetchone()
+    (base,) = connection.execute(
+        "SELECT content FROM bundle WHERE path = 'quickstart.yaml'"
+    ).fetchone()
     model = b"error_model: {kind: python, object: 'evil:build'}\n"
     base = re.sub(rb"error_model:\n(  .*\n)+", model, base)
     assert model in base
-    connection.execute("UPDATE bundle SET content = ?, digest = NULL WHERE path = 'quickstart.yaml'", [base])
+    connection.execute(
+        "UPDATE bundle SET content = ?, digest = NULL WHERE path = 'quickstart.yaml'", [base]
+    )
     for name in ("evil.py", "sitecustomize.py", "conftest.py"):
-        connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, ?, ?)", [name, code])
+        connection.execute(
+            "INSERT INTO bundle (sweep, path, content) VALUES (1, ?, ?)", [name, code]
+        )
     connection.commit()
     connection.close()
     assert main(commands(store, kind)[0]) == 0
     assert not mark.exists()
     if kind == "html":
-        assert "only with --run-modules" in (store.parent / "report.html").read_text(encoding="utf-8")
+        assert "only with --run-modules" in (store.parent / "report.html").read_text(
+            encoding="utf-8"
+        )
 
 
 def flipped(store: Path, chance: random.Random) -> None:
@@ -490,7 +554,9 @@ def flipped(store: Path, chance: random.Random) -> None:
 
 
 def assert_survives(made: Path, folder: Path, seed: int, right: pandas.DataFrame) -> str:
-    """Flip bits of a store: whatever is read of it is right, and everything else is told; the status by itself."""
+    """Flip bits of a store: whatever is read of it is right, and everything else is told; the
+    status by itself.
+    """
     chance = random.Random(seed)
     store = folder / "small.sqlite"
     for path in folder.iterdir():

@@ -91,7 +91,13 @@ def test_a_link_to_a_file_outside_is_refused(folder: Path) -> None:
         load_sweep(folder / "s.yaml")
 
 
-ROOTED = ("C:\\balls.csv", "C:balls.csv", "\\\\server\\share\\balls.csv", "/balls.csv", "~/balls.csv")
+ROOTED = (
+    "C:\\balls.csv",
+    "C:balls.csv",
+    "\\\\server\\share\\balls.csv",
+    "/balls.csv",
+    "~/balls.csv",
+)
 
 
 def files_of(folder: Path, text: str) -> list[Path]:
@@ -109,7 +115,13 @@ def test_names_from_a_root_or_a_drive_are_left_out(name: str, folder: Path) -> N
         beside.parent.mkdir(exist_ok=True)
         beside.write_text(BALLS)
     found = files_of(folder, f"artefacts: {{a: {{file: '{name}'}}, b: {{file: other.csv}}}}\n")
-    assert [path.name for path in found] == ["balls.csv", "e.yaml", "other.csv", "s.yaml", "third.csv"]
+    assert [path.name for path in found] == [
+        "balls.csv",
+        "e.yaml",
+        "other.csv",
+        "s.yaml",
+        "third.csv",
+    ]
 
 
 def test_modules_come_with_what_they_import(folder: Path) -> None:
@@ -135,7 +147,9 @@ def test_modules_come_with_what_they_import(folder: Path) -> None:
     ]
 
 
-def test_too_much_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_much_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(bundles, "MOST_BYTES", 100)
     assert main(["sweep", str(folder / "s.yaml"), "--workers", "1"]) == 3
     assert "are the limit of what a store takes" in capsys.readouterr().err

@@ -1,6 +1,8 @@
-"""Keys of cells that stores hold stay valid: the fingerprints of shipped designs are those of earlier versions.
+"""Keys of cells that stores hold stay valid: the fingerprints of shipped designs are those of
+earlier versions.
 
-A fingerprint that has to change means that all stores are computed anew: then the number of the method rises with it.
+A fingerprint that has to change means that all stores are computed anew: then the number of the
+method rises with it.
 """
 
 from __future__ import annotations
@@ -15,7 +17,11 @@ KEPT = [
     ("quickstart.yaml", "quickstart", "9cce15c3e7bebae2bfb31f6733a7fd4ae6c88151"),
     ("npl/6.1.1.yaml", "6.1.1[B]", "a5208313a57c127131205ebe5cb1a564f817f9f2"),
     ("npl/6.2.5.yaml", "6.2.5[n=5 NDEL=5]", "9df3395e9ad26ce79e60821532715427f59e7a47"),
-    ("hocken_borchardt/dummy.yaml", "dummy[with scale]", "18a645280019e629b2393eb21817db311fd1304e"),
+    (
+        "hocken_borchardt/dummy.yaml",
+        "dummy[with scale]",
+        "18a645280019e629b2393eb21817db311fd1304e",
+    ),
 ]
 
 

@@ -37,11 +37,31 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
             "cwd": ROOT,
             "env": {**os.environ, "TMPDIR": str(temporary)},
         }
-        arguments = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
-        scheduler = subprocess.Popen([sys.executable, "-m", "distributed.cli.dask_scheduler", *arguments], **quiet)
-        options = ["--scheduler-file", str(file), "--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
+        arguments = [
+            "--host",
+            "127.0.0.1",
+            "--port",
+            "0",
+            "--no-dashboard",
+            "--scheduler-file",
+            str(file),
+        ]
+        scheduler = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli.dask_scheduler", *arguments], **quiet
+        )
+        options = [
+            "--scheduler-file",
+            str(file),
+            "--nworkers",
+            "2",
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+        ]
         options += ["--local-directory", str(tmp_path)]
-        workers = subprocess.Popen([sys.executable, "-m", "distributed.cli.dask_worker", *options], **quiet)
+        workers = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli.dask_worker", *options], **quiet
+        )
         try:
             end = time.monotonic() + 60
             while not file.exists():
@@ -49,7 +69,10 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
                 time.sleep(0.1)
             # In a process of its own, whose threads and sockets end with it.
             ready = subprocess.run(
-                [sys.executable, "-c", READY, str(file)], capture_output=True, text=True, timeout=120
+                [sys.executable, "-c", READY, str(file)],
+                capture_output=True,
+                text=True,
+                timeout=120,
             )
             assert ready.returncode == 0, ready.stderr
             yield ready.stdout.strip(), workers
@@ -78,9 +101,15 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     path = small_sweep(tmp_path, 12, "trials: 16\n")
     assert run("sweep", path, "--workers", 1, "--store", tmp_path / "alone.sqlite").returncode == 1
     arguments = command("sweep", path, "--scheduler", address)
-    with subprocess.Popen(arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
         end = time.monotonic() + 120
-        while process.poll() is None and stored(tmp_path / "small.sqlite") < 4 and time.monotonic() < end:
+        while (
+            process.poll() is None
+            and stored(tmp_path / "small.sqlite") < 4
+            and time.monotonic() < end
+        ):
             time.sleep(0.05)
         if process.poll() is None:
             os.kill(worker_processes(workers.pid)[0], signal.SIGKILL)

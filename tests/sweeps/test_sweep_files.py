@@ -49,18 +49,26 @@ def test_every_combination_is_a_cell(written: Written) -> None:
             f"  balls: {{paths: {BALLS}, values: [4, 5]}}\n"
         )
     )
-    assert labels(sweep) == [f"size {size} mm, balls {balls}" for size in (500, 625, 750) for balls in (4, 5)]
+    assert labels(sweep) == [
+        f"size {size} mm, balls {balls}" for size in (500, 625, 750) for balls in (4, 5)
+    ]
     assert [axis.column for axis in sweep.axes] == ["size_m", "balls"]
     assert [choice.value for choice in sweep.axes[0].choices] == [0.5, 0.625, 0.75]
     experiment = experiment_of(sweep, 2)
-    np.testing.assert_allclose(np.ptp(experiment.layouts["plate"].coordinates, axis=0), [0.625, 0.625, 0.0], atol=1e-15)
+    np.testing.assert_allclose(
+        np.ptp(experiment.layouts["plate"].coordinates, axis=0), [0.625, 0.625, 0.0], atol=1e-15
+    )
     assert len(experiment.layouts["plate"].names) == 16
 
 
 def test_a_cell_is_the_experiment_that_a_variant_would_be(written: Written, tmp_path: Path) -> None:
-    sweep = load_sweep(written("axes:\n  level: {path: 'positions[z low].level', values: [100 mm]}\n"))
+    sweep = load_sweep(
+        written("axes:\n  level: {path: 'positions[z low].level', values: [100 mm]}\n")
+    )
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
-    (tmp_path / "v.yaml").write_text(text + 'variants: {one: {"positions[z low].level": 100 mm}}\n', encoding="utf-8")
+    (tmp_path / "v.yaml").write_text(
+        text + 'variants: {one: {"positions[z low].level": 100 mm}}\n', encoding="utf-8"
+    )
     (expected,) = load(tmp_path / "v.yaml")
     found = experiment_of(sweep, 0)
     for one, other in zip(found.positions, expected.positions, strict=True):
@@ -69,7 +77,10 @@ def test_a_cell_is_the_experiment_that_a_variant_would_be(written: Written, tmp_
 
 
 def test_values_that_change_together(written: Written) -> None:
-    together = 'together: {"positions[z low].level": [100 mm, 200 mm], "positions[z high].level": [900 mm, 800 mm]}'
+    together = (
+        'together: {"positions[z low].level": [100 mm, 200 mm], "positions[z high].level": [900 mm,'
+        " 800 mm]}"
+    )
     sweep = load_sweep(written(f"axes:\n  levels:\n    {together}\n    names: [wide, narrow]\n"))
     assert labels(sweep) == ["levels wide", "levels narrow"]
     second = experiment_of(sweep, 1)
@@ -82,14 +93,18 @@ def test_values_that_change_together(written: Written) -> None:
 
 def test_named_values_and_conditions(written: Written) -> None:
     text = (
-        f"axes:\n  size: {{paths: {SIZE}, values: {{small: 450 mm, middle: 600 mm, large: 750 mm}}}}\n"
-        f"  balls: {{paths: {BALLS}, values: [4, 5, 7]}}\n"
+        f"axes:\n  size: {{paths: {SIZE}, values: {{small: 450 mm, middle: 600 mm, large: 750"
+        f" mm}}}}\n  balls: {{paths: {BALLS}, values: [4, 5, 7]}}\n"
     )
-    assert labels(load_sweep(written(text + "skip: [{size: {below: 500 mm}, balls: [5, 7]}]\n"))) == [
+    assert labels(
+        load_sweep(written(text + "skip: [{size: {below: 500 mm}, balls: [5, 7]}]\n"))
+    ) == [
         "size small, balls 4",
         *(f"size {size}, balls {balls}" for size in ("middle", "large") for balls in (4, 5, 7)),
     ]
-    assert labels(load_sweep(written(text + "only: [{size: small}, {balls: {above: 5}, size: 0.75 m}]\n"))) == [
+    assert labels(
+        load_sweep(written(text + "only: [{size: small}, {balls: {above: 5}, size: 0.75 m}]\n"))
+    ) == [
         *(f"size small, balls {balls}" for balls in (4, 5, 7)),
         "size large, balls 7",
     ]
@@ -98,8 +113,8 @@ def test_named_values_and_conditions(written: Written) -> None:
 def test_subsets_of_positions(written: Written) -> None:
     sweep = load_sweep(
         written(
-            "axes:\n  strategy:\n    path: positions\n"
-            "    subsets: {sizes: [3, 6], always: [x low], among: [z low, z high, y low, y high, x high]}\n"
+            "axes:\n  strategy:\n    path: positions\n    subsets: {sizes: [3, 6], always: [x low],"
+            " among: [z low, z high, y low, y high, x high]}\n"
         )
     )
     assert len(sweep.cells) == 10 + 1
@@ -110,14 +125,19 @@ def test_subsets_of_positions(written: Written) -> None:
 
 def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
-    variants = 'variants: {few: {"artefacts.plate.balls": [4, 4]}, many: {"artefacts.plate.balls": [7, 7]}}\n'
+    variants = (
+        'variants: {few: {"artefacts.plate.balls": [4, 4]}, many: {"artefacts.plate.balls": [7,'
+        " 7]}}\n"
+    )
     (tmp_path / "quickstart.yaml").write_text(text + variants, encoding="utf-8")
     levels = 'level: {path: "positions[z low].level", values: [100 mm, 200 mm]}'
     sweep = load_sweep(written(f"axes:\n  design: {{variants: all}}\n  {levels}\n"))
     assert labels(sweep)[1] == "design few, level 200 mm"
     assert [len(experiment_of(sweep, k).layouts["plate"].names) for k in (1, 2)] == [16, 49]
-    assert refusal(written(f"axes:\n  {levels}\n"))[0] == (
-        "s.yaml:2:7: base: has the variants few, many; choose one with variant: NAME, or add an axis {variants: all}"
+    assert (
+        refusal(written(f"axes:\n  {levels}\n"))[0]
+        == "s.yaml:2:7: base: has the variants few, many; choose one with variant: NAME, or add an"
+        " axis {variants: all}"
     )
     assert len(load_sweep(written(f"variant: many\naxes:\n  {levels}\n")).cells) == 2
     assert refusal(written(f"variant: mny\naxes:\n  {levels}\n"))[0].startswith(
@@ -127,7 +147,10 @@ def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
 
 def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path) -> None:
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
-    variants = 'variants: {low: {"positions[z low].level": 100 mm}, high: {"positions[z low].level": 300 mm}}\n'
+    variants = (
+        'variants: {low: {"positions[z low].level": 100 mm}, high: {"positions[z low].level": 300'
+        " mm}}\n"
+    )
     (tmp_path / "quickstart.yaml").write_text(text + variants, encoding="utf-8")
     subsets = "kept: {path: positions, subsets: {sizes: [5], always: [z low]}}"
     sweep = load_sweep(written(f"axes:\n  design: {{variants: all}}\n  {subsets}\n"))
@@ -141,14 +164,23 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("axes:\n  status: {path: seed, values: [1]}\n", ["s.yaml:4:3: axes.status: is a column of every table"]),
-        ("axes:\n  U4_size: {path: seed, values: [1]}\n", ["s.yaml:4:3: axes.U4_size: is a column of every table"]),
+        (
+            "axes:\n  status: {path: seed, values: [1]}\n",
+            ["s.yaml:4:3: axes.status: is a column of every table"],
+        ),
+        (
+            "axes:\n  U4_size: {path: seed, values: [1]}\n",
+            ["s.yaml:4:3: axes.U4_size: is a column of every table"],
+        ),
         (
             "axes:\n  a: {path: seed, from: 1e-200, to: 1e200, count: 5, spacing: logarithmic}\n",
             ["s.yaml:4:6: axes.a: the ends are too far apart"],
         ),
         ("axes: {}\n", ["s.yaml:3:7: axes: "]),
-        ("axis: {a: {path: seed, values: [1]}}\n", ["s.yaml:1:1: axes: missing", "s.yaml:3:1: axis: unknown key"]),
+        (
+            "axis: {a: {path: seed, values: [1]}}\n",
+            ["s.yaml:1:1: axes: missing", "s.yaml:3:1: axis: unknown key"],
+        ),
         (
             "axes:\n  a: {path: artefacts.plat.size, values: [1]}\n",
             ["s.yaml:4:6: axes.a: artefacts.plat.size: there is no"],
@@ -158,7 +190,10 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
             "axes:\n  a: {values: [1]}\n",
             ["s.yaml:4:6: axes.a: what the values replace is not clear; give path, or paths"],
         ),
-        ("axes:\n  a: {path: seed, values: [1], to: 5}\n", ["s.yaml:4:32: axes.a.to: does not go with values"]),
+        (
+            "axes:\n  a: {path: seed, values: [1], to: 5}\n",
+            ["s.yaml:4:32: axes.a.to: does not go with values"],
+        ),
         (
             "axes:\n  a: {path: seed, from: 1, to: 5}\n",
             ["s.yaml:4:6: axes.a: a range needs count or step;"],
@@ -167,16 +202,25 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
             "axes:\n  a: {path: seed, from: 1 mm, to: 5 m, count: 3}\n",
             ["s.yaml:4:6: axes.a: from and to have the units"],
         ),
-        ("axes:\n  a: {path: seed, from: 1, to: 5, step: -1}\n", ["s.yaml:4:6: axes.a: step does not lead"]),
+        (
+            "axes:\n  a: {path: seed, from: 1, to: 5, step: -1}\n",
+            ["s.yaml:4:6: axes.a: step does not lead"],
+        ),
         (
             "axes:\n  a: {path: seed, from: 1, to: 9000000, step: 1}\n",
             ["s.yaml:4:6: axes.a: the range has 9000000 values"],
         ),
-        ("axes:\n  a: {path: seed, values: [1, 2, 1]}\n", ['s.yaml:4:6: axes.a: has the value "1" twice']),
+        (
+            "axes:\n  a: {path: seed, values: [1, 2, 1]}\n",
+            ['s.yaml:4:6: axes.a: has the value "1" twice'],
+        ),
         (
             "axes:\n  a: {path: positions, subsets: {sizes: [9], always: [z lo]}}\n",
             [
-                's.yaml:4:55: axes.a.subsets.always[0]: no entry "z lo" in positions; did you mean "z low"?',
+                (
+                    's.yaml:4:55: axes.a.subsets.always[0]: no entry "z lo" in positions; did you'
+                    ' mean "z low"?'
+                ),
                 "s.yaml:4:42: axes.a.subsets.sizes[0]: no subset has 9 entries",
             ],
         ),
@@ -188,9 +232,18 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
             "axes:\n  a: {path: seed, values: [1]}\n  b: {path: seed, values: [1]}\n",
             ['s.yaml:5:6: axes.b: seed is part of the same place as seed of the axis "a"'],
         ),
-        ("axes:\n  a: {path: seed, values: [1]}\nskip: [{b: 1}]\n", ['s.yaml:5:9: skip[0].b: there is no axis "b"']),
-        ("axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 2}]\n", ["s.yaml:5:12: skip[0].a: holds for no value"]),
-        ("axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 1}]\n", ["s.yaml:5:7: skip: leaves no cell"]),
+        (
+            "axes:\n  a: {path: seed, values: [1]}\nskip: [{b: 1}]\n",
+            ['s.yaml:5:9: skip[0].b: there is no axis "b"'],
+        ),
+        (
+            "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 2}]\n",
+            ["s.yaml:5:12: skip[0].a: holds for no value"],
+        ),
+        (
+            "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 1}]\n",
+            ["s.yaml:5:7: skip: leaves no cell"],
+        ),
         (
             "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: {above: 1 mm}}]\n",
             ['s.yaml:5:12: skip[0].a: "1 mm" cannot'],
@@ -221,5 +274,6 @@ def test_a_wrong_base_file_is_refused(written: Written, tmp_path: Path) -> None:
     assert refusal(path)[0].startswith("quickstart.yaml:35:34: artefacts.plate.balls[1]: ")
     (tmp_path / "quickstart.yaml").unlink()
     assert refusal(path) == [
-        "s.yaml:2:7: base: " + f"{tmp_path}/quickstart.yaml: there is no such file; check the name and the folder"
+        "s.yaml:2:7: base: "
+        + f"{tmp_path}/quickstart.yaml: there is no such file; check the name and the folder"
     ]

@@ -31,10 +31,17 @@ def sweep(tmp_path: Path) -> Path:
     assert truth in text
     # The plate stands within the smaller machine's volume as well.
     text = text.replace(f"{truth}npl-like.yaml", f"{truth}measured-errors.yaml")
-    text = text.replace("x: [0 mm, 900 mm], y: [0 mm, 1150 mm]", "x: [0 mm, 800 mm], y: [0 mm, 600 mm]")
+    text = text.replace(
+        "x: [0 mm, 900 mm], y: [0 mm, 1150 mm]", "x: [0 mm, 800 mm], y: [0 mm, 600 mm]"
+    )
     head, _, tail = text.partition("positions:\n")
-    kept = "  - {name: low, plane: z, level: 60 mm, corner: {x: 60 mm, y: 60 mm}, probes: [down, left]}\n"
-    plate.write_text(head + "positions:\n" + kept + "\n" + tail[tail.index("calibration:") :], encoding="utf-8")
+    kept = (
+        "  - {name: low, plane: z, level: 60 mm, corner: {x: 60 mm, y: 60 mm}, probes: [down,"
+        " left]}\n"
+    )
+    plate.write_text(
+        head + "positions:\n" + kept + "\n" + tail[tail.index("calibration:") :], encoding="utf-8"
+    )
     path = tmp_path / "sweep.yaml"
     path.write_text(SWEEP, encoding="utf-8")
     return path
@@ -83,11 +90,16 @@ def test_they_count(sweep: Path) -> None:
     assert len(set(found)) == 6
     # Words are only words.
     path = folder / "machines/npl-like.yaml"
-    path.write_text(path.read_text(encoding="utf-8").replace("title: moving", "title: a moving"), encoding="utf-8")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("title: moving", "title: a moving"),
+        encoding="utf-8",
+    )
     assert now() == found[-1]
 
 
-def test_a_sweep_runs_and_notices_a_changed_table(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sweep_runs_and_notices_a_changed_table(
+    sweep: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     options = ("--workers", "1")
     assert main(["sweep", str(sweep), *options]) == 0
     assert "2 cells, 2 done" in capsys.readouterr().out

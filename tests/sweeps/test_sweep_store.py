@@ -29,12 +29,18 @@ def sweep(path: Path, *options: str) -> int:
     return main(["sweep", str(path), "--workers", "1", *options])
 
 
-def test_figures_are_those_of_the_experiments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_are_those_of_the_experiments(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = small_sweep(tmp_path, 4, "trials: 64\nrecord: [U4, U5]\n")
     assert sweep(path) == 1
     out, err = capsys.readouterr()
     assert out == f"{tmp_path}/small.sqlite: 8 cells, 6 done, 2 failed\n"
-    assert "cell 6 failed: " in err and "quickstart.yaml" in err and str(tmp_path / "quickstart.yaml") not in err
+    assert (
+        "cell 6 failed: " in err
+        and "quickstart.yaml" in err
+        and str(tmp_path / "quickstart.yaml") not in err
+    )
     table = rows(tmp_path / "small.sqlite")
     loaded = load_sweep(path)
     assert table["size_m"].tolist() == [choice[0].value for choice in map(loaded.choices, range(8))]
@@ -63,14 +69,21 @@ def test_a_second_run_computes_nothing(
     monkeypatch.setattr("ballplate.sweeps.local.compute", None)
     capsys.readouterr()
     assert sweep(path) == 1
-    assert capsys.readouterr().out == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
+    assert (
+        capsys.readouterr().out
+        == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
+    )
 
 
 def made_by_the_first_method(path: Path) -> None:
-    """Make of a store one of the first method, whose keys are the fingerprints alone; its figures are 17."""
+    """Make of a store one of the first method, whose keys are the fingerprints alone; its figures
+    are 17.
+    """
     connection = sqlite3.connect(path, isolation_level=None)
     for table in ("cell", "result"):
-        assert connection.execute(f"UPDATE {table} SET key = substr(key, instr(key, ' ') + 1)").rowcount
+        assert connection.execute(
+            f"UPDATE {table} SET key = substr(key, instr(key, ' ') + 1)"
+        ).rowcount
     for key, figures in connection.execute("SELECT key, figures FROM result").fetchall():
         wrong = np.full(len(figures) // 8, 17.0, "<f8").tobytes()
         connection.execute("UPDATE result SET figures = ? WHERE key = ?", [wrong, key])
@@ -98,7 +111,10 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
 
     assert sweep(path) == 1
     captured = capsys.readouterr()
-    assert told in captured.err and "this version computes by method 2, and computes these cells anew" in captured.err
+    assert (
+        told in captured.err
+        and "this version computes by method 2, and computes these cells anew" in captured.err
+    )
     assert captured.out == f"{store}: 4 cells, 2 done, 2 failed\n"
     # With the same seeds, so that only what was corrected differs.
     assert_same(rows(store), right)
@@ -108,7 +124,9 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
     assert "method" not in capsys.readouterr().err
 
 
-def test_an_interrupted_run_leaves_no_rows_of_two_methods(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_run_leaves_no_rows_of_two_methods(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path, store = small_sweep(tmp_path, 2), tmp_path / "small.sqlite"
     sweep(path)
     right = rows(store)
@@ -135,24 +153,33 @@ def test_failed_cells_are_tried_again_when_asked(tmp_path: Path) -> None:
     assert_same(rows(tmp_path / "small.sqlite"), before)
 
 
-def test_the_first_failure_ends_a_run_when_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_first_failure_ends_a_run_when_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path, "--fail-fast") == 1
     assert "2 done, 1 failed, 1 left" in capsys.readouterr().out
 
 
-def test_a_changed_base_is_refused_with_what_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_changed_base_is_refused_with_what_changed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = small_sweep(tmp_path, 2)
     sweep(path)
     base = tmp_path / "quickstart.yaml"
     text = base.read_text(encoding="utf-8")
     base.write_text("# Only a remark.\n" + text, encoding="utf-8")
     assert sweep(path) == 1
-    base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
+    base.write_text(
+        text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8"
+    )
     capsys.readouterr()
     assert sweep(path) == 3
     err = capsys.readouterr().err
-    assert "quickstart.yaml: machine.repeatability: '0.2 um' has become '0.3 um'" in err and "--beside" in err
+    assert (
+        "quickstart.yaml: machine.repeatability: '0.2 um' has become '0.3 um'" in err
+        and "--beside" in err
+    )
     assert sweep(path, "--beside") == 1
     store = open_store(tmp_path / "small.sqlite")
     assert len(sweeps(store)) == 2
@@ -170,7 +197,9 @@ def test_a_change_while_a_sweep_runs_is_noticed(
 
     def changing(loaded: Sweep, task: Task) -> Row:
         if task.number == 1:
-            base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8")
+            base.write_text(
+                text.replace("repeatability: 0.2 um", "repeatability: 0.3 um"), encoding="utf-8"
+            )
         return compute(loaded, task)
 
     monkeypatch.setattr("ballplate.sweeps.local.compute", changing)
@@ -184,10 +213,14 @@ def test_a_change_while_a_sweep_runs_is_noticed(
     assert len(rows(tmp_path / "small.sqlite")) == 4
 
 
-def test_what_two_sweeps_share_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_two_sweeps_share_is_computed_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = small_sweep(tmp_path, 2)
     sweep(path)
-    path.write_text(path.read_text(encoding="utf-8").replace("[4, 5]", "[4, 5, 6]"), encoding="utf-8")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("[4, 5]", "[4, 5, 6]"), encoding="utf-8"
+    )
     done = []
 
     def counted(loaded: Sweep, task: Task) -> Row:
@@ -205,19 +238,28 @@ def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
     shutil.copy("tests/sweeps/balls.csv", tmp_path)
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
     plate = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
-    text = text.replace(plate, "{kind: balls, file: balls.csv}").replace("corner sides ", "[[a, b], [b, c]]  ")
+    text = text.replace(plate, "{kind: balls, file: balls.csv}").replace(
+        "corner sides ", "[[a, b], [b, c]]  "
+    )
     (tmp_path / "quickstart.yaml").write_text(text, encoding="utf-8")
-    path.write_text("title: t\nbase: quickstart.yaml\naxes: {a: {path: seed, values: [1, 2]}}\n", encoding="utf-8")
+    path.write_text(
+        "title: t\nbase: quickstart.yaml\naxes: {a: {path: seed, values: [1, 2]}}\n",
+        encoding="utf-8",
+    )
     assert sweep(path) == 0
     store = open_store(tmp_path / "small.sqlite")
     assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
     assert "undetermined" in results(store, 1).details[0]
     store.close()
-    (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8")
+    (tmp_path / "balls.csv").write_text(
+        "ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8"
+    )
     assert sweep(path) == 3
 
 
-def test_replicates_in_blocks_are_the_same_replicates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_replicates_in_blocks_are_the_same_replicates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
     assert BLOCK % 512 == 0
     monkeypatch.setattr("ballplate.sweeps.task.BLOCK", 512)
@@ -230,9 +272,9 @@ def test_replicates_in_blocks_are_the_same_replicates(tmp_path: Path, monkeypatc
     for name in ("U5_spread_ratio", "U5_coverage_sigma_given", "U5_actual_average_m"):
         np.testing.assert_allclose(split[name][:2], whole[name][:2], rtol=1e-12)
     store = open_store(tmp_path / "small.sqlite")
-    assert store.connection.execute("SELECT count(*) FROM result WHERE block > 0 AND status = 'done'").fetchone() == (
-        0,
-    )
+    assert store.connection.execute(
+        "SELECT count(*) FROM result WHERE block > 0 AND status = 'done'"
+    ).fetchone() == (0,)
     store.close()
 
 
@@ -249,7 +291,9 @@ def test_replicates_in_blocks_are_the_same_replicates(tmp_path: Path, monkeypatc
         ("random: 200", "random: 201", True),
     ],
 )
-def test_a_fingerprint_tells_what_matters(tmp_path: Path, old: str, new: str, differs: bool) -> None:
+def test_a_fingerprint_tells_what_matters(
+    tmp_path: Path, old: str, new: str, differs: bool
+) -> None:
     text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
     assert old in text
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
@@ -263,7 +307,9 @@ def test_axes_of_a_plate_are_told_later(tmp_path: Path) -> None:
     text = Path("designs/hocken_borchardt/angles.yaml").read_text(encoding="utf-8")
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
     (tmp_path / "b.yaml").write_text(text.replace("x: r1c4", "y: r3c1"), encoding="utf-8")
-    one, other = ([fingerprint(found) for found in load(tmp_path / name)] for name in ("a.yaml", "b.yaml"))
+    one, other = (
+        [fingerprint(found) for found in load(tmp_path / name)] for name in ("a.yaml", "b.yaml")
+    )
     assert one == other and len(set(one)) == len(one)
 
 
@@ -340,7 +386,9 @@ def with_own_model(folder: Path, name: str, values: str) -> Path:
     text = (folder / "quickstart.yaml").read_text(encoding="utf-8")
     before, _, after = text.partition("error_model:\n")
     model = f"error_model: {{kind: python, object: '{name}:build', options: {{fails: false}}}}"
-    (folder / "quickstart.yaml").write_text(before + model + after[after.index("\n\n") :], encoding="utf-8")
+    (folder / "quickstart.yaml").write_text(
+        before + model + after[after.index("\n\n") :], encoding="utf-8"
+    )
     axes = f"axes: {{fails: {{path: error_model.options.fails, values: {values}}}}}"
     path.write_text(f"title: t\nbase: quickstart.yaml\n{axes}\n", encoding="utf-8")
     return path
@@ -351,7 +399,9 @@ def test_what_a_users_model_imports_counts(tmp_path: Path) -> None:
     assert run("sweep", path).returncode == 0
     (tmp_path / "imports_another_helper.py").write_text("SIZE = 4\n", encoding="utf-8")
     changed = run("sweep", path)
-    assert changed.returncode == 3 and "imports_another_helper.py: another content" in changed.stderr
+    assert (
+        changed.returncode == 3 and "imports_another_helper.py: another content" in changed.stderr
+    )
     assert run("sweep", path, "--beside").returncode == 0
     store = open_store(tmp_path / "small.sqlite")
     few, more = (results(store, k).figures["parameters"][0] for k in (1, 2))
@@ -371,20 +421,32 @@ def test_what_a_users_model_raises_is_the_rows_reason(tmp_path: Path) -> None:
 def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> None:
     path = small_sweep(tmp_path, 2)
     (tmp_path / "sweeps").mkdir()
-    text = path.read_text(encoding="utf-8").replace("base: quickstart.yaml", "base: ../quickstart.yaml")
+    text = path.read_text(encoding="utf-8").replace(
+        "base: quickstart.yaml", "base: ../quickstart.yaml"
+    )
     (tmp_path / "sweeps" / "s.yaml").write_text(text, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    for workers, name, where in ((1, "s.yaml", tmp_path / "sweeps"), (2, "s.yaml", tmp_path / "sweeps")):
-        command_line = [*command("sweep", name, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")]
+    for workers, name, where in (
+        (1, "s.yaml", tmp_path / "sweeps"),
+        (2, "s.yaml", tmp_path / "sweeps"),
+    ):
+        command_line = [
+            *command("sweep", name, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
+        ]
         subprocess.run(command_line, cwd=where, env=environment, capture_output=True, check=False)
-    assert run("sweep", tmp_path / "sweeps" / "s.yaml", "--store", tmp_path / "3.sqlite").returncode == 1
+    assert (
+        run("sweep", tmp_path / "sweeps" / "s.yaml", "--store", tmp_path / "3.sqlite").returncode
+        == 1
+    )
     first = rows(tmp_path / "1.sqlite")
     assert first["reason"][2].startswith("../quickstart.yaml:41:5: positions[1]: ")
     for k in (2, 3):
         assert_same(first, rows(tmp_path / f"{k}.sqlite"))
 
 
-def test_a_store_is_read_where_nothing_can_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_store_is_read_where_nothing_can_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = small_sweep(tmp_path, 2)
     sweep(path)
     before = sorted(file.name for file in tmp_path.iterdir())
@@ -392,7 +454,9 @@ def test_a_store_is_read_where_nothing_can_be_written(tmp_path: Path, capsys: py
     assert {file.name for file in tmp_path.iterdir()} <= {*before}
     with pytest.raises(sqlite3.OperationalError, match="readonly"):
         open_store(tmp_path / "small.sqlite").connection.execute("DELETE FROM result")
-    assert main(["export", str(tmp_path / "small.sqlite"), "-o", str(tmp_path / "small.sqlite")]) == 2
+    assert (
+        main(["export", str(tmp_path / "small.sqlite"), "-o", str(tmp_path / "small.sqlite")]) == 2
+    )
 
 
 def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
@@ -407,9 +471,17 @@ def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("place", "size", "told"),
     [
-        ("predict", (1 << 58,), "it needs more memory than there is: there is no room for another 2.00 EiB; "),
+        (
+            "predict",
+            (1 << 58,),
+            "it needs more memory than there is: there is no room for another 2.00 EiB; ",
+        ),
         ("experiment_of", (), "it needs more memory than there is; "),
-        ("trials", (1 << 58,), "it needs more memory than there is: there is no room for another 2.00 EiB; "),
+        (
+            "trials",
+            (1 << 58,),
+            "it needs more memory than there is: there is no room for another 2.00 EiB; ",
+        ),
     ],
 )
 def test_a_cell_that_finds_no_memory_says_so(
@@ -425,4 +497,7 @@ def test_a_cell_that_finds_no_memory_says_so(
     monkeypatch.setattr(f"ballplate.sweeps.task.{place}", finds_none)
     row = compute(loaded, Task(0))
     assert row.status == "failed"
-    assert row.reason == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"
+    assert (
+        row.reason
+        == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"
+    )

@@ -1,4 +1,6 @@
-"""A sweep that is killed, starved or interrupted goes on, and ends with exactly the rows of an undisturbed one."""
+"""A sweep that is killed, starved or interrupted goes on, and ends with exactly the rows of an
+undisturbed one.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,16 @@ from pathlib import Path
 
 import pytest
 
-from .support import ROOT, assert_same, command, hearing_interruptions, rows, run, small_sweep, stored
+from .support import (
+    ROOT,
+    assert_same,
+    command,
+    hearing_interruptions,
+    rows,
+    run,
+    small_sweep,
+    stored,
+)
 
 Change = Callable[[], None]
 
@@ -68,7 +79,9 @@ def started(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 
 @pytest.mark.slow
-def test_killed_at_random_moments(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+def test_killed_at_random_moments(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
     """Twenty times: the command itself, one of its workers, or a disk that takes no more."""
     path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
     undisturbed = tmp_path / "undisturbed.sqlite"
@@ -137,17 +150,26 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
     after = after[after.index("\n\n") :]
     model = "error_model: {kind: python, object: 'deadly:build', options: {deadly: false}}"
     (tmp_path / "quickstart.yaml").write_text(before + model + after, encoding="utf-8")
-    axes = "deadly: {path: error_model.options.deadly, values: [false, true]}, seed: {path: seed, values: [1, 2, 3]}"
+    axes = (
+        "deadly: {path: error_model.options.deadly, values: [false, true]}, seed: {path: seed,"
+        " values: [1, 2, 3]}"
+    )
     path.write_text(f"title: t\nbase: quickstart.yaml\naxes: {{{axes}}}\n", encoding="utf-8")
     done = run("sweep", path, "--workers", "2")
     assert done.returncode == 1, done.stderr
     assert "6 cells, 3 done, 3 failed" in done.stdout
-    assert "the process that computed it was ended" in done.stderr and "Traceback" not in done.stderr
+    assert (
+        "the process that computed it was ended" in done.stderr and "Traceback" not in done.stderr
+    )
     again = run("sweep", path, "--workers", "2", "--retry-failed")
-    assert again.returncode == 1 and "6 cells, 3 done, 3 failed (3 of them before)" in again.stdout, again.stderr
+    assert (
+        again.returncode == 1 and "6 cells, 3 done, 3 failed (3 of them before)" in again.stdout
+    ), again.stderr
 
 
-def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+def test_interrupted_and_resumed(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
     path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
     process = started(path, preexec_fn=hearing_interruptions)
     assert wait_until(lambda: stored(store) > 2, process)
@@ -158,7 +180,9 @@ def test_interrupted_and_resumed(tmp_path: Path, started: Callable[..., subproce
     assert 2 < stored(store) < 80
 
 
-def test_interrupted_while_workers_start(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+def test_interrupted_while_workers_start(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
     """The keyboard reaches the workers too, which are still loading modules."""
     # Without data sets the sweep may be done before a busy machine comes to interrupt it.
     path = small_sweep(tmp_path, 40, "trials: 16\n")
@@ -171,7 +195,9 @@ def test_interrupted_while_workers_start(tmp_path: Path, started: Callable[..., 
     assert err.startswith("interrupted; what is done is in") and err.count("\n") == 1, err
 
 
-def test_one_writer_at_a_time(tmp_path: Path, started: Callable[..., subprocess.Popen[str]]) -> None:
+def test_one_writer_at_a_time(
+    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+) -> None:
     path, store = small_sweep(tmp_path, 40, "trials: 16\n"), tmp_path / "small.sqlite"
     process = started(path)
     assert wait_until(lambda: stored(store) > 0, process)
@@ -184,5 +210,10 @@ def test_one_writer_at_a_time(tmp_path: Path, started: Callable[..., subprocess.
 def test_the_number_of_workers_changes_no_bit(tmp_path: Path) -> None:
     path = small_sweep(tmp_path, 3, "trials: 16\n")
     for workers in (1, 2):
-        assert run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite").returncode == 1
+        assert (
+            run(
+                "sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite"
+            ).returncode
+            == 1
+        )
     assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))

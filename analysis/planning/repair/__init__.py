@@ -1,1 +1,3 @@
-"""Changes after which a design determines all that it asks for: what can be changed, and what of it is cheapest."""
+"""Changes after which a design determines all that it asks for: what can be changed, and what of it
+is cheapest.
+"""

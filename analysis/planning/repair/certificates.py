@@ -54,7 +54,10 @@ def certificates(experiment: Experiment) -> Iterator[Change]:
             continue
         like = like_distances(experiment, name)
         calibrated = {
-            frozenset(pair) for item in known if isinstance(item, DistanceCalibration) for pair in item.pairs.tolist()
+            frozenset(pair)
+            for item in known
+            if isinstance(item, DistanceCalibration)
+            for pair in item.pairs.tolist()
         }
         for words, chosen in natural_distances(layout):
             if any(frozenset(pair) not in calibrated for pair in chosen.tolist()):
@@ -71,37 +74,67 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
             what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
             if isinstance(item, DistanceCalibration):
                 what = f"distances ({pair_set(layout, item.pairs) or len(item.pairs)})"
-            told = f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard uncertainty)"
+            told = (
+                f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard"
+                " uncertainty)"
+            )
             apply = partial(_with_better, k=k, item=better)
-            yield Change(Kind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply)
+            yield Change(
+                Kind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply
+            )
 
 
 def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
     """The change of calibrating distances."""
     u = length_words(item.standard_uncertainty)
     told = f"calibrate the {words.replace('{}', artefact)} to {u}"
-    touched = frozenset(f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist())
-    return Change(Kind.CERTIFICATE, told, float(len(item.pairs)), touched, partial(with_calibration, item=item), item)
+    touched = frozenset(
+        f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist()
+    )
+    return Change(
+        Kind.CERTIFICATE,
+        told,
+        float(len(item.pairs)),
+        touched,
+        partial(with_calibration, item=item),
+        item,
+    )
 
 
 def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration:
     """Distances of an artefact, none yet, as certain as others of it, or else as readings."""
-    own = [c for c in experiment.calibration if isinstance(c, DistanceCalibration) and c.artefact == artefact]
-    uncertainty = own[0].standard_uncertainty if own else LengthFunction(float(experiment.machine.repeatability.min()))
+    own = [
+        c
+        for c in experiment.calibration
+        if isinstance(c, DistanceCalibration) and c.artefact == artefact
+    ]
+    uncertainty = (
+        own[0].standard_uncertainty
+        if own
+        else LengthFunction(float(experiment.machine.repeatability.min()))
+    )
     none, no_pairs = np.zeros(0), np.zeros((0, 2), np.intp)
     dimensions: Any = 2 if experiment.dimension == 2 else 3
-    return DistanceCalibration(artefact, no_pairs, dimensions, none, False, uncertainty, none, "distance", "included")
+    return DistanceCalibration(
+        artefact, no_pairs, dimensions, none, False, uncertainty, none, "distance", "included"
+    )
 
 
 def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
-    """Words and pairs (m, 2) of single distances along the edges, diagonals and rows, and of sets of them."""
+    """Words and pairs (m, 2) of single distances along the edges, diagonals and rows, and of sets
+    of them.
+    """
     n = len(layout.names)
     if n < 2:
         return
     if n == 2:
         yield "distance of its balls on {}", np.array([[0, 1]], np.intp)
         return
-    singles = [pair for name in ("corner sides", "corner diagonals") for pair in layout.pair_sets.get(name, ())]
+    singles = [
+        pair
+        for name in ("corner sides", "corner diagonals")
+        for pair in layout.pair_sets.get(name, ())
+    ]
     if not layout.pair_sets:
         far = np.linalg.norm(layout.coordinates[:, None] - layout.coordinates[None], axis=2)
         order = np.argsort(-far[np.triu_indices(n, 1)], kind="stable")[:10]
@@ -120,7 +153,9 @@ def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
 
 
 def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
-    """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`, evenly from all."""
+    """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`,
+    evenly from all.
+    """
     found = []
     xy = np.round(layout.coordinates[:, :2], 9)
     for across, along in ((1, 0), (0, 1)):
@@ -149,7 +184,11 @@ def _better(item: Any, factor: float) -> tuple[Any, str]:
         old = item.standard_uncertainty
         new = LengthFunction(factor * old.constant, factor * old.slope)
         return (
-            replace(item, standard_uncertainty=new, standard_uncertainties=factor * item.standard_uncertainties),
+            replace(
+                item,
+                standard_uncertainty=new,
+                standard_uncertainties=factor * item.standard_uncertainties,
+            ),
             length_words(new),
         )
     if isinstance(item, CoordinateCalibration):

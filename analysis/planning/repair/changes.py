@@ -1,4 +1,6 @@
-"""A change of an experiment: in words, with its price, and as a function from experiment to experiment."""
+"""A change of an experiment: in words, with its price, and as a function from experiment to
+experiment.
+"""
 
 from __future__ import annotations
 
@@ -52,11 +54,11 @@ KINDS = {
 class Change:
     """What may be changed of an experiment.
 
-    `words` is an imperative sentence. `cost` compares changes of one kind: seconds for candidates of a pool, otherwise
-    readings or distances more. Two changes that touch the same thing do not go together.
-    `adds` is what is observed besides, where everything else stays as it is: a calibration item, a position, or the
-    further readings in the position that `of` names. `candidate` is the index of the pool's candidate, -1 where it is
-    none.
+    `words` is an imperative sentence. `cost` compares changes of one kind: seconds for candidates
+    of a pool, otherwise readings or distances more. Two changes that touch the same thing do not go
+    together. `adds` is what is observed besides, where everything else stays as it is: a
+    calibration item, a position, or the further readings in the position that `of` names.
+    `candidate` is the index of the pool's candidate, -1 where it is none.
     """
 
     kind: Kind
@@ -82,8 +84,12 @@ def go_together(changes: Sequence[Change]) -> bool:
     return len(touched) == len(set(touched))
 
 
-def is_inside(position: Position, layout: BallLayout, volume: Volume, offsets: Mapping[str, Array]) -> bool:
-    """Whether all scale readings of a position are in the volume, as in a file, with the `offsets` (d,) of probes."""
+def is_inside(
+    position: Position, layout: BallLayout, volume: Volume, offsets: Mapping[str, Array]
+) -> bool:
+    """Whether all scale readings of a position are in the volume, as in a file, with the `offsets`
+    (d,) of probes.
+    """
     places = ball_coordinates(position.pose, layout)
     lower, upper = volume.of_readings
     for group in position.readings:
@@ -117,7 +123,9 @@ def moved(position: Position, rotation: Array, origin: Array) -> Position:
 def further(position: Position, probe: str) -> Position:
     """Everything that is read in a position, read once with another probe, and nothing else."""
     every = {
-        int(i): name for group in position.readings for i, name in zip(group.ball_indices, group.balls, strict=True)
+        int(i): name
+        for group in position.readings
+        for i, name in zip(group.ball_indices, group.balls, strict=True)
     }
     indices = np.array(sorted(every), np.intp)
     repeats = min(group.repeats for group in position.readings)
@@ -127,8 +135,12 @@ def further(position: Position, probe: str) -> Position:
     return replace(position, readings=(group,))
 
 
-def with_further(experiment: Experiment, name: str, more: Position, probes: Mapping[str, Array]) -> Experiment:
-    """The experiment with the readings of `more` in the position `name` besides, with probes that may be new."""
+def with_further(
+    experiment: Experiment, name: str, more: Position, probes: Mapping[str, Array]
+) -> Experiment:
+    """The experiment with the readings of `more` in the position `name` besides, with probes that
+    may be new.
+    """
     (group,) = more.readings
     position = _named(experiment, name)
     same = [
@@ -168,7 +180,11 @@ def probes_of(position: Position) -> tuple[str, ...]:
 
 def count_readings(positions: Sequence[Position]) -> int:
     """Readings of balls, every repeat counted."""
-    return sum(len(group.probes) * len(group.balls) * group.repeats for place in positions for group in place.readings)
+    return sum(
+        len(group.probes) * len(group.balls) * group.repeats
+        for place in positions
+        for group in place.readings
+    )
 
 
 def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
@@ -191,8 +207,12 @@ def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
     return "corners" if layout.corner_set and wanted == set(layout.corner_set) else None
 
 
-def with_artefact(experiment: Experiment, name: str, settings: ArtefactSettings) -> Experiment | None:
-    """The experiment with another artefact of that name; None where what is said of its balls would not carry over."""
+def with_artefact(
+    experiment: Experiment, name: str, settings: ArtefactSettings
+) -> Experiment | None:
+    """The experiment with another artefact of that name; None where what is said of its balls would
+    not carry over.
+    """
     old, new = experiment.layouts[name], settings.layout()
     places = []
     for place in experiment.positions:
@@ -200,7 +220,9 @@ def with_artefact(experiment: Experiment, name: str, settings: ArtefactSettings)
             if any(ball_set(old, group.ball_indices) != "all" for group in place.readings):
                 return None
             every = np.arange(len(new.names))
-            groups = tuple(replace(group, balls=new.names, ball_indices=every) for group in place.readings)
+            groups = tuple(
+                replace(group, balls=new.names, ball_indices=every) for group in place.readings
+            )
             place = replace(place, readings=groups)
         places.append(place)
     items: list[Calibration] = []
@@ -235,7 +257,9 @@ def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibr
     return None
 
 
-def distances(like: DistanceCalibration, layout: BallLayout, chosen: Indices) -> DistanceCalibration:
+def distances(
+    like: DistanceCalibration, layout: BallLayout, chosen: Indices
+) -> DistanceCalibration:
     """Calibrated distances between pairs (m, 2) of balls, otherwise like others."""
     ends = layout.coordinates[chosen][:, :, : like.dimensions]
     values = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

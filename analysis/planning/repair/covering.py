@@ -37,8 +37,14 @@ def covering_pairs(triangles: Sequence[Array]) -> list[tuple[int, int]]:
     for i, left in enumerate(rest):
         if not left.shape[1]:
             continue
-        others = [k for k in range(i + 1, len(rest)) if rest[k].shape[1] and _may_cover(rest[k], left)]
-        found += [(i, k) for k, rank in zip(others, _ranks(stack[others] @ left), strict=True) if rank == left.shape[1]]
+        others = [
+            k for k in range(i + 1, len(rest)) if rest[k].shape[1] and _may_cover(rest[k], left)
+        ]
+        found += [
+            (i, k)
+            for k, rank in zip(others, _ranks(stack[others] @ left), strict=True)
+            if rank == left.shape[1]
+        ]
     return found
 
 
@@ -48,7 +54,8 @@ def covering_set(
     effort: Callable[[Change], float],
     may_be: Callable[[Sequence[Change]], bool],
 ) -> tuple[Change, ...]:
-    """A set built up of what removes most null directions for its effort each time; empty if some stay.
+    """A set built up of what removes most null directions for its effort each time; empty if some
+    stay.
 
     What the others make superfluous is left out again, the most expensive first.
     """

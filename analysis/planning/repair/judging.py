@@ -1,4 +1,6 @@
-"""What a changed experiment would determine: everything but the words of a verdict, as many are compared."""
+"""What a changed experiment would determine: everything but the words of a verdict, as many are
+compared.
+"""
 
 from __future__ import annotations
 
@@ -26,9 +28,10 @@ THERE = 1e-6
 class Judged:
     """A design's rank and what it knows least.
 
-    `weak` counts weakly determined directions, `worst` is what one standard deviation along the weakest adds to
-    corrected points, and `spread` the same of all directions together, in metres. `open_errors` (model parameters,
-    deficiency) is what null directions do to the machine, scaled to micrometres.
+    `weak` counts weakly determined directions, `worst` is what one standard deviation along the
+    weakest adds to corrected points, and `spread` the same of all directions together, in metres.
+    `open_errors` (model parameters, deficiency) is what null directions do to the machine, scaled
+    to micrometres.
     """
 
     deficiency: int
@@ -81,7 +84,9 @@ def examine(experiment: Experiment) -> Examined:
 
 
 def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | None:
-    """What an experiment determines after changes; None where they contradict something else that it says."""
+    """What an experiment determines after changes; None where they contradict something else that
+    it says.
+    """
     try:
         return examine(apply_all(changes, experiment)).judged
     except ExperimentError:
@@ -94,7 +99,8 @@ def work(base: Examined) -> float:
 
 
 def removed(before: Array, after: Array) -> tuple[int, ...]:
-    """Which null directions, told by what they do to the machine (parameters, k), are no part of those afterwards.
+    """Which null directions, told by what they do to the machine (parameters, k), are no part of
+    those afterwards.
 
     Directions that do nothing to the machine, or the same as others, are never told as removed.
     """
@@ -103,4 +109,9 @@ def removed(before: Array, after: Array) -> tuple[int, ...]:
     parts, _, rank, _ = np.linalg.lstsq(before, after, rcond=1e-9)
     if rank < before.shape[1]:
         return ()
-    return tuple(int(k) for k in np.flatnonzero(np.abs(parts).max(axis=1) < THERE * max(np.abs(parts).max(), 1e-300)))
+    return tuple(
+        int(k)
+        for k in np.flatnonzero(
+            np.abs(parts).max(axis=1) < THERE * max(np.abs(parts).max(), 1e-300)
+        )
+    )

@@ -46,14 +46,20 @@ def more_balls(experiment: Experiment) -> Iterator[Change]:
             else:
                 break
             try:
-                new = type(settings).model_validate({**settings.model_dump(exclude_unset=True), "balls": balls})
+                new = type(settings).model_validate(
+                    {**settings.model_dump(exclude_unset=True), "balls": balls}
+                )
             except ValueError:
                 new = settings.model_copy(update={"balls": balls})
             changed = with_artefact(experiment, name, new)
             if changed is not None:
-                cost = float(count_readings(changed.positions) - count_readings(experiment.positions))
+                cost = float(
+                    count_readings(changed.positions) - count_readings(experiment.positions)
+                )
                 apply = partial(_with_artefact, name=name, settings=new)
-                yield Change(Kind.ARTEFACT, f"use {words}", cost, frozenset({f"artefact {name}"}), apply)
+                yield Change(
+                    Kind.ARTEFACT, f"use {words}", cost, frozenset({f"artefact {name}"}), apply
+                )
 
 
 def _with_artefact(experiment: Experiment, name: str, settings: Any) -> Experiment:
@@ -75,7 +81,11 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
             ("rotation_coefficients", 1, "coefficients of rotational errors"),
         )
     elif isinstance(model, EmpiricalSettings) and model.terms in ("sums", "tensor"):
-        keys = () if isinstance(model.basis, SplineSettings) else (("coefficients", 2, "coefficients"),)
+        keys = (
+            ()
+            if isinstance(model.basis, SplineSettings)
+            else (("coefficients", 2, "coefficients"),)
+        )
     elif isinstance(model, MachineFileSettings):
         keys = (("knots", 0, "interior knots"),)
     for key, least, words in keys:
@@ -83,7 +93,11 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
         for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
             new = model.model_copy(update={key: value})
             apply = partial(_with_model, settings=new)
-            what = words if value != 1 else words.replace("coefficients", "coefficient").replace("knots", "knot")
+            what = (
+                words
+                if value != 1
+                else words.replace("coefficients", "coefficient").replace("knots", "knot")
+            )
             told = f"ask for {value} {what} instead of {now}"
             yield Change(Kind.MODEL, told, float(now - value), frozenset({"model"}), apply)
 

@@ -47,7 +47,11 @@ def moves(experiment: Experiment) -> Iterator[Change]:
     volume = experiment.machine.volume
     for place in experiment.positions:
         layout = experiment.layouts[place.artefact]
-        for words, pose in (*_turned(experiment, place), *_shifted(experiment, place), *_laid(experiment, place)):
+        for words, pose in (
+            *_turned(experiment, place),
+            *_shifted(experiment, place),
+            *_laid(experiment, place),
+        ):
             new = moved(place, *pose)
             if is_inside(new, layout, volume, experiment.probes):
                 told = words.format(f'position "{place.name}"')
@@ -95,15 +99,24 @@ def _laid(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[
     for words, along in bars(experiment.dimension):
         rotation = along_rotation(along)
         if np.abs(rotation[:, 0] - place.pose.rotation[:, 0]).max() > 1e-9:
-            yield f"lay the bar of {{}} {words}", (rotation, np.round(centre - rotation @ middle, 5) + 0.0)
+            yield (
+                f"lay the bar of {{}} {words}",
+                (rotation, np.round(centre - rotation @ middle, 5) + 0.0),
+            )
 
 
 def more_readings(experiment: Experiment) -> Iterator[Change]:
-    """Positions read with further probes, those there are and, where they lie on one line, new ones."""
+    """Positions read with further probes, those there are and, where they lie on one line, new
+    ones.
+    """
     tips = new_tips(experiment)
     for name, offset in {**experiment.probes, **tips}.items():
         for place in experiment.positions:
-            if name in probes_of(place) or not is_plate(experiment, place.artefact) or experiment.dimension == 2:
+            if (
+                name in probes_of(place)
+                or not is_plate(experiment, place.artefact)
+                or experiment.dimension == 2
+            ):
                 continue
             more, layout = further(place, name), experiment.layouts[place.artefact]
             if not is_inside(more, layout, experiment.machine.volume, {name: offset}):
@@ -113,7 +126,9 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
             if name in tips:
                 # A stylus has to be made.
                 cost *= NEW_TIP
-                words = f'read position "{place.name}" with a new probe too, {_tip_words(name, offset)}'
+                words = (
+                    f'read position "{place.name}" with a new probe too, {_tip_words(name, offset)}'
+                )
             new = {name: offset} if name in tips else {}
             apply = partial(with_further, name=place.name, more=more, probes=new)
             touched = frozenset({f"position {place.name} with {name}"})
@@ -153,4 +168,6 @@ def new_tips(experiment: Experiment) -> dict[str, Array]:
 
 
 def _tip_words(name: str, offset: Array) -> str:
-    return f"{name}, its offset ({', '.join(format_length(v).removesuffix(' mm') for v in offset)}) mm"
+    return (
+        f"{name}, its offset ({', '.join(format_length(v).removesuffix(' mm') for v in offset)}) mm"
+    )

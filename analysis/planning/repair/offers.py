@@ -27,7 +27,8 @@ Generator = Callable[[Experiment], Iterator[Change]]
 
 
 def offers(experiment: Experiment, is_deficient: bool = True) -> dict[Kind, list[Change]]:
-    """Changes that stay within the volume, by kind; additions are those of the pool where the experiment has one.
+    """Changes that stay within the volume, by kind; additions are those of the pool where the
+    experiment has one.
 
     What only makes observations more certain is offered where none is missing.
     """
@@ -39,7 +40,9 @@ def offers(experiment: Experiment, is_deficient: bool = True) -> dict[Kind, list
     else:
         makers += [(Kind.CERTIFICATE, certificates), (Kind.ADD_POSITION, positions)]
     makers += [(Kind.ARTEFACT, more_balls), (Kind.MODEL, fewer_coefficients)]
-    found: dict[Kind, list[Change]] = {kind: [] for kind, _ in sorted(makers, key=lambda one: one[0])}
+    found: dict[Kind, list[Change]] = {
+        kind: [] for kind, _ in sorted(makers, key=lambda one: one[0])
+    }
     placed = placed_only(experiment)
     for kind, maker in makers:
         found[kind] += maker(experiment if kind == Kind.POOL else placed)
@@ -61,7 +64,9 @@ def pool_additions(experiment: Experiment) -> Iterator[Change]:
             else partial(with_calibration, item=one.item)
         )
         words = f'add "{one.name}" of the pool ({duration(one.seconds)})'
-        yield Change(Kind.POOL, words, one.seconds, frozenset({f"candidate {k}"}), add, one.item, candidate=k)
+        yield Change(
+            Kind.POOL, words, one.seconds, frozenset({f"candidate {k}"}), add, one.item, candidate=k
+        )
 
 
 def allowed(pool: Pool, chosen: tuple[int, ...]) -> bool:

@@ -27,7 +27,11 @@ def along_rotation(direction: Array) -> Array:
     if d == 2:
         return np.array([[direction[0], -direction[1]], [direction[1], direction[0]]])
     level = np.hypot(direction[0], direction[1])
-    side = np.array([0.0, 1.0, 0.0]) if level < 1e-9 else np.array([-direction[1], direction[0], 0.0]) / level
+    side = (
+        np.array([0.0, 1.0, 0.0])
+        if level < 1e-9
+        else np.array([-direction[1], direction[0], 0.0]) / level
+    )
     return np.column_stack([direction, side, np.cross(direction, side)])
 
 

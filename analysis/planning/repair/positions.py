@@ -37,7 +37,9 @@ LEVELS = (0.25, 0.75, 0.5)
 
 
 def positions(experiment: Experiment) -> Iterator[Change]:
-    """A plate in one position more, in each plane, turned and shifted, or a bar in one direction more."""
+    """A plate in one position more, in each plane, turned and shifted, or a bar in one direction
+    more.
+    """
     volume, d = experiment.machine.volume, experiment.dimension
     for artefact in dict.fromkeys(place.artefact for place in experiment.positions):
         layout = experiment.layouts[artefact]
@@ -46,14 +48,23 @@ def positions(experiment: Experiment) -> Iterator[Change]:
             names = _probes_across(experiment, artefact, plane)
             every = np.arange(len(layout.names))
             name = _free_name(experiment, f"more {plane or ''}".strip())
-            new = Position(name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),))
+            new = Position(
+                name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),)
+            )
             if d == len(pose[1]) and is_inside(new, layout, volume, experiment.probes):
                 told = f"read {artefact} once more {words}"
                 if d == 3 and len(experiment.probes) > 1:
-                    told += f", with {'probe' if len(names) == 1 else 'probes'} {' and '.join(names)}"
+                    told += (
+                        f", with {'probe' if len(names) == 1 else 'probes'} {' and '.join(names)}"
+                    )
                 add = partial(with_added, position=new)
                 yield Change(
-                    Kind.ADD_POSITION, told, float(count_readings([new])), frozenset({f"more {words}"}), add, new
+                    Kind.ADD_POSITION,
+                    told,
+                    float(count_readings([new])),
+                    frozenset({f"more {words}"}),
+                    add,
+                    new,
                 )
 
 
@@ -65,11 +76,21 @@ def with_added(experiment: Experiment, position: Position) -> Experiment:
 
 def _free_name(experiment: Experiment, name: str) -> str:
     taken = {place.name for place in experiment.positions}
-    return next(one for k in range(len(taken) + 1) if (one := name if not k else f"{name} {k + 1}") not in taken)
+    return next(
+        one
+        for k in range(len(taken) + 1)
+        if (one := name if not k else f"{name} {k + 1}") not in taken
+    )
 
 
-def _plate_poses(experiment: Experiment, artefact: str) -> Iterator[tuple[str, Axis | None, tuple[Array, Array]]]:
-    layout, d, volume = experiment.layouts[artefact], experiment.dimension, experiment.machine.volume
+def _plate_poses(
+    experiment: Experiment, artefact: str
+) -> Iterator[tuple[str, Axis | None, tuple[Array, Array]]]:
+    layout, d, volume = (
+        experiment.layouts[artefact],
+        experiment.dimension,
+        experiment.machine.volume,
+    )
     centre, step = 0.5 * (volume.lower + volume.upper), pitch(layout)
     middle = middle_of(layout)[:d]
     for shift, turns in product((0.0, 0.5), range(4)):
@@ -77,27 +98,41 @@ def _plate_poses(experiment: Experiment, artefact: str) -> Iterator[tuple[str, A
             rotation = plane_rotation(plane, turns, d)
             at = centre + np.round(shift * step, 4)
             words = (
-                f"in the middle of the volume, turned by {90 * turns} deg" if turns else "in the middle of the volume"
+                f"in the middle of the volume, turned by {90 * turns} deg"
+                if turns
+                else "in the middle of the volume"
             )
             if shift:
                 words = words.replace(
-                    " of the volume", f", shifted by {format_length(np.round(0.5 * step, 4))} along both axes"
+                    " of the volume",
+                    f", shifted by {format_length(np.round(0.5 * step, 4))} along both axes",
                 )
             if d == 3:
                 normal = AXIS_INDEX[plane]
-                at[normal] = volume.lower[normal] + level * (volume.upper[normal] - volume.lower[normal])
+                at[normal] = volume.lower[normal] + level * (
+                    volume.upper[normal] - volume.lower[normal]
+                )
                 words = f"in plane {plane} at {format_length(at[normal])}, {words}"
             yield words, plane if d == 3 else None, (rotation, clean(at - rotation @ middle))
 
 
-def _bar_poses(experiment: Experiment, artefact: str) -> Iterator[tuple[str, Axis | None, tuple[Array, Array]]]:
+def _bar_poses(
+    experiment: Experiment, artefact: str
+) -> Iterator[tuple[str, Axis | None, tuple[Array, Array]]]:
     if not isinstance(experiment.artefacts[artefact], TwoSpheresSettings):
         return
     volume, d = experiment.machine.volume, experiment.dimension
-    centre, middle = 0.5 * (volume.lower + volume.upper), middle_of(experiment.layouts[artefact])[:d]
+    centre, middle = (
+        0.5 * (volume.lower + volume.upper),
+        middle_of(experiment.layouts[artefact])[:d],
+    )
     for words, along in bars(d):
         rotation = along_rotation(along)
-        yield f"{words}, in the middle of the volume", None, (rotation, np.round(centre - rotation @ middle, 5) + 0.0)
+        yield (
+            f"{words}, in the middle of the volume",
+            None,
+            (rotation, np.round(centre - rotation @ middle, 5) + 0.0),
+        )
 
 
 def _probes_across(experiment: Experiment, artefact: str, plane: Axis | None) -> tuple[str, ...]:
@@ -108,5 +143,9 @@ def _probes_across(experiment: Experiment, artefact: str, plane: Axis | None) ->
         if plane is None or (found is not None and found[0] == plane):
             return probes_of(place)
     normal = AXIS_INDEX[plane or "z"]
-    across = [name for name, p in experiment.probes.items() if abs(p[normal]) > 0.7 * float(np.linalg.norm(p))]
+    across = [
+        name
+        for name, p in experiment.probes.items()
+        if abs(p[normal]) > 0.7 * float(np.linalg.norm(p))
+    ]
     return tuple(across) or (next(iter(experiment.probes)),)

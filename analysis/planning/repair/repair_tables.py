@@ -18,7 +18,9 @@ MOST_NAMES = 8
 
 
 def repair_lines(found: Repairs | None, judged: Verdict) -> list[str]:
-    """What was found, one repair after the other, each with what the file is to say; nothing where all is well."""
+    """What was found, one repair after the other, each with what the file is to say; nothing where
+    all is well.
+    """
     if found is None:
         return []
     lines = []
@@ -29,7 +31,10 @@ def repair_lines(found: Repairs | None, judged: Verdict) -> list[str]:
         tried = _tried(found)
         lines.append(f"repair: no changes were found after which nothing is open; {tried}")
     for one in found.partial:
-        lines.append(f"repair of {_directions(one, judged)} alone: {_changes(one)}: leaves {_rank(one.deficiency)}")
+        lines.append(
+            f"repair of {_directions(one, judged)} alone: {_changes(one)}: leaves"
+            f" {_rank(one.deficiency)}"
+        )
         lines += [f"repair of {_numbers(one)} alone, in the file: {edit}" for edit in one.edits]
     return lines
 
@@ -46,7 +51,10 @@ def _worth(one: Repair, judged: Verdict) -> str:
     words = _rank(one.deficiency)
     if one.weak:
         count = "1 direction is" if one.weak == 1 else f"{one.weak} directions are"
-        words += f", but {count} weakly determined, the weakest known only to {length(one.worst)} in corrected points"
+        words += (
+            f", but {count} weakly determined, the weakest known only to {length(one.worst)} in"
+            " corrected points"
+        )
     elif one.is_faint:
         words += ", but hardly: see the smallest singular value"
     else:
@@ -76,37 +84,55 @@ def _names(direction: Direction) -> list[str]:
     """Errors that a direction changes, or else what it changes instead."""
     if direction.functions:
         return [part.name for part in direction.functions]
-    artefacts, lengths = [part.name for part in direction.artefacts], [part.name for part in direction.lengths]
-    return [*artefacts, *lengths, *(part.name for part in (*direction.probes, *direction.positions))]
+    artefacts, lengths = (
+        [part.name for part in direction.artefacts],
+        [part.name for part in direction.lengths],
+    )
+    return [
+        *artefacts,
+        *lengths,
+        *(part.name for part in (*direction.probes, *direction.positions)),
+    ]
 
 
 def _tried(found: Repairs) -> str:
     if not found.tried:
         return "there is nothing that could be changed in general"
     counts = ", ".join(f"{count} {KINDS[kind]}" for kind, count in found.tried.items())
-    return f"tried: {counts}, and {found.sets} sets of several" if found.sets else f"tried: {counts}"
+    return (
+        f"tried: {counts}, and {found.sets} sets of several" if found.sets else f"tried: {counts}"
+    )
 
 
 def certificate_lines(found: ScaleCertificate | None) -> list[str]:
-    """The certificate that carries scale, with what the file is to say; nothing where none is needed."""
+    """The certificate that carries scale, with what the file is to say; nothing where none is
+    needed.
+    """
     if found is None:
         return []
     if found.change is None:
-        return ["scale: no single calibrated distance that was tried carries it in place of the probe offsets"]
+        return [
+            "scale: no single calibrated distance that was tried carries it in place of the probe"
+            " offsets"
+        ]
     u, average = f"{1e6 * found.offset_uncertainty:g}", number(1e6 * found.average)
     words = f"scale: {found.change.words}: average U6 {average} um with {u} um on the probe offsets"
     return [words, *(f"scale, in the file: {edit}" for edit in found.edits)]
 
 
 def certificate_data(found: ScaleCertificate | None) -> dict[str, Any] | None:
-    """The same as plain data in metres; None where none is needed, and without a text where none was found."""
+    """The same as plain data in metres; None where none is needed, and without a text where none
+    was found.
+    """
     if found is None:
         return None
     return {
         "text": None if found.change is None else found.change.words,
         "offset_uncertainty": found.offset_uncertainty,
         "average_U6": finite(found.average),
-        "edits": [{"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in found.edits],
+        "edits": [
+            {"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in found.edits
+        ],
     }
 
 
@@ -132,5 +158,7 @@ def _data(one: Repair) -> dict[str, Any]:
         "weakest": one.worst,
         "smallest_singular_value": one.smallest,
         "average_U6": None if u6 is None else finite(u6.average),
-        "edits": [{"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in one.edits],
+        "edits": [
+            {"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in one.edits
+        ],
     }

@@ -1,4 +1,6 @@
-"""What further observations say of null directions, without a factorisation of the changed design."""
+"""What further observations say of null directions, without a factorisation of the changed
+design.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +24,22 @@ SEEN = 1e-6
 
 
 def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
-    """What the observations that changes add say of the null directions: a triangle (deficiency, deficiency) for each.
+    """What the observations that changes add say of the null directions: a triangle (deficiency,
+    deficiency) for each.
 
-    The pose of an added position is eliminated. Changes that do more than add readings or distances of plates that are
-    read already are left out. A set of changes removes as many directions as the rank of its triangles together.
+    The pose of an added position is eliminated. Changes that do more than add readings or distances
+    of plates that are read already are left out. A set of changes removes as many directions as the
+    rank of its triangles together.
     """
     found: dict[Change, Array] = {}
     if not base.at.deficiency:
         return found
     experiment = base.experiment
-    plates = {place.artefact for place in experiment.positions if experiment.artefacts[place.artefact].role == "plate"}
+    plates = {
+        place.artefact
+        for place in experiment.positions
+        if experiment.artefacts[place.artefact].role == "plate"
+    }
     added: dict[Change, Position] = {}
     for change in changes:
         item = change.adds
@@ -46,7 +54,9 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
 
 def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
     design = base.at.design
-    own = np.flatnonzero(design.ball_artefact == design.artefact_names.index(item.artefact))[item.pairs]
+    own = np.flatnonzero(design.ball_artefact == design.artefact_names.index(item.artefact))[
+        item.pairs
+    ]
     along = design.balls[own[:, 0]] - design.balls[own[:, 1]]
     along[:, item.dimensions :] = 0.0
     along /= np.linalg.norm(along, axis=1)[:, None] * item.standard_uncertainties[:, None]
@@ -75,7 +85,9 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
     for k, change in enumerate(added, start=own):
         readings = extended.readings.select(order[first[k] : first[k + 1]])
         blocks = reading_blocks(extended, state, readings, None)
-        rows = blocks.by_model @ null[layout.model] + blocks.by_ball @ base.at.ball_null[readings.ball]
+        rows = (
+            blocks.by_model @ null[layout.model] + blocks.by_ball @ base.at.ball_null[readings.ball]
+        )
         if blocks.by_offset is not None:
             rows = rows + blocks.by_offset @ with_held[layout.offset_columns[readings.probe]]
         if change.of is None:
@@ -109,5 +121,7 @@ def rank_of(triangles: Sequence[Array]) -> int:
 
 
 def weakest_of(triangles: Sequence[Array]) -> float:
-    """How well the triangles together show the direction that they show least, in standard deviations."""
+    """How well the triangles together show the direction that they show least, in standard
+    deviations.
+    """
     return float(np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False)[-1])

@@ -1,7 +1,7 @@
 """The cheapest changes after which a design determines all that it asks for.
 
-Every set of changes that is told has been applied to the experiment, and the rank of the resulting design computed in
-full; none of its members can be left out.
+Every set of changes that is told has been applied to the experiment, and the rank of the resulting
+design computed in full; none of its members can be left out.
 """
 
 from __future__ import annotations
@@ -44,10 +44,11 @@ MOST_VERIFIED = 8
 class Repair:
     """Changes that leave nothing undetermined, with the plan of the changed design.
 
-    `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts directions still
-    weakly determined, of which `worst` is what one standard deviation along the weakest adds to corrected points, in
-    metres. `smallest` is the smallest singular value, and `is_faint` says that it is far below those of the design
-    before. `edits` is what the file is to say.
+    `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts
+    directions still weakly determined, of which `worst` is what one standard deviation along the
+    weakest adds to corrected points, in metres. `smallest` is the smallest singular value, and
+    `is_faint` says that it is far below those of the design before. `edits` is what the file is to
+    say.
     """
 
     changes: tuple[Change, ...]
@@ -63,7 +64,8 @@ class Repair:
 
 @dataclass(frozen=True)
 class Repairs:
-    """What was found: `complete` repairs, `partial` ones of single directions, and how much was tried.
+    """What was found: `complete` repairs, `partial` ones of single directions, and how much was
+    tried.
 
     `tried` counts by kind the changes that were judged, and `sets` sets of several.
     """
@@ -76,7 +78,9 @@ class Repairs:
 
 @single_threaded
 def repairs(experiment: Experiment, most: int = MOST_TOLD) -> Repairs | None:
-    """Repairs of an experiment's design, `most` at most; None where nothing is undetermined or weakly determined."""
+    """Repairs of an experiment's design, `most` at most; None where nothing is undetermined or
+    weakly determined.
+    """
     base = examine(experiment)
     if base.judged.is_cured:
         return None
@@ -116,7 +120,9 @@ class _Search:
                 break
             whole, part = self.singles(kind, changes)
             singles += [*whole, *part]
-            possible: list[tuple[Change, ...]] = [(one,) for one in whole if not self.judge((one,)).deficiency]
+            possible: list[tuple[Change, ...]] = [
+                (one,) for one in whole if not self.judge((one,)).deficiency
+            ]
             together = self.set_of_additions(changes) if self.is_worth_more(possible) else ()
             possible += [together] if together else []
             if possible:
@@ -124,11 +130,23 @@ class _Search:
         for together in self.mixed(found, best):
             best[max(one.kind for one in together)] = together
         # What costs nothing comes before what the pool has a price for.
-        order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind != Kind.MOVE, kind))
-        complete = tuple(self.told(best[kind]) for kind in order[: self.most] if self.helps(best[kind]))
-        is_single = any(len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete)
+        order = sorted(
+            best,
+            key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind != Kind.MOVE, kind),
+        )
+        complete = tuple(
+            self.told(best[kind]) for kind in order[: self.most] if self.helps(best[kind])
+        )
+        is_single = any(
+            len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete
+        )
         partial = () if is_single else self.of_single_directions(singles)
-        return Repairs(complete, partial, {kind: len(self.tried[kind]) for kind in sorted(self.tried)}, self.sets)
+        return Repairs(
+            complete,
+            partial,
+            {kind: len(self.tried[kind]) for kind in sorted(self.tried)},
+            self.sets,
+        )
 
     def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
         """Whether several changes of a kind may be better than the best one."""
@@ -138,7 +156,9 @@ class _Search:
     def mixed(
         self, found: Mapping[Kind, Sequence[Change]], best: Mapping[Kind, tuple[Change, ...]]
     ) -> Iterator[tuple[Change, ...]]:
-        """Sets of changes where no sound repair is known but to ask for less: additions first, then moves as well."""
+        """Sets of changes where no sound repair is known but to ask for less: additions first, then
+        moves as well.
+        """
 
         def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
             return any(self.is_sound(self.judge(one)) for one in some)
@@ -152,7 +172,12 @@ class _Search:
             if is_enough([together]):
                 return
         for kind in (Kind.MOVE, *(() if is_enough(best.values()) else (Kind.ARTEFACT, Kind.MODEL))):
-            changes = [one for other in found if other <= kind for one in self.thinned(self.useful(found[other]))]
+            changes = [
+                one
+                for other in found
+                if other <= kind
+                for one in self.thinned(self.useful(found[other]))
+            ]
             together = self.greedy(found.get(Kind.MOVE, []) if kind == Kind.MOVE else changes)
             together = together or (self.greedy(changes) if kind == Kind.MOVE else ())
             if together:
@@ -164,7 +189,9 @@ class _Search:
         return [one for one in changes if one not in self.seen or self.ranks[one]]
 
     def is_faint(self, after: Judged) -> bool:
-        """Whether what was undetermined is so little determined now that nobody would call it known."""
+        """Whether what was undetermined is so little determined now that nobody would call it
+        known.
+        """
         return self.before.deficiency > 0 and after.smallest < FAINT * self.before.smallest
 
     def is_sound(self, after: Judged) -> bool:
@@ -188,9 +215,16 @@ class _Search:
         return self.judged[key] or self.before
 
     def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
-        """A repair that leaves nothing weak first, then the cheapest, then the one that leaves least uncertain."""
+        """A repair that leaves nothing weak first, then the cheapest, then the one that leaves
+        least uncertain.
+        """
         after = self.judge(changes)
-        return not self.is_sound(after), sum(one.cost for one in changes), len(changes), float(comparable(after.spread))
+        return (
+            not self.is_sound(after),
+            sum(one.cost for one in changes),
+            len(changes),
+            float(comparable(after.spread)),
+        )
 
     def thinned(self, changes: Sequence[Change]) -> list[Change]:
         """No more of them than can be judged, evenly from all."""
@@ -199,7 +233,9 @@ class _Search:
         return [changes[k] for k in np.linspace(0, len(changes) - 1, self.at_most).astype(int)]
 
     def singles(self, kind: Kind, changes: Sequence[Change]) -> tuple[list[Change], list[Change]]:
-        """Changes that may suffice, judged one at a time, and additions that remove some of the null directions."""
+        """Changes that may suffice, judged one at a time, and additions that remove some of the
+        null directions.
+        """
         useful = self.useful(changes)
         self.tried.setdefault(kind, set()).update(one for one in changes if one in self.seen)
         k = self.before.deficiency
@@ -231,7 +267,9 @@ class _Search:
         return nominal
 
     def cheapest_sets(self, additions: Sequence[Change]) -> list[tuple[Change, ...]]:
-        """Sets of additions that remove all null directions, the cheapest pairs first, then one that is built up."""
+        """Sets of additions that remove all null directions, the cheapest pairs first, then one
+        that is built up.
+        """
         few = different(additions, self.seen)
         found: list[tuple[Change, ...]] = [
             (few[i], few[k])
@@ -255,10 +293,15 @@ class _Search:
         if not {Kind.MOVE, Kind.READ_MORE} <= {one.kind for one in changes}:
             return True
         changed, volume = apply_all(changes, experiment), experiment.machine.volume
-        return all(is_inside(one, changed.layouts[one.artefact], volume, changed.probes) for one in changed.positions)
+        return all(
+            is_inside(one, changed.layouts[one.artefact], volume, changed.probes)
+            for one in changed.positions
+        )
 
     def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:
-        """A set that is built up of the change that helps most each time, less what can be left out of it."""
+        """A set that is built up of the change that helps most each time, less what can be left out
+        of it.
+        """
         built: tuple[Change, ...] = ()
         after = self.before
         while not after.is_cured and len(built) < self.together:
@@ -281,7 +324,9 @@ class _Search:
         return built
 
     def of_single_directions(self, singles: Sequence[Change]) -> tuple[Repair, ...]:
-        """For each null direction the cheapest single change after which it is no part of what is open."""
+        """For each null direction the cheapest single change after which it is no part of what is
+        open.
+        """
         if not self.before.deficiency:
             return ()
         told = self.open_errors()

@@ -16,7 +16,12 @@ from ballplate.simulator.experiment.model import (
     Position,
     ReadingGroup,
 )
-from ballplate.simulator.geometry.positions import AXIS_INDEX, IN_PLANE_AXES, QUARTER_TURNS, ball_coordinates
+from ballplate.simulator.geometry.positions import (
+    AXIS_INDEX,
+    IN_PLANE_AXES,
+    QUARTER_TURNS,
+    ball_coordinates,
+)
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.machines.protocol import Array
 
@@ -27,7 +32,9 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Edit:
-    """A value that a file is to have at a path; `is_new` says that it goes to the end of the list there."""
+    """A value that a file is to have at a path; `is_new` says that it goes to the end of the list
+    there.
+    """
 
     path: str
     value: Any
@@ -62,7 +69,11 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
             found.append(Edit("calibration", said, True))
             continue
         old = calibration_settings(before, before.calibration[k])
-        found += [Edit(f"calibration[{k}].{key}", value) for key, value in said.items() if value != old.get(key)]
+        found += [
+            Edit(f"calibration[{k}].{key}", value)
+            for key, value in said.items()
+            if value != old.get(key)
+        ]
     return tuple(found)
 
 
@@ -93,12 +104,21 @@ def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
     layout, pose, d = experiment.layouts[position.artefact], position.pose, experiment.dimension
     found = plane_of(pose.rotation)
     if found is None:
-        return {"pose": {"origin": [written_length(v) for v in pose.origin], "rotation": _angles(pose.rotation)}}
+        return {
+            "pose": {
+                "origin": [written_length(v) for v in pose.origin],
+                "rotation": _angles(pose.rotation),
+            }
+        }
     plane, turns = found
     normal = AXIS_INDEX[plane]
     lower = ball_coordinates(pose, layout).min(axis=0)
-    said: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": written_length(pose.origin[normal])}
-    said["corner"] = {axis: written_length(lower[AXIS_INDEX[axis]]) for axis in IN_PLANE_AXES[plane]}
+    said: dict[str, Any] = (
+        {} if d == 2 else {"plane": plane, "level": written_length(pose.origin[normal])}
+    )
+    said["corner"] = {
+        axis: written_length(lower[AXIS_INDEX[axis]]) for axis in IN_PLANE_AXES[plane]
+    }
     return said | ({"quarter_turns": turns} if turns else {})
 
 
@@ -134,7 +154,10 @@ def _angles(rotation: Array) -> Any:
     upright = np.hypot(rotation[0, 0], rotation[1, 0])
     about_y = np.arctan2(-rotation[2, 0], upright)
     if upright > 1e-9:
-        about_x, about_z = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
+        about_x, about_z = (
+            np.arctan2(rotation[2, 1], rotation[2, 2]),
+            np.arctan2(rotation[1, 0], rotation[0, 0]),
+        )
     else:
         about_x, about_z = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
     return [_angle(value) for value in (about_x, about_y, about_z)]
@@ -210,5 +233,7 @@ def flow(value: Any) -> str:
     >>> flow({"name": "z low", "corner": {"x": "0 mm"}, "probes": ["a, b", "down"]})
     "{name: z low, corner: {x: 0 mm}, probes: ['a, b', down]}"
     """
-    text = yaml.safe_dump(value, default_flow_style=True, width=float("inf"), sort_keys=False, allow_unicode=True)
+    text = yaml.safe_dump(
+        value, default_flow_style=True, width=float("inf"), sort_keys=False, allow_unicode=True
+    )
     return str(text).removesuffix("\n...\n").strip()
