@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class CheckedDesign:
     """The verdict on one design; `place` is where its file should change, None where nothing is to
-    be complained of.
+    be complained of, and `variant` its name in the file.
 
     `repairs` are changes that would determine what is open, None where nothing is or none were
     asked for. `goals` tell how each goal that was asked for is met, and `missed` what fails of
@@ -40,6 +40,7 @@ class CheckedDesign:
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
     certificate: ScaleCertificate | None = None
+    variant: str | None = None
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -122,7 +123,7 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
     if wanted.nothing_weak and plan.verdict.weak:
         count = len(plan.verdict.weak)
         missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
-    design = CheckedDesign(plan, None, found, goals, missed, certificate)
+    design = CheckedDesign(plan, None, found, goals, missed, certificate, experiment.name)
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from argparse import Namespace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .common import add_file, percentage
+from .interruption import signatures, written
 
 if TYPE_CHECKING:
     from ..checking.check_files import CheckedDesign
@@ -60,6 +62,22 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         ),
     )
     parser.add_argument(
+        "--fix",
+        action="store_true",
+        help=(
+            "write the first change that --suggest finds into the file of a design that leaves"
+            " something undetermined, and check the file again; the rest of the file stays as it is"
+        ),
+    )
+    parser.add_argument(
+        "--diff",
+        action="store_true",
+        help=(
+            "print what --fix would change as a unified diff, and write nothing; the exit status is"
+            " 1 if there is anything"
+        ),
+    )
+    parser.add_argument(
         "--goal",
         action="append",
         default=[],
@@ -107,16 +125,31 @@ def run(options: Namespace) -> int:
     if options.share is not None and "lengths" not in options.goal:
         print("ballplate check: --share goes with --goal lengths; add it", file=sys.stderr)
         return WRONG_USAGE
-    files = []
-    wanted = Wanted(goals, options.fail_weak, options.suggest, not options.no_modules)
-    for checked in check_files(matching_files(options.files), options.variant, wanted):
+    if options.diff and options.format != "text":
+        text = f"--diff does not go with --format {options.format}; leave one out"
+        print(f"ballplate check: {text}", file=sys.stderr)
+        return WRONG_USAGE
+    files, statuses = [], [AS_EXPECTED]
+    is_repairing = options.fix or options.diff
+    wanted = Wanted(
+        goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
+    )
+    paths = matching_files(options.files)
+    if options.fix and not options.diff:
+        options.interruption.kept = partial(written, signatures(paths))
+    for checked in check_files(paths, options.variant, wanted):
+        if is_repairing:
+            from .mending import with_repairs
+
+            checked, status = with_repairs(checked, wanted, options)
+            statuses.append(status)
         files.append(checked)
         for doubt in checked.doubts:
             print(f"warning: {doubt}", file=sys.stderr)
         if options.format == "github":
             for line in annotation_lines(checked, workspace):
                 print(line, flush=True)
-        elif options.format == "text":
+        elif options.format == "text" and not options.diff:
             for design in checked.designs:
                 print_lines([*design.plan.lines(), *advice_lines(design)])
         if options.format in ("text", "json"):
@@ -125,10 +158,12 @@ def run(options: Namespace) -> int:
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([one.plan.to_dict() | _asked(one, options.suggest) for one in designs])
+        print_json([one.plan.to_dict() | _asked(one, wanted.repairs) for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
-    return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED
+    if not all(checked.as_expected for checked in files):
+        statuses.append(NOT_AS_EXPECTED)
+    return max(statuses)
 
 
 def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:

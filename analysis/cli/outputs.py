@@ -170,6 +170,18 @@ def check_outputs(options: Namespace) -> None:
         raise ExperimentError(messages)
 
 
+def check_overwritten(path: Path) -> None:
+    """Refuse a file that cannot be put in the place of the one that is there.
+
+    :raises ExperimentError: it cannot be written.
+    """
+    from ballplate.simulator.inputs.messages import ExperimentError
+
+    reasons = _reasons_against(Output("files", "--fix", path, None, False), force=True)
+    if reasons:
+        raise ExperimentError(reasons)
+
+
 def _refuse_screen(outputs: list[Output]) -> None:
     for one in outputs:
         if str(one.path) == "-":

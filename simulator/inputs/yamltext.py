@@ -115,7 +115,9 @@ def changed_data(data: Any, change: TextChange) -> Any:
 
 def _one_changed(data: Any, rest: Steps, change: TextChange) -> Any:
     if rest:
-        return changed_data({} if data is None else data, TextChange(rest, change.value, change.kind))
+        return changed_data(
+            {} if data is None else data, TextChange(rest, change.value, change.kind)
+        )
     value = _as_read(change.value)
     return (*(data or ()), value) if change.kind == "append" else value
 
@@ -308,9 +310,7 @@ def _without(text: _Text, above: _Span, span: _Span, change: TextChange) -> str:
     return whole[:start] + whole[end:]
 
 
-def _keep_what_is_told(
-    text: _Text, span: _Span, start: int, end: int, change: TextChange
-) -> None:
+def _keep_what_is_told(text: _Text, span: _Span, start: int, end: int, change: TextChange) -> None:
     """Refuse to take away comments, anchors and aliases.
 
     :raises ExperimentError: there are some between the indices.

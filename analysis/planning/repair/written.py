@@ -21,8 +21,8 @@ from ballplate.simulator.geometry.positions import (
     QUARTER_TURNS,
     ball_coordinates,
 )
-from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.inputs.messages import Step, format_path
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.machines.protocol import Array
 
