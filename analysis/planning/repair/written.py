@@ -86,7 +86,7 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
 
 
 def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
-    if before is after:
+    if before == after:
         return []
     old, new = before.model_dump(), after.model_dump()
     return [Edit((*steps, key), _plain(value)) for key, value in new.items() if value != old[key]]
