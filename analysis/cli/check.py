@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from .common import add_file, percentage
 from .interruption import signatures, written
+from .outputs import UsageError
 
 if TYPE_CHECKING:
-    from ..checking.check_files import CheckedDesign
+    from ..checking.check_files import CheckedDesign, CheckedFile
+    from ..requirements.goals import Goal
 
 FORMATS = ("text", "github", "junit", "json")
-AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
+AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -109,34 +111,20 @@ def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
     from ..checking.check_files import Wanted, check_files
     from ..checking.file_patterns import matching_files
-    from ..checking.github import advice_lines, annotation_lines
     from ..checking.junit import junit_report
-    from ..requirements.goals import GoalError, parse_goal
-    from .common import print_json, print_lines
-    from .excerpts import print_errors
+    from .common import print_json
 
-    workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
-    try:
-        with_share = {"lengths": options.share}
-        goals = tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
-    except GoalError as error:
-        print(f"ballplate check: {error}", file=sys.stderr)
-        return WRONG_USAGE
-    if options.share is not None and "lengths" not in options.goal:
-        print("ballplate check: --share goes with --goal lengths; add it", file=sys.stderr)
-        return WRONG_USAGE
-    if options.diff and options.format != "text":
-        text = f"--diff does not go with --format {options.format}; leave one out"
-        print(f"ballplate check: {text}", file=sys.stderr)
-        return WRONG_USAGE
-    files, statuses = [], [AS_EXPECTED]
+    goals = _goals(options)
     is_repairing = options.fix or options.diff
+    if options.diff and options.format != "text":
+        raise UsageError(f"--diff does not go with --format {options.format}; leave one out")
     wanted = Wanted(
         goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
     )
     paths = matching_files(options.files)
     if options.fix and not options.diff:
         options.interruption.kept = partial(written, signatures(paths))
+    files, statuses = [], [AS_EXPECTED]
     for checked in check_files(paths, options.variant, wanted):
         if is_repairing:
             from .mending import with_repairs
@@ -144,16 +132,7 @@ def run(options: Namespace) -> int:
             checked, status = with_repairs(checked, wanted, options)
             statuses.append(status)
         files.append(checked)
-        for doubt in checked.doubts:
-            print(f"warning: {doubt}", file=sys.stderr)
-        if options.format == "github":
-            for line in annotation_lines(checked, workspace):
-                print(line, flush=True)
-        elif options.format == "text" and not options.diff:
-            for design in checked.designs:
-                print_lines([*design.plan.lines(), *advice_lines(design)])
-        if options.format in ("text", "json"):
-            print_errors(checked.messages, options)
+        _print(checked, options)
     if options.format == "junit":
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
@@ -164,6 +143,36 @@ def run(options: Namespace) -> int:
     if not all(checked.as_expected for checked in files):
         statuses.append(NOT_AS_EXPECTED)
     return max(statuses)
+
+
+def _goals(options: Namespace) -> tuple[Goal, ...]:
+    from ..requirements.goals import GoalError, parse_goal
+
+    if options.share is not None and "lengths" not in options.goal:
+        raise UsageError("--share goes with --goal lengths; add it")
+    with_share = {"lengths": options.share}
+    try:
+        return tuple(parse_goal(text, with_share.get(text)) for text in options.goal)
+    except GoalError as error:
+        raise UsageError(str(error)) from None
+
+
+def _print(checked: CheckedFile, options: Namespace) -> None:
+    from ..checking.github import advice_lines, annotation_lines
+    from .common import print_lines
+    from .excerpts import print_errors
+
+    for doubt in checked.doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
+    if options.format == "github":
+        workspace = os.environ.get("GITHUB_WORKSPACE")
+        for line in annotation_lines(checked, Path(workspace) if workspace else None):
+            print(line, flush=True)
+    elif options.format == "text" and not options.diff:
+        for design in checked.designs:
+            print_lines([*design.plan.lines(), *advice_lines(design)])
+    if options.format in ("text", "json"):
+        print_errors(checked.messages, options)
 
 
 def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -157,7 +157,7 @@ def _dumped(value: Any, flow_style: bool = False) -> str:
 
 
 def _spans(text: str, file: str) -> _Text:
-    events = yaml.parse(text, Loader=LOADER)
+    events: Iterator[Any] = iter(yaml.parse(text, Loader=LOADER))
     scalars: list[tuple[int, int]] = []
     aliases: set[str] = set()
 
@@ -165,7 +165,7 @@ def _spans(text: str, file: str) -> _Text:
         start, end = event.start_mark.index, event.end_mark.index
         mark = Mark(file, event.start_mark.line + 1, event.start_mark.column + 1)
         if isinstance(event, yaml.AliasEvent):
-            aliases.add(event.anchor)
+            aliases.add(str(event.anchor))
             return _Span(start, end, "alias", mark)
         if isinstance(event, yaml.ScalarEvent):
             # A block's end is where something else begins.
