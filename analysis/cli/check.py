@@ -24,19 +24,19 @@ AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "check",
-        help="judge whether designs determine all their parameters",
+        help="check whether designs determine all their parameters",
         description=(
-            "Judge the rank of each design, and tell which share of lengths is within its target"
-            " and what carries its scale. The exit status is 0 if every deficiency is the one that"
-            " the file expects (none, where it says nothing), every --goal is met and, with"
-            " --fail-weak, nothing is weakly determined, otherwise 1; it is 3 if a file cannot be"
-            " used, and the others are then checked nevertheless."
+            "Determine the rank of each design, the share of lengths within its target, and"
+            " what carries its scale. The exit status is 0 if every rank deficiency is the one"
+            " that the file expects (by default none), every --goal is met and, with --fail-"
+            "weak, nothing is weakly determined; otherwise it is 1. It is 3 if a file cannot be"
+            " used; the other files are still checked."
         ),
     )
     add_file(parser, several=True)
     parser.epilog = (
-        "FILE may be a pattern such as designs/**/*.yaml, in which ** stands for any folders; files"
-        " in folders named sweeps or machines are then left out."
+        "FILE may be a pattern such as designs/**/*.yaml, where ** matches any number of"
+        " folders; files in folders named sweeps or machines are then left out."
     )
     parser.add_argument(
         "--format",
@@ -59,7 +59,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--suggest",
         action="store_true",
         help=(
-            "tell the cheapest changes after which nothing is undetermined or weakly determined,"
+            "suggest the cheapest changes that leave nothing undetermined or weakly determined,"
             " each verified"
         ),
     )
@@ -67,16 +67,16 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "--fix",
         action="store_true",
         help=(
-            "write the first change that --suggest finds into the file of a design that leaves"
-            " something undetermined, and check the file again; the rest of the file stays as it is"
+            "write the first repair that --suggest finds for a deficient design into its file,"
+            " keep the rest of the file as it is, and check the file again"
         ),
     )
     parser.add_argument(
         "--diff",
         action="store_true",
         help=(
-            "print what --fix would change as a unified diff, and write nothing; the exit status is"
-            " 1 if there is anything"
+            "print what --fix would change as a unified diff, and write nothing; the exit"
+            " status is 1 if there is a change"
         ),
     )
     parser.add_argument(
@@ -84,25 +84,26 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="append",
         default=[],
         help=(
-            "what a design must reach, too, as in ballplate reach: lengths (U6 within"
-            ' target_accuracy), tasks, or a quantity such as "U6 average 0.5 um"; may be repeated'
+            "goal that a design must also meet, as for ballplate reach: lengths (U6 within "
+            'target_accuracy), tasks, or a quantity such as "U6 average 0.5 um"; may be '
+            "repeated"
         ),
     )
     parser.add_argument(
         "--share",
         metavar="95%",
         type=percentage,
-        help="of the lengths that are to be within, with --goal lengths",
+        help="share of the lengths that must be within the target, with --goal lengths",
     )
     parser.add_argument(
         "--fail-weak",
         action="store_true",
-        help="let a design with a weakly determined direction fail, too",
+        help="also fail a design with a weakly determined direction",
     )
     parser.add_argument(
         "--no-modules",
         action="store_true",
-        help="refuse files with an error model in Python, which is code that loading them runs",
+        help="refuse files with an error model in Python, because loading them runs its code",
     )
     parser.set_defaults(run=run)
 

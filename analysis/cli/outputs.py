@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import Message
 
 EXISTS = "exists already; name a new file, or overwrite it with --force"
-FORCE = "overwrite files that there are already"
+FORCE = "overwrite existing files"
 
 # Options that name files which name others, as experiment and machine files do.
 NAMING = ("files", "file", "earlier")
