@@ -171,8 +171,8 @@ def _replaced(
         below = _replaced(node.items[i], rest, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
     raise ValueError(
-        f"{format_path(above) or 'the experiment'} is {describe(node.value)} and has nothing below it; replace it as a"
-        " whole"
+        f"{format_path(above) or "the experiment"} is {describe(node.value)} and has nothing below"
+        " it; replace it as a whole"
     )
 
 
