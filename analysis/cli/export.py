@@ -14,7 +14,7 @@ from .outputs import PARQUET, add_force, add_output, write_outputs
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ..sweeps.store import Results
+    from ..sweeps.store import StoredResults
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -67,7 +67,7 @@ def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
         )
 
 
-def warn_of_damage(path: Path, found: Results, count: int) -> bool:
+def warn_of_damage(path: Path, found: StoredResults, count: int) -> bool:
     """Tell what of a store could not be read; whether there is anything."""
     from ..sweeps.store import unread
     from ..sweeps.store_file import GO_ON

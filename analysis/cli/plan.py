@@ -152,6 +152,7 @@ def _sheet(text: str) -> Path:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
+    from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.experiment.load import load
     from ballplate.simulator.inputs.messages import ExperimentError, Message
 
@@ -160,7 +161,6 @@ def run(options: Namespace) -> int:
     from ..planning.done import done_candidates
     from ..planning.earlier import earlier_choice
     from ..planning.offer import offer
-    from ..running.processes import processors
     from .excerpts import print_errors
     from .progress import progress
 

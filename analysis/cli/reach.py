@@ -72,9 +72,9 @@ def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
 
-    from ..requirements.goals import GoalError, parse_goal
-    from ..requirements.search import reach
-    from ..requirements.unknowns import NotVariableError
+    from ..planning.requirements.goals import GoalError, parse_goal
+    from ..planning.requirements.root_search import reach
+    from ..planning.requirements.unknowns import NotVariableError
     from .progress import progress
 
     try:

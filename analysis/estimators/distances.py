@@ -8,15 +8,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
+from ballplate.simulator.estimation.alternative_estimators import (
+    RivalName,
+    RivalSolution,
+    rival_estimate,
+)
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
 from ballplate.simulator.estimation.length_equations import (
     LengthEstimator,
     NotAMetricError,
     length_estimate,
 )
-from ballplate.simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -30,9 +35,8 @@ from ballplate.simulator.readings.generate import (
 )
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
+from ..presentation.formatting import SHOWN, aligned, number
 from ..results.estimates import ParameterEstimate
-from ..results.formatting import SHOWN, aligned, number
-from ..running.steps import Report, unreported
 from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -46,7 +50,7 @@ MOST_POINTS = 100_000
 
 # Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth
 # of that.
-ENOUGH = GaussNewtonSettings(smallest_step=1e-8)
+COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ class RivalFit:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class EstimatorComparison:
     """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic
     data sets.
 
@@ -247,7 +251,7 @@ def compare_estimators(
     seed: int | None = None,
     points: int = 200,
     report: Report = unreported,
-) -> Comparison:
+) -> EstimatorComparison:
     """Compare a rival with the full estimator on readings of the file's true machine.
 
     Each data set has noise, a certificate and `points` random pairs of points in the volume of its
@@ -289,7 +293,7 @@ def compare_estimators(
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
         report(f"data sets of {experiment.label}", trial + 1, trials)
-    return Comparison(
+    return EstimatorComparison(
         experiment.label,
         experiment.title,
         estimator,
@@ -318,7 +322,7 @@ def _both_estimates(
     """
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
-    full = estimate(observed.design, observed.x, ENOUGH)
+    full = estimate(observed.design, observed.x, COMPARISON_TOLERANCE)
     if estimator == "length-equations" or estimator == "sphere-then-metric":
         try:
             solved = length_estimate(observed.design, observed.x, estimator)
@@ -330,7 +334,13 @@ def _both_estimates(
             else None
         )
     rival = rival_estimate(
-        observed.design, observed.x, chosen, estimator, across_probes, ENOUGH, start=full.state.a
+        observed.design,
+        observed.x,
+        chosen,
+        estimator,
+        across_probes,
+        COMPARISON_TOLERANCE,
+        start=full.state.a,
     )
     if full.status != "converged" or rival.status != "converged":
         return None
@@ -406,7 +416,7 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
     }
 
 
-def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
+def comparison_lines(found: EstimatorComparison, published: dict[str, float | None]) -> list[str]:
     """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum")
     stand in them.
     """
@@ -453,7 +463,9 @@ def comparison_lines(found: Comparison, published: dict[str, float | None]) -> l
     return lines + aligned(rows, [False] + [True] * (len(rows[0]) - 1))
 
 
-def comparison_data(found: Comparison, published: dict[str, float | None]) -> dict[str, Any]:
+def comparison_data(
+    found: EstimatorComparison, published: dict[str, float | None]
+) -> dict[str, Any]:
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
         "experiment": found.label,

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 
-from ..results.formatting import SHOWN, number
+from ..presentation.formatting import SHOWN, number
+from .cause_search import MOST
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
-from .search import MOST
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
 
 # A direction of a cause is told from so many standard uncertainties on.

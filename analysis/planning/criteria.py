@@ -15,7 +15,7 @@ from itertools import chain
 from typing import Protocol
 
 import numpy as np
-from ballplate.simulator.estimation.functions import Balls, Distances, Points, point_rows
+from ballplate.simulator.estimation.functions import Balls, Distances, MeasuredPoints, point_rows
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.messages import ExperimentError, Message
@@ -512,7 +512,7 @@ def _of_balls(information: Information, places: Balls) -> tuple[Array, Array]:
     return STEP * displacement.reshape(n, d, -1), STEP * (amounts @ open_).reshape(n, d, -1)
 
 
-def _of_points(information: Information, places: Points) -> tuple[Array, Array]:
+def _of_points(information: Information, places: MeasuredPoints) -> tuple[Array, Array]:
     """Displacements of corrected points (n, d, z), and those that the pool leaves open, in
     metres.
     """

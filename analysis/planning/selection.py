@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
 
-from ..report.campaign import draw_campaign
-from ..results.formatting import aligned, finite, number
-from ..results.result import Result
+from ..presentation.formatting import aligned, finite, number
+from ..presentation.result import Result
+from .campaign_picture import draw_campaign
 from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Budget, Spent
 from .criteria import DESCRIPTIONS

@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines
-from ballplate.simulator.numerics.rounding import above, comparable, printable
 
 from .canonical import elementary_mixture, principal_directions
 from .missing_bars import reasons

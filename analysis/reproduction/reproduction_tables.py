@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..results.formatting import aligned, number
+from ..presentation.formatting import aligned, number
 from .compare import (
     ComparedColumn,
     ComparedErratum,
+    ComparedFigure,
     ComparedProgress,
     ComparedRemark,
-    Figure,
     PlacedFigure,
     ProgressLine,
     Reproduction,
@@ -232,7 +232,7 @@ def _figures(columns: Sequence[ComparedColumn], with_assumptions: bool) -> Grid:
     return _grid(head + (["rests on"] if with_assumptions else []), rows, 4)
 
 
-def _note(figure: Figure) -> str:
+def _note(figure: ComparedFigure) -> str:
     words = [] if figure.agrees else ["DIFFERS"]
     if figure.exception is not None:
         words.append(f"{'open' if figure.exception.open else 'see'} {figure.exception.key}")
@@ -381,7 +381,7 @@ def _told(section: Section) -> Grid:
     return _grid(("case", "statistic", *SYMBOLS), rows, 2)
 
 
-def _excepted(found: Reproduction) -> list[tuple[Reservation, list[Figure]]]:
+def _excepted(found: Reproduction) -> list[tuple[Reservation, list[ComparedFigure]]]:
     """Exceptions that figures of the sections fall under, open ones first, each with its
     figures.
     """
@@ -607,7 +607,7 @@ def _section_data(section: Section) -> dict[str, Any]:
     }
 
 
-def _figure_data(one: ComparedColumn, figure: Figure) -> dict[str, Any]:
+def _figure_data(one: ComparedColumn, figure: ComparedFigure) -> dict[str, Any]:
     return {
         "table": one.column.table,
         "quantity": figure.quantity,

@@ -18,7 +18,7 @@ from ..results.fit import Fit
 from ..results.prediction import Prediction
 from ..results.study import fit, predict
 from ..uncertainty.summaries import Quantity
-from .quantities import tabulated_quantities
+from .published_quantities import tabulated_quantities
 
 
 @dataclass(frozen=True)

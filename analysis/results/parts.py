@@ -6,14 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ballplate.simulator.numerics.rounding import printable
+from ballplate.simulator.computing.rounding import printable
 
-from ..rank.verdict import GREAT, Verdict
-from ..uncertainty.scale import Scale
-from ..uncertainty.summaries import Quantity
-from ..uncertainty.tasks import TaskUncertainty, is_determined
-from .adjustments import ARCSECOND, Adjustment
-from .formatting import (
+from ..presentation.formatting import (
     aligned,
     finite,
     number,
@@ -22,6 +17,11 @@ from .formatting import (
     to_uncertainty,
     uncertainty_words,
 )
+from ..rank.verdict import GREAT, Verdict
+from ..uncertainty.scale import Scale
+from ..uncertainty.summaries import Quantity
+from ..uncertainty.tasks import TaskUncertainty, is_determined
+from .adjustments import ARCSECOND, Adjustment
 from .plates import PlateCoordinates
 
 # Balls of a plate that a table has room for.

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.numerics.threads import single_threaded
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
+from ..gross_errors.cause_search import diagnosis
 from ..gross_errors.leftover import too_many_entries
-from ..gross_errors.search import diagnosis
 from ..gross_errors.suspects import Diagnosis
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Results, Store, chosen_sweep, definition_of, results
+from .store import Store, StoredResults, chosen_sweep, definition_of, results
 
 if TYPE_CHECKING:
     import pandas
@@ -33,7 +33,7 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
     return frame_of(results(store, number, len(defined["cells"])), defined)
 
 
-def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame:
+def frame_of(found: StoredResults, defined: dict[str, Any] | None) -> pandas.DataFrame:
     """The table of `frame`; without a definition it has no columns for the axes."""
     import pandas
 

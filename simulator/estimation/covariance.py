@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design
 from ..machines.protocol import Array
-from ..numerics.threads import scipy_linalg, single_threaded
 from .elimination import Factor
 from .graded import triangle
 from .parameters import SharedLayout

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, State
 from ..machines.protocol import Array, Integers
-from ..numerics.threads import scipy_linalg, single_threaded
 from .graded import Collected, without_balls
 from .observations import (
     BallRows,

@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, State, probe_offsets, unknown_lengths
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
-from ..numerics.threads import scipy_linalg, single_threaded
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle

@@ -30,11 +30,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..computing.threads import single_threaded
 from ..design.arrays import Design
 from ..design.joint_lengths import equation_root
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
-from ..numerics.threads import single_threaded
 from .covariance import EXACT, MICROMETRE
 from .initial import initial_state
 

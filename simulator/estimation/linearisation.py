@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.threads import single_threaded
 from ..design.arrays import Design, State, nominal_state
 from ..machines.protocol import Array
-from ..numerics.threads import single_threaded
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, blank, spectrum
 from .elimination import Factor, eliminate
 from .parameters import SharedLayout, shared_layout

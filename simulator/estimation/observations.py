@@ -15,13 +15,12 @@ from ..design.arrays import (
     Design,
     State,
     locations,
-    pose_size,
     probe_offsets,
     reading_uncertainties,
     unknown_lengths,
 )
 from ..design.observations import Readings
-from ..geometry.motions import vector_from_rotation, vector_rate
+from ..geometry.motions import pose_size, vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel, Integers
 from .parameters import SharedLayout
 

@@ -17,7 +17,7 @@ from ..machines.arrangement import AXES
 from ..machines.curves import Points
 from ..machines.description import Three
 from ..machines.straightness import Criterion
-from .curves import BANDWIDTH, read_numbered_curves
+from .curve_files import BANDWIDTH, read_numbered_curves
 
 COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
 KEYS = ("line", "straightness", "straightedge", "probe")

@@ -43,7 +43,7 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .references import References, Tally, frozen
+from .references import ReadingCount, References, frozen
 from .structure import Sections
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
@@ -109,7 +109,7 @@ def resolve_candidates(
         result.complete = node is None
         return result
     # The candidates have a limit of their own.
-    references = replace(references, tally=Tally())
+    references = replace(references, tally=ReadingCount())
     # Candidates may be what a key that is misspelt or no list was meant to be.
     is_known = isinstance(node, Mapping) and set(node.items) <= set(PoolSettings.model_fields)
     is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from .fit import SplineFit
 from .space import Array
+from .spline_fit import SplineFit
 
 Powers = Literal["local", "global"]
 """Of x less the start of the piece, or of x itself."""

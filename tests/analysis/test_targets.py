@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.length_map.length_map import Settings, length_map
+from ballplate.error_maps.length_map import LengthMapSettings, length_map
+from ballplate.presentation.formatting import percent
 from ballplate.rank.verdict import Verdict, weak_limit
-from ballplate.results.formatting import percent
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.layout import lay_out
@@ -57,7 +57,7 @@ def verdicts(experiment: Experiment) -> list[object]:
     """Everything that compares with the target."""
     found = predict(experiment)
     verdict: Verdict = check(experiment).verdict
-    mapped = length_map(experiment, Settings((3, 2, 3), "down", experiment.target_accuracy.stated,  # type: ignore[union-attr]
+    mapped = length_map(experiment, LengthMapSettings((3, 2, 3), "down", experiment.target_accuracy.stated,  # type: ignore[union-attr]
                                              2.0, False, experiment.coverage_factor))  # fmt: skip
     return [
         found.quantities["U6"].within_target,
@@ -207,7 +207,8 @@ def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
         assert main(["lengths", file, "--grid", "2"]) == 0
         mapped = length_map(
-            load(file)[0], Settings((2, 2, 2), "down", load(file)[0].target_accuracy.stated)
+            load(file)[0],
+            LengthMapSettings((2, 2, 2), "down", load(file)[0].target_accuracy.stated),
         )  # type: ignore[union-attr]
         of_corners = factor * float(mapped.whole.maximum_ratio[0]) > 1
         assert main(["lengths", file, "--grid", "2", "--fail"]) == int(of_corners)

@@ -15,7 +15,7 @@ from ballplate.estimators.distances import (
     count_terms,
 )
 from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.rivals import RivalName
+from ballplate.simulator.estimation.alternative_estimators import RivalName
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError

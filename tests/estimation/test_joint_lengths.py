@@ -18,13 +18,13 @@ from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.design.observations import Lengths
+from ballplate.simulator.estimation.alternative_estimators import RivalName, rival_estimate
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
 from ballplate.simulator.estimation.length_equations import length_estimate
 from ballplate.simulator.estimation.observations import expected_readings
 from ballplate.simulator.estimation.parameters import shared_layout
-from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector

@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
+from ballplate.simulator.estimation.alternative_estimators import RivalName, rival_estimate
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model

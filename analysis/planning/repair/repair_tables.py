@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ...presentation.formatting import finite, number
 from ...rank.proposed_bars import listed
 from ...rank.verdict import Direction, Verdict, length
-from ...results.formatting import finite, number
 from .changes import KINDS
 
 if TYPE_CHECKING:
+    from .repair_search import Repair, Repairs
     from .scale import ScaleCertificate
-    from .search import Repair, Repairs
 
 # Names of errors that a line has room for.
 MOST_NAMES = 8
