@@ -126,7 +126,7 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (
-        ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_accuracy",)
+        ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_uncertainty",)
     )
     if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")

@@ -38,9 +38,9 @@ Estimator = Callable[[Namespace, "Experiment", "ObservedReadings"], EstimatorOut
 def _of_distances(
     options: Namespace, experiment: Experiment, observed: ObservedReadings
 ) -> EstimatorOutcome:
-    from ..estimators.distances import fit_rival, rival_fit_data, rival_fit_lines
+    from ..estimators.distances import alternative_fit_data, alternative_fit_lines, fit_alternative
 
-    found = fit_rival(
+    found = fit_alternative(
         experiment,
         observed,
         options.estimator,
@@ -53,7 +53,7 @@ def _of_distances(
         complaint = f"the estimate has {found.solution.status}; see the record of iterations"
     elif found.solution.deficiency:
         complaint = f"rank deficiency {found.solution.deficiency}: what is undetermined is left out"
-    return EstimatorOutcome(rival_fit_lines(found), rival_fit_data(found), complaint)
+    return EstimatorOutcome(alternative_fit_lines(found), alternative_fit_data(found), complaint)
 
 
 def _reversal(

@@ -41,7 +41,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--grid",
@@ -151,13 +151,15 @@ def _settings(experiment: Experiment, options: Namespace) -> LengthMapSettings |
     from ..uncertainty.tasks import expansion
 
     try:
-        stated = None if experiment.target_accuracy is None else experiment.target_accuracy.stated
+        stated = (
+            None if experiment.target_uncertainty is None else experiment.target_uncertainty.stated
+        )
         target = stated if options.target is None else parse_length_function(options.target)
     except QuantityError as error:
         return f"--target: {error}"
     if target is None:
         return (
-            'the file states no target_accuracy; add it, or give --target, such as "0.5 um +'
+            'the file states no target_uncertainty; add it, or give --target, such as "0.5 um +'
             ' L/1000000"'
         )
     d = experiment.dimension

@@ -1,5 +1,5 @@
-"""The rival estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as
-in section 6.2.7.
+"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a
+comparison as in section 6.2.7.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.alternative_estimators import (
-    RivalName,
-    RivalSolution,
-    rival_estimate,
+    AlternativeName,
+    AlternativeSolution,
+    alternative_estimate,
 )
 from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
 from ballplate.simulator.estimation.length_equations import (
@@ -41,8 +41,8 @@ from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
-# Derivatives, terms times parameters, of a rival estimator, which takes some 70 bytes for each, and
-# more for few parameters.
+# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for
+# each, and more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
 # Pairs of points of a comparison.
@@ -54,14 +54,14 @@ COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 
 @dataclass(frozen=True)
-class RivalFit:
-    """Estimates of the machine's parameters by a rival estimator from `pairs` pairs of balls,
-    without uncertainties.
+class AlternativeFit:
+    """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of
+    balls, without uncertainties.
     """
 
     label: str
     title: str
-    solution: RivalSolution
+    solution: AlternativeSolution
     pairs: int
     lengths: int
     estimates: tuple[ParameterEstimate, ...]
@@ -69,8 +69,8 @@ class RivalFit:
 
 @dataclass(frozen=True)
 class EstimatorComparison:
-    """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic
-    data sets.
+    """How far an alternative estimator's corrected distances are from the full estimator's, over
+    `trials` synthetic data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
@@ -79,7 +79,7 @@ class EstimatorComparison:
 
     label: str
     title: str
-    estimator: RivalName | LengthEstimator
+    estimator: AlternativeName | LengthEstimator
     trials: int
     pairs: int
     lengths: int
@@ -113,12 +113,12 @@ def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
 def count_terms(
     experiment: Experiment,
     design: Design,
-    estimator: RivalName,
+    estimator: AlternativeName,
     name: str | None = None,
     across_probes: bool = False,
 ) -> int:
-    """Number of terms of a rival estimator, but for certificates and priors, if every position has
-    all the balls.
+    """Number of terms of an alternative estimator, but for certificates and priors, if every
+    position has all the balls.
     """
     count = 0
     artefact_of = design.ball_artefact[design.readings.ball]
@@ -141,7 +141,7 @@ def count_terms(
 def _refuse_many_terms(
     experiment: Experiment,
     design: Design,
-    estimator: RivalName,
+    estimator: AlternativeName,
     name: str | None,
     across_probes: bool,
 ) -> None:
@@ -202,14 +202,14 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
 
 
-def fit_rival(
+def fit_alternative(
     experiment: Experiment,
     observed: ObservedReadings,
-    estimator: RivalName,
+    estimator: AlternativeName,
     pair_set: str | None = None,
     across_probes: bool = False,
     monomials: bool = False,
-) -> RivalFit:
+) -> AlternativeFit:
     """Estimate machine errors from the distances of readings.
 
     Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of
@@ -219,7 +219,7 @@ def fit_rival(
     _refuse_unknown_lengths(experiment, design)
     _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
     chosen = ball_pairs(experiment, pair_set)
-    solution = rival_estimate(design, observed.x, chosen, estimator, across_probes)
+    solution = alternative_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
     names, units, matrix = (
         [p.name for p in parameters],
@@ -237,7 +237,7 @@ def fit_rival(
         ParameterEstimate(name, float(value), np.nan, unit)
         for name, value, unit in zip(names, values, units, strict=True)
     )
-    return RivalFit(
+    return AlternativeFit(
         experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates
     )
 
@@ -245,14 +245,14 @@ def fit_rival(
 def compare_estimators(
     experiment: Experiment,
     trials: int,
-    estimator: RivalName | LengthEstimator = "distances",
+    estimator: AlternativeName | LengthEstimator = "distances",
     pair_set: str | None = None,
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
     report: Report = unreported,
 ) -> EstimatorComparison:
-    """Compare a rival with the full estimator on readings of the file's true machine.
+    """Compare an alternative with the full estimator on readings of the file's true machine.
 
     Each data set has noise, a certificate and `points` random pairs of points in the volume of its
     own, all drawn from `seed` (default: the file's) and its number, so that more data sets only add
@@ -313,7 +313,7 @@ def _both_estimates(
     on_truth: Design,
     truth: State,
     chosen: Integers,
-    estimator: RivalName | LengthEstimator,
+    estimator: AlternativeName | LengthEstimator,
     across_probes: bool,
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
@@ -333,7 +333,7 @@ def _both_estimates(
             if full.status == "converged" and solved.converged
             else None
         )
-    rival = rival_estimate(
+    alternative = alternative_estimate(
         observed.design,
         observed.x,
         chosen,
@@ -342,9 +342,9 @@ def _both_estimates(
         COMPARISON_TOLERANCE,
         start=full.state.a,
     )
-    if full.status != "converged" or rival.status != "converged":
+    if full.status != "converged" or alternative.status != "converged":
         return None
-    return full.state.a, rival.a
+    return full.state.a, alternative.a
 
 
 def _distances(design: Design, a: Array, ends: Array) -> Array:
@@ -359,8 +359,8 @@ def share_below(values: Array, published: float) -> float:
     return float((values < published).mean()) if len(values) else float("nan")
 
 
-def rival_fit_lines(fit: RivalFit) -> list[str]:
-    """A rival's fit as lines of text: iterations and the machine's parameters."""
+def alternative_fit_lines(fit: AlternativeFit) -> list[str]:
+    """An alternative estimator's fit as lines of text: iterations and the machine's parameters."""
     record = fit.solution.iterations
     rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
     used = _used(fit.pairs, fit.lengths)
@@ -395,8 +395,10 @@ def _used(pairs: int, lengths: int) -> str:
     return " and ".join([*words, *([f"{lengths} lengths of standards"] if lengths else [])])
 
 
-def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
-    """A rival's fit as plain data in metres and radians; what is undetermined is None."""
+def alternative_fit_data(fit: AlternativeFit) -> dict[str, Any]:
+    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
+    None.
+    """
     return {
         "experiment": fit.label,
         "title": fit.title,

@@ -11,9 +11,9 @@ from operator import add
 
 import numpy as np
 from ballplate.montecarlo.reference import (
-    NoReferenceError,
+    DivergedError,
+    RankDeficientError,
     Reference,
-    TooWildError,
     Truth,
     reference,
 )
@@ -135,9 +135,9 @@ def _shared(experiment: Experiment) -> Reference | str:
     design, truth = true_experiment(experiment)
     try:
         return reference(design, truth)
-    except NoReferenceError as error:
+    except RankDeficientError as error:
         return str(error)
-    except (NoReadingError, TooWildError) as error:
+    except (NoReadingError, DivergedError) as error:
         text = f"{error}; state smaller errors"
         raise ExperimentError([experiment.message(("true_machine",), text)]) from None
 

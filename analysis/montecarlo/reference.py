@@ -29,11 +29,11 @@ READINGS_AT_ONCE = 512
 FAITHFUL = 1e-8
 
 
-class NoReferenceError(ValueError):
+class RankDeficientError(ValueError):
     """The design is rank deficient, so that replicates have no estimate to be compared."""
 
 
-class TooWildError(ValueError):
+class DivergedError(ValueError):
     """The true machine's errors are so large that not even readings without noise can be fitted."""
 
 
@@ -130,7 +130,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     # As drawn, because a small machine error makes a direction that is open merely all but open.
     deficiency = linearise(observed).deficiency
     if deficiency:
-        raise NoReferenceError(f"the design is rank deficient by {deficiency}")
+        raise RankDeficientError(f"the design is rank deficient by {deficiency}")
     readings = observed.readings
     p = probe_offsets(observed, truth.state)[readings.probe]
     turned = np.einsum(
@@ -146,7 +146,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     )
     solution = gauss_newton(observed, exact, initial_state(observed, exact))
     if solution.status != "converged":
-        raise TooWildError(f"the estimate from its readings without noise has {solution.status}")
+        raise DivergedError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings
     p = probe_offsets(observed, start)[readings.probe]
     is_expanded = _is_faithful(

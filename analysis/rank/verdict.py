@@ -31,8 +31,8 @@ ROUNDING = 1e-9
 GREAT = 1e9
 
 # A direction is weak when one standard deviation along it moves corrected points, relative to one
-# another, by more than the target accuracy at half the volume's diagonal or, without a target, this
-# many times the repeatability.
+# another, by more than the target uncertainty at half the volume's diagonal or, without a target,
+# this many times the repeatability.
 WEAK = 10.0
 
 # Curves that no polynomial of this degree describes are called irregular.

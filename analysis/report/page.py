@@ -273,7 +273,7 @@ def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Dra
     if found.within is not None:
         words += (
             f" Of the distances between all points of this grid {percent(found.within)} are known"
-            " to within the target accuracy, by the"
+            " to within the target uncertainty, by the"
             f" {uncertainty_words(experiment.coverage_factor)}."
         )
     figures = []

@@ -61,7 +61,7 @@ def uncertainty_table(quantities: dict[str, Quantity]) -> list[str]:
         if quantity.within_target is not None:
             by = uncertainty_words(quantity.coverage_factor)
             lines.append(
-                f"within the target accuracy ({by}): {percent(quantity.within_target)} of"
+                f"within the target uncertainty ({by}): {percent(quantity.within_target)} of"
                 f" {quantity.symbol}"
             )
     return lines
@@ -164,14 +164,14 @@ def _lengths_words(lengths: Quantity) -> str:
 
 
 def target_lines(lengths: Quantity | None) -> list[str]:
-    """The share of lengths within the target accuracy, with U6, as a line of text; none where
+    """The share of lengths within the target uncertainty, with U6, as a line of text; none where
     nothing is compared.
     """
     if lengths is None or lengths.within_target is None:
         return []
     by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
     return [
-        f"within the target accuracy ({by}): {share} of {lengths.count} lengths;"
+        f"within the target uncertainty ({by}): {share} of {lengths.count} lengths;"
         f" {_lengths_words(lengths)}"
     ]
 

@@ -36,8 +36,8 @@ class ErrorMap:
     slices.
 
     A value is the root mean square over the co-ordinates, so that it compares with U4. `within` is
-    the share of the distances between points of the grid that are within the target accuracy, None
-    without one.
+    the share of the distances between points of the grid that are within the target uncertainty,
+    None without one.
     """
 
     x: Array
@@ -63,7 +63,7 @@ def error_map(experiment: Experiment) -> ErrorMap:
         levels = [(name, height) for (name, _), height in zip(LEVELS, heights, strict=True)]
         grid = np.stack(np.meshgrid(heights, y, x, indexing="ij")[::-1], axis=-1)
     design = replace(design, points=grid.reshape(-1, design.dimension))
-    target = experiment.target_accuracy
+    target = experiment.target_uncertainty
     limit = None if target is None else target.standard
     of_points, pairs = point_pairs(linearise(design), limit)
     values = np.sqrt((of_points**2).mean(axis=1)).reshape(grid.shape[:-1])

@@ -35,7 +35,7 @@ class Quantity:
     `count` of them there are, `undetermined` of which the observations leave open; the maximum and
     the average are NaN when nothing is left, and `largest` then is empty, otherwise it names where
     the maximum stands. `within_target` is the share of distances whose uncertainty,
-    `coverage_factor` times the standard one, is within the target accuracy, those undetermined
+    `coverage_factor` times the standard one, is within the target uncertainty, those undetermined
     counted as not; None where no target is compared with. `places` tell where in the volume the
     evaluation points are that `largest` names.
     """

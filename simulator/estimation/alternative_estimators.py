@@ -41,18 +41,18 @@ from .covariance import EXACT, MICROMETRE
 from .gauss_newton import GaussNewtonSettings, Iteration, Status
 from .observations import length_rows
 
-RivalName = Literal["distances", "cresto", "kruth"]
+AlternativeName = Literal["distances", "cresto", "kruth"]
 
 
 @dataclass(frozen=True)
-class RivalSolution:
+class AlternativeSolution:
     """Parameters a (n,) of the machine, the record of iterations, and undetermined directions of a
     (n, deficiency).
 
     `observations` counts the terms of the sum of squares.
     """
 
-    estimator: RivalName
+    estimator: AlternativeName
     a: Array
     iterations: tuple[Iteration, ...]
     status: Status
@@ -105,16 +105,16 @@ _Rows = Callable[[_Measured, Array, Array], tuple[Array, Array]]
 
 
 @single_threaded
-def rival_estimate(
+def alternative_estimate(
     design: Design,
     x: Array,
     pairs: Integers,
-    estimator: RivalName = "distances",
+    estimator: AlternativeName = "distances",
     across_probes: bool = False,
     settings: GaussNewtonSettings | None = None,
     start: Array | None = None,
-) -> RivalSolution:
-    """Minimise the objective of a rival estimator by Gauss-Newton, from `start` or a machine
+) -> AlternativeSolution:
+    """Minimise the objective of an alternative estimator by Gauss-Newton, from `start` or a machine
     without errors.
 
     `x` (readings, d) holds the scale readings, `pairs` (p, 2) ball indices; calibrated pairs are
@@ -153,7 +153,7 @@ def rival_estimate(
         if size < settings.smallest_step or (size > 0.5 * previous and size < 1e-9):
             status = "converged"
         previous = size
-    return RivalSolution(estimator, a, tuple(record), status, null, count)
+    return AlternativeSolution(estimator, a, tuple(record), status, null, count)
 
 
 def _points(design: Design, x: Array) -> _Points:
@@ -302,7 +302,7 @@ def _initial_position(measured: _Measured, length: Array, by_model: Array) -> tu
     )
 
 
-_ROWS: dict[RivalName, _Rows] = {
+_ROWS: dict[AlternativeName, _Rows] = {
     "distances": _free_distances,
     "cresto": _every_two_positions,
     "kruth": _initial_position,

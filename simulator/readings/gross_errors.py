@@ -81,7 +81,7 @@ class _Motions:
     agreeing: NDArray[np.bool_]
 
 
-def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
+def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     """Positions and readings that cannot be right, from scale readings x (readings, d).
 
     Readings of Bryan gauges pass: their directions need not be those of the drawing.
@@ -93,16 +93,16 @@ def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], lis
             readings=design.readings.select(compared),
             lengths=design.lengths.select(np.zeros(0, np.int64)),
         )
-        positions, found = _misreadings(of_others, x[compared]) if len(compared) else ([], [])
+        positions, found = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
         back = np.append(compared, -1)
         return positions, [
             replace(one, reading=int(back[one.reading]), partner=int(back[one.partner]))
             for one in found
         ]
-    return _misreadings(design, x)
+    return _gross_errors(design, x)
 
 
-def _misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
+def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
     seen = x + design.probes[readings.probe]
     pitch = _pitches(design)

@@ -21,7 +21,7 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, column_names, read_table
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .gross_error_messages import refuse_misreadings
+from .gross_error_messages import refuse_gross_errors
 
 AXES = ("x", "y", "z")
 
@@ -71,7 +71,7 @@ def read_readings(
     one that is not planned, once. Unless `every_ball` has to be read, some may be missing.
 
     :raises ExperimentError: a wrong table, names that the design does not know, or readings that
-        cannot be of the ball they name (`estimation.misreadings`); all of a kind at once.
+        cannot be of the ball they name (`readings.gross_errors`); all of a kind at once.
     """
     texts = ["position", "ball", "probe"]
     columns, d = column_names(path), design.dimension
@@ -109,7 +109,7 @@ def read_readings(
         )
     marks = tuple(row.mark for row in rows)
     observed = _combine_standards(design, readings, x, missing, unplanned, marks)
-    refuse_misreadings(observed.design, observed.x, observed.marks)
+    refuse_gross_errors(observed.design, observed.x, observed.marks)
     _refuse_repeated(rows, readings, design)
     return observed
 

@@ -247,10 +247,10 @@ def test_a_deficient_design_is_told_and_named(
 
 
 def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    experiment_of(tmp_path, TEXT.replace("target_accuracy: 0.5 um + L/1000000\n", ""))
+    experiment_of(tmp_path, TEXT.replace("target_uncertainty: 0.5 um + L/1000000\n", ""))
     file = str(tmp_path / "design.yaml")
     for options, told in (
-        ([], "the file states no target_accuracy"),
+        ([], "the file states no target_uncertainty"),
         (["--target", "3"], '--target: "3" has no unit'),
         (
             ["--target", "1 um", "--grid", "3,3"],

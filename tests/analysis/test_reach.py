@@ -247,9 +247,9 @@ def test_goals_that_are_none(text: str, message: str) -> None:
 
 
 def test_what_the_file_does_not_have(tmp_path: Path) -> None:
-    file = written(tmp_path, UNCALIBRATED.replace("target_accuracy: 0.5 um + L/1000000\n", ""))
+    file = written(tmp_path, UNCALIBRATED.replace("target_uncertainty: 0.5 um + L/1000000\n", ""))
     experiment = load(file)[0]
-    with pytest.raises(GoalError, match="states no target_accuracy"):
+    with pytest.raises(GoalError, match="states no target_uncertainty"):
         reach(experiment, Goal())
     with pytest.raises(GoalError, match="the file has no tasks"):
         reach(experiment, Goal("tasks"))

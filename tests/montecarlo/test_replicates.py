@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ballplate.montecarlo.expansion import Direct, Expansion
-from ballplate.montecarlo.reference import NoReferenceError, Reference, Truth, reference
+from ballplate.montecarlo.reference import RankDeficientError, Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations import CalibratedCoordinates, Lengths, Priors, Readings
@@ -279,5 +279,5 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
 def test_a_deficient_design_has_no_replicates() -> None:
     design = replace(small(), distances=small(pairs=False).distances)
     design = replace(design, probes=np.zeros_like(design.probes))
-    with pytest.raises(NoReferenceError, match="deficient"):
+    with pytest.raises(RankDeficientError, match="deficient"):
         reference(design, truth(design))

@@ -275,8 +275,8 @@ def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
 # that are coarse.
 TIGHT = {
     "a prior": (
-        "target_accuracy",
-        "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_accuracy",
+        "target_uncertainty",
+        "priors:\n  - {parameter: EXX t^1, standard_uncertainty: 1e-9 um}\ntarget_uncertainty",
     ),
     "coarse readings": ("repeatability: 1 um", "repeatability: 10 mm"),
     "an item on offer": (

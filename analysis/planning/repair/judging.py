@@ -64,7 +64,7 @@ class Examined:
         """The summary."""
         found, model = self.at.spectrum, self.at.layout.model
         effect = effects(self.at)
-        limit = weak_limit(self.at.design, self.experiment.target_accuracy)
+        limit = weak_limit(self.at.design, self.experiment.target_uncertainty)
         return Judged(
             found.deficiency,
             int(above(effect, limit).sum()),

@@ -55,7 +55,7 @@ class Goal:
     def __str__(self) -> str:
         if self.kind == "lengths":
             share = "all" if self.share == 1.0 else f"{percent(self.share)} of"
-            return f"{share} lengths (U6) within the target accuracy"
+            return f"{share} lengths (U6) within the target uncertainty"
         if self.kind == "tasks":
             return "every task within its target"
         unit = "urad" if self.symbol.endswith("angles") else "um"
@@ -83,7 +83,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     >>> str(parse_goal("U6 average 0.3 um"))
     'average U6 at most 0.3 um'
     >>> str(parse_goal("lengths", 0.95))
-    '95 % of lengths (U6) within the target accuracy'
+    '95 % of lengths (U6) within the target uncertainty'
     """
     if text in ("lengths", "tasks"):
         if share is not None and text == "tasks":
@@ -120,7 +120,7 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
         "U6" not in prediction.quantities or prediction.quantities["U6"].within_target is None
     ):
         raise GoalError(
-            'the file states no target_accuracy; add it, such as "0.5 um + L/1000000", or give'
+            'the file states no target_uncertainty; add it, such as "0.5 um + L/1000000", or give'
             " --target or --goal"
         )
     if goal.kind == "tasks":
@@ -129,7 +129,8 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
         without = [task.name for task in prediction.tasks if task.target is None]
         if without:
             raise GoalError(
-                f"no target for {listing(without)}; give target_accuracy to tasks, or to the file"
+                f"no target for {listing(without)}; give target_uncertainty to tasks, or to the"
+                " file"
             )
     if goal.kind == "quantity" and goal.symbol not in prediction.quantities:
         raise GoalError(

@@ -64,7 +64,7 @@ def reach(
     """Solve for each of some unknowns, the others staying as they are.
 
     `artefact` and `calibration`, an index, choose what varies where there are several; `target`
-    replaces the target accuracy of the file, and `report` is told the number of unknowns done.
+    replaces the target uncertainty of the file, and `report` is told the number of unknowns done.
 
     :raises GoalError: the experiment does not have what the goal is about.
     :raises NotVariableError: a single unknown is asked for that the experiment does not have.
@@ -86,7 +86,7 @@ def reach(
     zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
     root = override(root, "true_machine", zero, root.mark)
     if target is not None:
-        root = override(root, "target_accuracy", Scalar(root.mark, target), root.mark)
+        root = override(root, "target_uncertainty", Scalar(root.mark, target), root.mark)
     searched = _Searched(root, experiment.source, experiment.name, goal)
     present = searched.uncertainty(root)
     check_goal(goal, present)
