@@ -203,7 +203,8 @@ class Search:
     def _smooth_chances(self, event: _Event) -> Array:
         """Logarithms of the chances (k,) of all smooth errors as alternatives to an event.
 
-        One that contains the event is its alternative only if the rest of it explains something as well.
+        One that contains the event is its alternative only if the rest of it explains something
+        as well.
         """
         taken = _basis(self.left, self._dense(event.columns))
         found = np.zeros(len(self.smooth))

@@ -271,7 +271,9 @@ def rates(folder: Path, text: str, kinds: list[str], fits: int) -> dict[tuple[st
             for r in range(fits):
                 k = int(every[r % len(every)])
                 seed = 100_000 * number + 1000 * int(estimated) + r
-                observed, solution = world.fitted(seed, planned, k, float(planned.detectable[k]))
+                observed, solution = world.fitted(
+                    seed, planned, k, float(planned.minimal_detectable[k])
+                )
                 freedom = freedom_of(observed.design)
                 found = patterns(observed.design, solution.state, observed.x)
                 left = leftover(linearised_fit(observed.design, solution), observed.x, freedom)
