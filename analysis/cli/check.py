@@ -17,6 +17,7 @@ FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "check",

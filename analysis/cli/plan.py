@@ -22,6 +22,7 @@ AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 SHEETS = (".html", ".md", ".csv", ".txt")
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "plan",

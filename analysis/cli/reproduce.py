@@ -12,6 +12,7 @@ from .common import trial_count
 WRONG_USAGE = 2
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reproduce",

@@ -28,6 +28,7 @@ class OptionError(ValueError):
     """An option's value cannot be used."""
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "spline",

@@ -197,6 +197,7 @@ def _value_lines(curve: ErrorCurve, at: np.ndarray) -> list[str]:
     return aligned(rows, [True] * 5)
 
 
+# In one piece: one mapping, in the form in which the JSON has it.
 def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> dict[str, Any]:
     """The curve as plain data in metres and radians; what is not known is None."""
     fitted, points = curve.fit, curve.points

@@ -62,6 +62,7 @@ def reliability(
     )
 
 
+# In one piece: one pass over the responses fills all sums of the result.
 @single_threaded
 def reliability_of(
     design: Design,

@@ -105,6 +105,7 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
     return f"{value:.{decimals}f}({uncertainty:.{decimals}f})"
 
 
+# In one piece: one sentence for each kind of cause, side by side.
 def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     given, k = one.patterns, one.pattern
     design, kind, subject, axis = (

@@ -117,6 +117,8 @@ class Reference:
         return self.design.observations - self.design.parameter_count
 
 
+# In one piece: everything that replicates share is made at one reference, each part from those
+# before.
 @single_threaded
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.

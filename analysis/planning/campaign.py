@@ -122,6 +122,7 @@ def campaign(
     )
 
 
+# In one piece: the steps of a campaign in their order, and one result of all of them.
 def _campaign(
     experiment: Experiment,
     pool: Pool,

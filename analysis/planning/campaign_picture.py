@@ -214,6 +214,7 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
     _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
+# In one piece: layers of one drawing, from the back to the front.
 def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
     """Criterion against budget: choices, their bounds, the positions as drawn, and the target."""
     from matplotlib.ticker import MaxNLocator

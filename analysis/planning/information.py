@@ -170,6 +170,7 @@ class Frames:
         return np.asarray(left.T @ left)
 
 
+# In one piece: two sets of rows, as stated and evenly weighted, pass through the same steps.
 @single_threaded
 def pool_information(
     experiment: Experiment,

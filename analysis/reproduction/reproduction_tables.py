@@ -496,6 +496,7 @@ def reproduction_data(found: Reproduction) -> dict[str, Any]:
     }
 
 
+# In one piece: one mapping, in the form in which the JSON has it.
 def _section_data(section: Section) -> dict[str, Any]:
     return {
         "section": section.name,

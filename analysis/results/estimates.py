@@ -158,6 +158,7 @@ def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
     return [one.name if times[one.name] == 1 else f"{one.kind}: {one.name}" for one in functions]
 
 
+# In one piece: names, values and derivatives of each kind of parameter are added side by side.
 @single_threaded
 def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunctions:
     """All that a fit estimates: the machine, poses, offsets, lengths of standards and balls;

@@ -32,6 +32,7 @@ DEFAULT_SEED = 1
 FLAT = 1e-9
 
 
+# In one piece: every array of a design is laid out beside those whose order it shares.
 def lay_out(experiment: Experiment) -> Design:
     """Design of an experiment.
 

@@ -148,6 +148,8 @@ def build(
         return None, list(too_many.messages)
 
 
+# In one piece: the order in which sections are resolved, each from those before it, stands in one
+# place.
 def _build(
     root: Node, source: Path, name: str | None, planning: bool
 ) -> tuple[Experiment | None, list[Message]]:

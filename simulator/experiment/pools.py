@@ -91,6 +91,7 @@ class Candidates:
         return tuple(one.item for one in self.found if isinstance(one.item, Position))
 
 
+# In one piece: candidates are counted, completed and refused in the order of the file.
 def resolve_candidates(
     sections: Sections,
     positions: AnyMapping[int, Position],

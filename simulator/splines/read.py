@@ -93,6 +93,7 @@ class CurvePoints:
         )
 
 
+# In one piece: one pass over the lines collects all points and all that is wrong with them.
 def read_points(path: Path, x: str | None = None, y: str | None = None) -> CurvePoints:
     """Read points from a file whose first line names the columns, each with its unit, such as
     position_mm,error_um.

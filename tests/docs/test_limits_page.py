@@ -19,7 +19,6 @@ from ballplate.planning.requirements import root_search as search
 from ballplate.simulator.experiment import (
     calibrations,
     checks,
-    curves,
     machine_sections,
     pool_groups,
     priors,
@@ -27,10 +26,14 @@ from ballplate.simulator.experiment import (
     sections,
     variants,
 )
+from ballplate.simulator.experiment import (
+    curve_files as curves,
+)
 from ballplate.simulator.geometry import artefacts, directions
 from ballplate.simulator.inputs import messages, tables, yamltree
 from ballplate.simulator.splines import read
-from ballplate.sweeps import axes, bundle, load, settings
+from ballplate.sweeps import axes, bundle, load
+from ballplate.sweeps import sweep_settings as settings
 
 PAGE = Path("docs/reference/limits.md")
 
