@@ -178,15 +178,15 @@ def run(options: Namespace) -> int:
     return _on_a_line(built, start, end, options)
 
 
-def _of_one(found: AlongAxis, options: Namespace) -> int:
+def _of_one(along: AlongAxis, options: Namespace) -> int:
     from ..error_maps.volumetric_tables import along_csv, along_data, along_lines
     from ..report.volumetric_plots import draw_along
 
-    status = _drawn(options, partial(draw_along, found))
+    status = _drawn(options, partial(draw_along, along))
     if options.format == "json":
-        print_json([along_data(found)])
+        print_json([along_data(along)])
     else:
-        print_lines(along_lines(found) if options.format == "text" else list(along_csv(found)))
+        print_lines(along_lines(along) if options.format == "text" else list(along_csv(along)))
     return status
 
 

@@ -30,15 +30,15 @@ def target_words(target: LengthFunction) -> str:
     return format_length(target.constant) + (f" + L/{1 / target.slope:.9g}" if target.slope else "")
 
 
-def length_lines(title: str, found: LengthMap) -> list[str]:
+def length_lines(title: str, lengths: LengthMap) -> list[str]:
     """The share of lengths that meet the target, and where, how long and in which direction they
     are.
     """
-    settings, whole = found.settings, found.whole
+    settings, whole = lengths.settings, lengths.whole
     k = f"{settings.coverage_factor:g}"
-    rank = f"rank deficiency {found.deficiency}; " if found.deficiency else ""
+    rank = f"rank deficiency {lengths.deficiency}; " if lengths.deficiency else ""
     scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
-    count, n = int(whole.count[0]), len(found.points)
+    count, n = int(whole.count[0]), len(lengths.points)
     lines = [
         title,
         (
@@ -54,31 +54,38 @@ def length_lines(title: str, found: LengthMap) -> list[str]:
     ]
     if whole.undetermined[0]:
         some = ", ".join(
-            f"{_place(found.points[i])} to {_place(found.points[j])}" for i, j in found.open_pairs
+            f"{_place(lengths.points[i])} to {_place(lengths.points[j])}"
+            for i, j in lengths.open_pairs
         )
         lines.append(
             f"{whole.undetermined[0]} lengths are undetermined and meet no target, such as {some}"
         )
-    elif found.deficiency:
+    elif lengths.deficiency:
         lines.append(
             "what is undetermined changes none of these lengths; those of another --grid it may"
             " change"
         )
-    if found.worst is not None:
-        i, j = found.worst
+    if lengths.worst is not None:
+        i, j = lengths.worst
         ratio = settings.target_factor * float(whole.maximum_ratio[0])
-        told = f"largest ratio of {_compared(found)} to the target: {number(ratio)}"
-        lines.append(f"{told}, from {_place(found.points[i])} to {_place(found.points[j])}")
+        told = f"largest ratio of {_compared(lengths)} to the target: {number(ratio)}"
+        lines.append(f"{told}, from {_place(lengths.points[i])} to {_place(lengths.points[j])}")
     return [
         *lines,
         "",
-        *_table("length", _class_names(found.edges), found.by_length, found, _class_targets(found)),
+        *_table(
+            "length",
+            _class_names(lengths.edges),
+            lengths.by_length,
+            lengths,
+            _class_targets(lengths),
+        ),
         "",
-        *_table("direction", list(found.directions), found.by_direction, found, None),
+        *_table("direction", list(lengths.directions), lengths.by_direction, lengths, None),
         "",
-        *_table("point, mm", *_extremes(found), found, None),
+        *_table("point, mm", *_extremes(lengths), lengths, None),
         (
-            f"(points in the order of their largest ratio of {_compared(found)} to the target;"
+            f"(points in the order of their largest ratio of {_compared(lengths)} to the target;"
             " lengths are those that start or end there)"
         ),
     ]
@@ -99,10 +106,10 @@ def _class_names(edges: Array) -> list[str]:
     ]
 
 
-def _class_targets(found: LengthMap) -> list[str] | None:
-    if not found.settings.target.slope:
+def _class_targets(lengths: LengthMap) -> list[str] | None:
+    if not lengths.settings.target.slope:
         return None
-    ends = 1e6 * found.settings.target.at(found.edges)
+    ends = 1e6 * lengths.settings.target.at(lengths.edges)
     return [
         f"{number(float(a), 3)} to {number(float(b), 3)}"
         for a, b in zip(ends, ends[1:], strict=False)
@@ -113,30 +120,32 @@ def _class_targets(found: LengthMap) -> list[str] | None:
 SHOWN_POINTS = 3
 
 
-def _extremes(found: LengthMap) -> tuple[list[str], LengthGroups]:
-    ratio = np.where(np.isnan(found.by_point.maximum_ratio), np.inf, found.by_point.maximum_ratio)
+def _extremes(lengths: LengthMap) -> tuple[list[str], LengthGroups]:
+    ratio = np.where(
+        np.isnan(lengths.by_point.maximum_ratio), np.inf, lengths.by_point.maximum_ratio
+    )
     order = np.argsort(-comparable(ratio), kind="stable")
     chosen = (
         order
         if len(order) <= 2 * SHOWN_POINTS
         else np.concatenate([order[:SHOWN_POINTS], order[-SHOWN_POINTS:]])
     )
-    names = [_place(found.points[i]).removesuffix(" mm") for i in chosen]
+    names = [_place(lengths.points[i]).removesuffix(" mm") for i in chosen]
     return names, LengthGroups(
-        **{name: values[chosen] for name, values in vars(found.by_point).items()}
+        **{name: values[chosen] for name, values in vars(lengths.by_point).items()}
     )
 
 
-def _compared(found: LengthMap) -> str:
+def _compared(lengths: LengthMap) -> str:
     """The uncertainty that the target is meant for, as a symbol."""
-    factor = found.settings.target_factor
+    factor = lengths.settings.target_factor
     return "u" if factor == 1.0 else f"{factor:g} u"
 
 
 def _table(
-    head: str, names: list[str], groups: LengthGroups, found: LengthMap, targets: list[str] | None
+    head: str, names: list[str], groups: LengthGroups, lengths: LengthMap, targets: list[str] | None
 ) -> list[str]:
-    factor = found.settings.coverage_factor
+    factor = lengths.settings.coverage_factor
     k = f"{factor:g}"
     heads = [
         head,
@@ -147,7 +156,7 @@ def _table(
         f"{k} u maximum",
         "target",
     ]
-    heads += [f"{_compared(found)} / target, maximum", "u within", f"{k} u within"]
+    heads += [f"{_compared(lengths)} / target, maximum", "u within", f"{k} u within"]
     rows = [heads]
     for i, name in enumerate(names):
         if not groups.count[i]:
@@ -159,7 +168,7 @@ def _table(
         ]
         row += [
             targets[i] if targets else "",
-            number(found.settings.target_factor * float(groups.maximum_ratio[i])),
+            number(lengths.settings.target_factor * float(groups.maximum_ratio[i])),
         ]
         row += [percent(float(groups.share(expanded)[i])) for expanded in (False, True)]
         rows.append(row)
@@ -169,13 +178,13 @@ def _table(
     return aligned([[row[j] for j in kept] for row in rows], [j > 0 for j in kept])
 
 
-def point_csv(found: LengthMap) -> Iterator[str]:
+def point_csv(lengths: LengthMap) -> Iterator[str]:
     """A line for each point of the grid: of the lengths that start or end there."""
-    axes = AXES[: found.design.dimension]
+    axes = AXES[: lengths.design.dimension]
     yield ",".join([*(f"{axis}_mm" for axis in axes), POINT_COLUMNS])
-    groups = found.by_point
+    groups = lengths.by_point
     columns = [
-        1e3 * found.points,
+        1e3 * lengths.points,
         groups.count,
         groups.undetermined,
         1e6 * groups.average,
@@ -208,28 +217,32 @@ def _csv(row: list[float]) -> str:
     return ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
 
 
-def length_data(label: str, title: str, found: LengthMap) -> dict[str, Any]:
+def length_data(label: str, title: str, lengths: LengthMap) -> dict[str, Any]:
     """The same as plain data in metres; what is undetermined is None."""
-    settings = found.settings
-    edges = found.edges.tolist()
+    settings = lengths.settings
+    edges = lengths.edges.tolist()
     classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
     return {
         "experiment": label,
         "title": title,
-        "rank_deficiency": found.deficiency,
+        "rank_deficiency": lengths.deficiency,
         "grid": list(settings.grid),
         "probe": settings.probe,
         "target": {"constant": settings.target.constant, "slope": settings.target.slope},
         "coverage_factor": settings.coverage_factor,
         "target_coverage_factor": settings.target_factor,
         "with_repeatability": settings.with_repeatability,
-        "all": _group_data(found.whole)[0],
-        "worst": None if found.worst is None else [found.points[k].tolist() for k in found.worst],
-        "by_length": _with(classes, found.by_length),
+        "all": _group_data(lengths.whole)[0],
+        "worst": None
+        if lengths.worst is None
+        else [lengths.points[k].tolist() for k in lengths.worst],
+        "by_length": _with(classes, lengths.by_length),
         "by_direction": _with(
-            [{"direction": name} for name in found.directions], found.by_direction
+            [{"direction": name} for name in lengths.directions], lengths.by_direction
         ),
-        "by_point": _with([{"point": point} for point in found.points.tolist()], found.by_point),
+        "by_point": _with(
+            [{"point": point} for point in lengths.points.tolist()], lengths.by_point
+        ),
     }
 
 

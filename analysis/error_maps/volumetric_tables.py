@@ -64,13 +64,13 @@ def _chain(arrangement: Arrangement) -> str:
     return ", ".join(sides)
 
 
-def _stated_as(one: AlongAxis) -> str:
-    error = one.error
-    if one.values is None:
+def _stated_as(along: AlongAxis) -> str:
+    error = along.error
+    if along.values is None:
         return "random"
     form = (
-        f"table of {len(one.measured.positions)} points"
-        if one.measured is not None
+        f"table of {len(along.measured.positions)} points"
+        if along.measured is not None
         else "polynomial"
     )
     if error.line is not None and not error.is_rotation:
@@ -132,9 +132,9 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
     return [(parameter, value) for parameter, value in every if parameter.function not in names]
 
 
-def diagonal_lines(found: LengthErrors) -> list[str]:
+def diagonal_lines(errors: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
-    is_random = bool(found.deviation.any())
+    is_random = bool(errors.deviation.any())
     rows = [
         [
             "body diagonal",
@@ -145,62 +145,62 @@ def diagonal_lines(found: LengthErrors) -> list[str]:
             *(["random, um"] if is_random else []),
         ]
     ]
-    for k in range(len(found.error)):
+    for k in range(len(errors.error)):
         ends = [
             f"({', '.join(_millimetres(v) for v in point)})"
-            for point in (found.starts[k], found.ends[k])
+            for point in (errors.starts[k], errors.ends[k])
         ]
-        told = [float(found.error[k]), *([float(found.deviation[k])] if is_random else [])]
+        told = [float(errors.error[k]), *([float(errors.deviation[k])] if is_random else [])]
         rows.append(
             [
                 str(k + 1),
                 *ends,
-                f"{1e3 * found.nominal[k]:.3f}",
+                f"{1e3 * errors.nominal[k]:.3f}",
                 *(number(1e6 * value) for value in told),
             ]
         )
     return aligned(rows, [False, False, False, *[True] * (len(rows[0]) - 3)])
 
 
-def length_line(found: LengthErrors) -> str:
+def length_line(errors: LengthErrors) -> str:
     """The length error of a single line."""
     random = (
-        f", random {number(1e6 * float(found.deviation[0]))} um" if found.deviation.any() else ""
+        f", random {number(1e6 * float(errors.deviation[0]))} um" if errors.deviation.any() else ""
     )
     return (
-        f"length {1e3 * found.nominal[0]:.3f} mm, length error"
-        f" {number(1e6 * float(found.error[0]))} um{random}"
+        f"length {1e3 * errors.nominal[0]:.3f} mm, length error"
+        f" {number(1e6 * float(errors.error[0]))} um{random}"
     )
 
 
-def error_lines(found: VolumetricErrors) -> list[str]:
+def error_lines(errors: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
     heads = ["x, mm", "y, mm", "z, mm", "X, um", "Y, um", "Z, um", "resultant"]
-    is_random = bool(found.deviation.any())
+    is_random = bool(errors.deviation.any())
     rows = [[*heads, *(["random X", "Y", "Z"] if is_random else [])]]
     for point, error, resultant, random in zip(
-        found.points, found.systematic, found.resultant, found.deviation, strict=True
+        errors.points, errors.systematic, errors.resultant, errors.deviation, strict=True
     ):
         cells = [_millimetres(value) for value in point]
         cells += [
             _fixed(1e6 * value, 2) for value in (*error, resultant, *(random if is_random else ()))
         ]
         rows.append(cells)
-    return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(found)]
+    return [*aligned(rows, [True] * len(rows[0])), *extreme_lines(errors)]
 
 
-def extreme_lines(found: VolumetricErrors) -> list[str]:
+def extreme_lines(errors: VolumetricErrors) -> list[str]:
     """Ranges of the components, and the largest resultant."""
-    worst = int(comparable(found.resultant).argmax())
+    worst = int(comparable(errors.resultant).argmax())
     at = ", ".join(
         f"{axis} = {format_length(v)}"
-        for axis, v in zip(AXES, found.points[worst].tolist(), strict=True)
+        for axis, v in zip(AXES, errors.points[worst].tolist(), strict=True)
     )
     bands = ", ".join(
-        f"{axis.upper()} {number(1e6 * float(np.ptp(found.systematic[:, k])))}"
+        f"{axis.upper()} {number(1e6 * float(np.ptp(errors.systematic[:, k])))}"
         for k, axis in enumerate(AXES)
     )
-    resultant = found.resultant
+    resultant = errors.resultant
     return [
         (
             f"range in um: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
@@ -209,22 +209,22 @@ def extreme_lines(found: VolumetricErrors) -> list[str]:
     ]
 
 
-def along_lines(one: AlongAxis) -> list[str]:
+def along_lines(along: AlongAxis) -> list[str]:
     """A parametric error along its axis."""
-    unit = SHOWN["rad" if one.error.is_rotation else "m"]
+    unit = SHOWN["rad" if along.error.is_rotation else "m"]
     columns = [
-        ("stated", one.stated),
-        ("at the reference point", one.values),
-        ("random", one.deviation),
+        ("stated", along.stated),
+        ("at the reference point", along.values),
+        ("random", along.deviation),
     ]
     given = [(name, values) for name, values in columns if values is not None]
-    positions = one.positions
+    positions = along.positions
     keep = (
         np.arange(0, len(positions), 5)
-        if one.measured is None
-        else np.flatnonzero(np.isin(positions, one.measured.positions))
+        if along.measured is None
+        else np.flatnonzero(np.isin(positions, along.measured.positions))
     )
-    axis = one.error.name[2].lower()
+    axis = along.error.name[2].lower()
     rows = [[f"{axis}, mm", *(f"{name}, {unit}" for name, _ in given)]]
     for k in keep:
         rows.append(
@@ -233,46 +233,50 @@ def along_lines(one: AlongAxis) -> list[str]:
                 *(_fixed(float(1e6 * values[k]), 3) for _, values in given),
             ]
         )
-    head = f"{one.error.name} {symbol(one.error.name)}: {meaning(one.error.name)}"
-    band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"
+    head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
+    band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
     told = (
         []
-        if one.values is None
-        else [f"stated as {_stated_as(one)}; {_line_stated(one)}".rstrip("; ")]
+        if along.values is None
+        else [f"stated as {_stated_as(along)}; {_line_stated(along)}".rstrip("; ")]
     )
     return [head + band, *told, *aligned(rows, [True] * len(rows[0]))]
 
 
-def _line_stated(one: AlongAxis) -> str:
-    if one.error.is_rotation:
+def _line_stated(along: AlongAxis) -> str:
+    if along.error.is_rotation:
         return "a rotation is the same on all lines"
-    return "at the reference point (no line stated)" if one.error.line is None else ""
+    return "at the reference point (no line stated)" if along.error.line is None else ""
 
 
-def error_csv(found: VolumetricErrors) -> Iterator[str]:
+def error_csv(errors: VolumetricErrors) -> Iterator[str]:
     """Errors as lines of a CSV file."""
     yield (
         "x_mm,y_mm,z_mm,error_x_um,error_y_um,error_z_um,resultant_um,"
         "random_x_um,random_y_um,random_z_um"
     )
     columns = (
-        1e3 * found.points,
-        1e6 * found.systematic,
-        1e6 * found.resultant[:, None],
-        1e6 * found.deviation,
+        1e3 * errors.points,
+        1e6 * errors.systematic,
+        1e6 * errors.resultant[:, None],
+        1e6 * errors.deviation,
     )
     for row in np.concatenate(columns, axis=1).tolist():
         yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
 
-def along_csv(one: AlongAxis) -> Iterator[str]:
+def along_csv(along: AlongAxis) -> Iterator[str]:
     """A parametric error along its axis as lines of a CSV file."""
-    unit = SHOWN["rad" if one.error.is_rotation else "m"]
-    columns = [("stated", one.stated), (one.error.name, one.values), ("random", one.deviation)]
+    unit = SHOWN["rad" if along.error.is_rotation else "m"]
+    columns = [
+        ("stated", along.stated),
+        (along.error.name, along.values),
+        ("random", along.deviation),
+    ]
     given = [(name, values) for name, values in columns if values is not None]
     yield ",".join(["position_mm", *(f"{name}_{unit}" for name, _ in given)])
     for row in np.column_stack(
-        [1e3 * one.positions, *(1e6 * values for _, values in given)]
+        [1e3 * along.positions, *(1e6 * values for _, values in given)]
     ).tolist():
         yield ",".join(f"{value + 0.0:.12g}" for value in row)
 
@@ -302,53 +306,53 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
     }
 
 
-def diagonal_data(found: LengthErrors) -> list[dict[str, Any]]:
+def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
     """Length errors of the body diagonals, in metres."""
-    return [{"diagonal": k + 1, **one} for k, one in enumerate(length_data(found))]
+    return [{"diagonal": k + 1, **one} for k, one in enumerate(length_data(errors))]
 
 
-def length_data(found: LengthErrors) -> list[dict[str, Any]]:
+def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
     """Length errors, in metres."""
     return [
         {
-            "from": found.starts[k].tolist(),
-            "to": found.ends[k].tolist(),
-            "length": float(found.nominal[k]),
-            "error": float(found.error[k]),
-            "random": float(found.deviation[k]),
+            "from": errors.starts[k].tolist(),
+            "to": errors.ends[k].tolist(),
+            "length": float(errors.nominal[k]),
+            "error": float(errors.error[k]),
+            "random": float(errors.deviation[k]),
         }
-        for k in range(len(found.error))
+        for k in range(len(errors.error))
     ]
 
 
-def error_data(found: VolumetricErrors) -> list[dict[str, Any]]:
+def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
     """Errors point by point, in metres."""
     return [
         {"position": point, "error": error, "resultant": resultant, "random": random}
         for point, error, resultant, random in zip(
-            found.points.tolist(),
-            found.systematic.tolist(),
-            found.resultant.tolist(),
-            found.deviation.tolist(),
+            errors.points.tolist(),
+            errors.systematic.tolist(),
+            errors.resultant.tolist(),
+            errors.deviation.tolist(),
             strict=True,
         )
     ]
 
 
-def along_data(one: AlongAxis) -> dict[str, Any]:
+def along_data(along: AlongAxis) -> dict[str, Any]:
     """A parametric error along its axis, in metres and radians."""
 
     def listed(values: Array | None) -> list[float] | None:
         return None if values is None else [float(value) for value in values]
 
     return {
-        "error": one.error.name,
-        "symbol": symbol(one.error.name),
-        "unit": "rad" if one.error.is_rotation else "m",
-        "position": listed(one.positions),
-        "stated": listed(one.stated),
-        "value": listed(one.values),
-        "random": listed(one.deviation),
+        "error": along.error.name,
+        "symbol": symbol(along.error.name),
+        "unit": "rad" if along.error.is_rotation else "m",
+        "position": listed(along.positions),
+        "stated": listed(along.stated),
+        "value": listed(along.values),
+        "random": listed(along.deviation),
     }
 
 

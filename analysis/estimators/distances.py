@@ -418,26 +418,28 @@ def alternative_fit_data(fit: AlternativeFit) -> dict[str, Any]:
     }
 
 
-def comparison_lines(found: EstimatorComparison, published: dict[str, float | None]) -> list[str]:
+def comparison_lines(
+    comparison: EstimatorComparison, published: dict[str, float | None]
+) -> list[str]:
     """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum")
     stand in them.
     """
-    across = ", across probes" if found.across_probes else ""
-    used = _used(found.pairs, found.lengths)
+    across = ", across probes" if comparison.across_probes else ""
+    used = _used(comparison.pairs, comparison.lengths)
     lines = [
-        f"{found.label}: {found.title}",
+        f"{comparison.label}: {comparison.title}",
         (
-            f"estimator {found.estimator} ({used}{across}) against the full one: corrected"
-            f" distances of {found.points} random pairs of points in each of {found.trials} data"
-            " sets, differences in um"
+            f"estimator {comparison.estimator} ({used}{across}) against the full one: corrected"
+            f" distances of {comparison.points} random pairs of points in each of"
+            f" {comparison.trials} data sets, differences in um"
         ),
     ]
-    if found.failed:
+    if comparison.failed:
         lines.append(
-            f"not converged: {len(found.failed)} data sets, numbers"
-            f" {', '.join(map(str, found.failed[:20]))}"
+            f"not converged: {len(comparison.failed)} data sets, numbers"
+            f" {', '.join(map(str, comparison.failed[:20]))}"
         )
-    if not len(found.rms):
+    if not len(comparison.rms):
         return lines
     rows = [
         [
@@ -450,8 +452,8 @@ def comparison_lines(found: EstimatorComparison, published: dict[str, float | No
         ]
     ]
     for words, key, values in (
-        ("root mean square", "rms", found.rms),
-        ("largest", "maximum", found.maximum),
+        ("root mean square", "rms", comparison.rms),
+        ("largest", "maximum", comparison.maximum),
     ):
         value = published.get(key)
         placed = (
@@ -466,21 +468,21 @@ def comparison_lines(found: EstimatorComparison, published: dict[str, float | No
 
 
 def comparison_data(
-    found: EstimatorComparison, published: dict[str, float | None]
+    comparison: EstimatorComparison, published: dict[str, float | None]
 ) -> dict[str, Any]:
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
-        "experiment": found.label,
-        "title": found.title,
-        "estimator": found.estimator,
-        "trials": found.trials,
-        "pairs": found.pairs,
-        "lengths": found.lengths,
-        "across_probes": found.across_probes,
-        "points": found.points,
-        "not_converged": list(found.failed),
+        "experiment": comparison.label,
+        "title": comparison.title,
+        "estimator": comparison.estimator,
+        "trials": comparison.trials,
+        "pairs": comparison.pairs,
+        "lengths": comparison.lengths,
+        "across_probes": comparison.across_probes,
+        "points": comparison.points,
+        "not_converged": list(comparison.failed),
     }
-    for key, values in (("rms", found.rms), ("maximum", found.maximum)):
+    for key, values in (("rms", comparison.rms), ("maximum", comparison.maximum)):
         quantiles = list(np.quantile(values, QUANTILES)) if len(values) else []
         data[key] = {
             "quantiles": {

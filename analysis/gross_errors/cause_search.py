@@ -217,12 +217,12 @@ class Search:
                 found[place] = min(found[place], event.log_p) if rest < CONTAINED else 0.0
         return found
 
-    def _is_part(self, one: Smooth, columns: Integers) -> bool:
+    def _is_part(self, smooth: Smooth, columns: Integers) -> bool:
         """Whether a smooth error is nothing but a cause, in one of its directions."""
-        if one.columns.shape[1] > len(columns):
+        if smooth.columns.shape[1] > len(columns):
             return False
         taken = _basis(self.start, self._dense(columns))
-        rest = one.columns - taken @ (taken.T @ one.columns)
+        rest = smooth.columns - taken @ (taken.T @ smooth.columns)
         return bool(((rest**2).sum(axis=0) <= SAME).all())
 
     def _dense(self, columns: Integers) -> Array:
@@ -232,14 +232,14 @@ class Search:
         self.left = self.left.without(self._dense(columns))
         self.columns.update(self.left)
 
-    def _weigh(self, one: Scatter) -> float:
+    def _weigh(self, scatter: Scatter) -> float:
         """Weigh some readings by how much they scatter, and begin anew; how many times that is as
         much as stated.
         """
         times, plain, left = 1.0, self.design, self.left
         for _ in range(WEIGHINGS):
-            times *= ratio(left, one.rows)
-            self.design = with_scatter(plain, one, times)
+            times *= ratio(left, scatter.rows)
+            self.design = with_scatter(plain, scatter, times)
             at = linearise(self.design, self.state, self.x, as_drawn(self.design))
             left = leftover(at, self.x, self.start.freedom)
         self._begin(left)

@@ -142,12 +142,15 @@ def _nothing(count: int, groups: tuple[Functions, ...]) -> Effects:
     )
 
 
-def _put(effects: Effects, index: Integers, changes: Changes, found: Largest) -> None:
+def _put(effects: Effects, index: Integers, changes: Changes, largest: Largest) -> None:
     """Enter what patterns `index` change, where that is more than what has been entered of other
     artefacts.
     """
-    more = comparable(found.change) > comparable(effects.change[index])
-    use = (found.function >= 0) & (more | (effects.first[index] < 0))
-    index, function = index[use], found.function[use]
-    effects.change[index], effects.uncertainty[index] = found.change[use], found.uncertainty[use]
+    more = comparable(largest.change) > comparable(effects.change[index])
+    use = (largest.function >= 0) & (more | (effects.first[index] < 0))
+    index, function = index[use], largest.function[use]
+    effects.change[index], effects.uncertainty[index] = (
+        largest.change[use],
+        largest.uncertainty[use],
+    )
     effects.first[index], effects.second[index] = changes.first[function], changes.second[function]

@@ -110,17 +110,17 @@ def _against_typical(errors: Array, aim: MonteCarloQuantity) -> Array:
 
 
 def accumulate(
-    shared: Reference, aims: tuple[MonteCarloQuantity, ...], found: Estimates, count: int
+    shared: Reference, aims: tuple[MonteCarloQuantity, ...], estimates: Estimates, count: int
 ) -> Accumulator:
     """Sums over the first `count` replicates of a batch."""
     limits = factors(shared.degrees_of_freedom)
-    used = found.converged & (np.arange(len(found.index)) < count)
-    failed = found.index[:count][~found.converged[:count]]
-    squares = found.sum_of_squares[used]
+    used = estimates.converged & (np.arange(len(estimates.index)) < count)
+    failed = estimates.index[:count][~estimates.converged[:count]]
+    squares = estimates.sum_of_squares[used]
     sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
     quantities = []
     for aim in aims:
-        change = aim.change(found.found)[used]
+        change = aim.change(estimates.found)[used]
         scatter = change * (1.0 / aim.uncertainty)
         error = scatter + aim.base / aim.uncertainty
         size = np.abs(error)
@@ -147,7 +147,7 @@ def accumulate(
     return Accumulator(
         int(used.sum()),
         tuple(int(k) for k in failed),
-        int(found.passes[:count].max(initial=0)),
+        int(estimates.passes[:count].max(initial=0)),
         np.array([squares.sum(), (squares**2).sum()]),
         int((squares > limits.limit).sum()),
         tuple(quantities),

@@ -179,20 +179,20 @@ def trials_data(done: Trials) -> dict[str, Any]:
     return found
 
 
-def _comparison_data(one: MonteCarloComparison) -> dict[str, Any]:
+def _comparison_data(comparison: MonteCarloComparison) -> dict[str, Any]:
     return {
-        "unit": one.unit,
-        "count": one.count,
-        "sampled": one.sampled,
-        "linear": {"maximum": one.linear_maximum, "average": one.linear_average},
-        "actual": {"maximum": one.actual_maximum, "average": one.actual_average},
-        "spread_ratio": _figure(one.spread),
-        "actual_ratio": _figure(one.actual),
-        "bias_ratio": _figure(one.bias),
-        "largest_bias": one.largest_bias,
-        "coverage_sigma_given": _figure(one.known),
-        "coverage_sigma_estimated": _figure(one.estimated),
-        "flags": list(one.flags),
+        "unit": comparison.unit,
+        "count": comparison.count,
+        "sampled": comparison.sampled,
+        "linear": {"maximum": comparison.linear_maximum, "average": comparison.linear_average},
+        "actual": {"maximum": comparison.actual_maximum, "average": comparison.actual_average},
+        "spread_ratio": _figure(comparison.spread),
+        "actual_ratio": _figure(comparison.actual),
+        "bias_ratio": _figure(comparison.bias),
+        "largest_bias": comparison.largest_bias,
+        "coverage_sigma_given": _figure(comparison.known),
+        "coverage_sigma_estimated": _figure(comparison.estimated),
+        "flags": list(comparison.flags),
     }
 
 

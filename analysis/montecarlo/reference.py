@@ -269,14 +269,14 @@ def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool
 
 
 def _is_faithful(
-    design: Design, found: Spectrum, columns: slice, start: State, exact: Array
+    design: Design, spectrum: Spectrum, columns: slice, start: State, exact: Array
 ) -> bool:
     """Whether an expansion of the model tells the same as the model itself."""
     p = probe_offsets(design, start)[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = 1.0 / reading_weights(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
-    step = generator.standard_normal((2, found.root.shape[1])) @ found.root[columns].T
+    step = generator.standard_normal((2, spectrum.root.shape[1])) @ spectrum.root[columns].T
     offsets = None if design.free_offsets is None else 1e-6 * generator.standard_normal(moved.shape)
     expanded, direct = (
         _local_model(design, start.a, exact, p, is_expanded).change(moved, step, offsets)

@@ -162,17 +162,17 @@ def _parameters(
     )
 
 
-def _shared(layout: SharedLayout, found: Deviations) -> Array:
+def _shared(layout: SharedLayout, deviations: Deviations) -> Array:
     """Changes (b, s) of the shared parameters; those of rotations are not the sums of their
     steps.
     """
-    changed = found.shared.copy()
+    changed = deviations.shared.copy()
     position, place = np.nonzero(layout.pose_columns >= 0)
-    poses = np.concatenate([found.origins, found.rotations], axis=2)
+    poses = np.concatenate([deviations.origins, deviations.rotations], axis=2)
     changed[:, layout.pose_columns[position, place]] = poses[:, position, place]
-    changed[:, layout.model] = found.a
+    changed[:, layout.model] = deviations.a
     probe, axis = np.nonzero(layout.offset_columns >= 0)
-    changed[:, layout.offset_columns[probe, axis]] = found.offsets[:, probe, axis]
+    changed[:, layout.offset_columns[probe, axis]] = deviations.offsets[:, probe, axis]
     return changed
 
 

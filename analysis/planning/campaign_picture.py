@@ -53,7 +53,7 @@ MOST_CHOSEN, MOST_LEFT_OUT, MOST_LETTERS = 24, 5, 66
 WIDE, FAR = 5.0, 4.0
 
 
-def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
+def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figure:
     """A picture of the criterion against the budget, of the gain of each candidate, and of the
     positions.
 
@@ -63,20 +63,20 @@ def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
     :raises ValueError: the name ends in none of the kinds of pictures.
     :raises OSError: the file cannot be written.
     """
-    rows, marks = _rows(found), _marks(found)
+    rows, marks = _rows(selection), _marks(selection)
     bars = ROW * max(len(rows), 1)
-    top = CURVE + LEGEND if found.curve else STRIP * len(marks)
+    top = CURVE + LEGEND if selection.curve else STRIP * len(marks)
     total = SCENE + UNDER + bars + ABOVE + BELOW + top + ABOVE
     with drawing(total, WIDTH) as figure:
         _title(
             figure,
             total - 14.0,
-            f"{DESCRIPTIONS[found.criterion]}{'' if found.unit == '1' else ', µm'}",
+            f"{DESCRIPTIONS[selection.criterion]}{'' if selection.unit == '1' else ', µm'}",
         )
-        if found.curve:
+        if selection.curve:
             _curve(
                 placed_axes(figure, LEFT, total - ABOVE - top, WIDTH - LEFT - RIGHT, CURVE),
-                found,
+                selection,
                 marks,
             )
         else:
@@ -89,34 +89,36 @@ def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
         _title(
             figure,
             bottom + bars + 14.0,
-            f"how much larger {found.criterion} is without each of the chosen ones",
+            f"how much larger {selection.criterion} is without each of the chosen ones",
         )
         _bars(axes, rows)
         axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
         axes.set_axis_off()
         axes.set_aspect("equal")
-        draw_scene(axes, scene(found.plan.design), by_number=True)
-        return save(figure, path, words(found))
+        draw_scene(axes, scene(selection.plan.design), by_number=True)
+        return save(figure, path, words(selection))
 
 
-def words(found: Selection) -> str:
+def words(selection: Selection) -> str:
     """The picture for those who do not see it."""
-    told = [f"{found.criterion}, no more than {found.budget}: chosen {_told(found, found.value)}"]
-    if not math.isnan(found.bound):
-        told.append(f"bound of any choice {_told(found, found.bound)}")
-    if found.drawn is not None:
-        told.append(f"{found.drawn_words} {_told(found, found.drawn)}")
-    if found.target is not None:
-        told.append(f"target {_told(found, found.target)}")
-    return (
-        f"{', '.join(told)}; {len(found.chosen)} chosen of {len(found.pool.candidates)} candidates"
-    )
+    told = [
+        f"{selection.criterion}, no more than {selection.budget}:"
+        f" chosen {_told(selection, selection.value)}"
+    ]
+    if not math.isnan(selection.bound):
+        told.append(f"bound of any choice {_told(selection, selection.bound)}")
+    if selection.drawn is not None:
+        told.append(f"{selection.drawn_words} {_told(selection, selection.drawn)}")
+    if selection.target is not None:
+        told.append(f"target {_told(selection, selection.target)}")
+    offered = len(selection.pool.candidates)
+    return f"{', '.join(told)}; {len(selection.chosen)} chosen of {offered} candidates"
 
 
-def _told(found: Selection, value: float) -> str:
+def _told(selection: Selection, value: float) -> str:
     if math.isinf(value):
         return "deficient"
-    return number(value, 3) if found.unit == "1" else f"{number(1e6 * value, 3)} µm"
+    return number(value, 3) if selection.unit == "1" else f"{number(1e6 * value, 3)} µm"
 
 
 def _title(figure: Figure, height: float, text: str) -> None:
@@ -158,20 +160,20 @@ class _Mark:
         return number(self.value, 3) if math.isfinite(self.value) else "deficient"
 
 
-def _factor(found: Selection) -> float:
-    return 1.0 if found.unit == "1" else 1e6
+def _factor(selection: Selection) -> float:
+    return 1.0 if selection.unit == "1" else 1e6
 
 
-def _marks(found: Selection) -> list[_Mark]:
+def _marks(selection: Selection) -> list[_Mark]:
     """What a choice is compared with, the choice first."""
-    marks = [_Mark(CHOSEN, found.value, SERIES[0], MARKERS[0])]
-    if not math.isnan(found.bound):
-        marks.append(_Mark(BOUND, found.bound, MUTED, "|"))
-    if found.drawn is not None:
-        marks.append(_Mark(found.drawn_words, found.drawn, SERIES[1], MARKERS[3]))
-    if found.target is not None:
-        marks.append(_Mark(TARGET, found.target, INK, "|"))
-    return [replace(mark, value=_factor(found) * mark.value) for mark in marks]
+    marks = [_Mark(CHOSEN, selection.value, SERIES[0], MARKERS[0])]
+    if not math.isnan(selection.bound):
+        marks.append(_Mark(BOUND, selection.bound, MUTED, "|"))
+    if selection.drawn is not None:
+        marks.append(_Mark(selection.drawn_words, selection.drawn, SERIES[1], MARKERS[3]))
+    if selection.target is not None:
+        marks.append(_Mark(TARGET, selection.target, INK, "|"))
+    return [replace(mark, value=_factor(selection) * mark.value) for mark in marks]
 
 
 def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
@@ -215,18 +217,18 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
 
 
 # In one piece: layers of one drawing, from the back to the front.
-def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
+def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
     """Criterion against budget: choices, their bounds, the positions as drawn, and the target."""
     from matplotlib.ticker import MaxNLocator
 
-    extent, factor = _extent(found.budget), _factor(found)
-    points = sorted(found.curve, key=lambda point: extent.of(point.budget))
+    extent, factor = _extent(selection.budget), _factor(selection)
+    points = sorted(selection.curve, key=lambda point: extent.of(point.budget))
     x = np.array([extent.of(point.budget) for point in points])
     values = factor * np.array([point.value for point in points])
     bounds = factor * np.array([point.bound for point in points])
     by_name = {mark.name: mark for mark in marks}
-    here = extent.of(found.budget)
-    drawn_at = here if found.drawn_spent is None else extent.of(found.drawn_spent)
+    here = extent.of(selection.budget)
+    drawn_at = here if selection.drawn_spent is None else extent.of(selection.drawn_spent)
 
     target = by_name.pop(TARGET, None)
     known = [*values, *bounds, *(mark.value for mark in by_name.values())]
@@ -251,10 +253,10 @@ def _curve(axes: Axes, found: Selection, marks: Sequence[_Mark]) -> None:
         markerfacecolor=PAPER,
         label="best choice found",
     )
-    if BOUND in by_name and found.is_determined:
+    if BOUND in by_name and selection.is_determined:
         ends_of_gap = [by_name[BOUND].value, by_name[CHOSEN].value]
         axes.plot([here, here], ends_of_gap, color=SERIES[0], linewidth=0.8, linestyle=DASHES[2])
-    for name, at_budget in ((CHOSEN, here), (found.drawn_words, drawn_at)):
+    for name, at_budget in ((CHOSEN, here), (selection.drawn_words, drawn_at)):
         if name in by_name:
             mark = by_name[name]
             is_known = math.isfinite(mark.value)
@@ -330,15 +332,17 @@ class _Row:
     colour: str
 
 
-def _rows(found: Selection) -> list[_Row]:
+def _rows(selection: Selection) -> list[_Row]:
     """The chosen ones with their numbers in the drawing, those first that gain most, then the best
     of the others.
     """
-    numbers = {name: k + 1 for k, name in enumerate(found.plan.design.position_names)}
-    rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in found.gains[:MOST_CHOSEN]]
-    if len(found.gains) > MOST_CHOSEN:
+    numbers = {name: k + 1 for k, name in enumerate(selection.plan.design.position_names)}
+    rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in selection.gains[:MOST_CHOSEN]]
+    if len(selection.gains) > MOST_CHOSEN:
         rows.append(
-            _Row("", f"… and {len(found.gains) - MOST_CHOSEN} chosen ones more", "", None, MUTED)
+            _Row(
+                "", f"… and {len(selection.gains) - MOST_CHOSEN} chosen ones more", "", None, MUTED
+            )
         )
     rows += [
         _Row(
@@ -348,9 +352,9 @@ def _rows(found: Selection) -> list[_Row]:
             None,
             _colour(numbers.get(one.name)),
         )
-        for one in found.done[: max(MOST_CHOSEN - len(found.gains), 0)]
+        for one in selection.done[: max(MOST_CHOSEN - len(selection.gains), 0)]
     ]
-    left_out = [gain for gain in found.left_out if not math.isnan(gain.relative)]
+    left_out = [gain for gain in selection.left_out if not math.isnan(gain.relative)]
     if left_out:
         rows.append(
             _Row("", "left out; how much larger it is without each of these", "", None, MUTED)

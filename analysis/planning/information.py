@@ -509,11 +509,11 @@ def _basis(
     )
 
 
-def _inverse(found: Triangle) -> Array:
+def _inverse(triangle: Triangle) -> Array:
     """Inverse of a triangle, its rows in the order of the columns."""
-    inverse = np.empty_like(found.root)
-    inverse[found.order] = scipy_linalg().solve_triangular(
-        found.root, np.eye(len(found.root)), check_finite=False
+    inverse = np.empty_like(triangle.root)
+    inverse[triangle.order] = scipy_linalg().solve_triangular(
+        triangle.root, np.eye(len(triangle.root)), check_finite=False
     )
     return inverse
 

@@ -240,12 +240,14 @@ def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
         return as_svg(figure, name, words)
 
 
-def slice_words(one: Slice) -> str:
+def slice_words(drawn: Slice) -> str:
     """A level of the error map for those who do not see it."""
-    known = one.values[np.isfinite(one.values)]
-    at = f"{one.name} level, z {_millimetres(one.level)} mm: " if one.level is not None else ""
+    known = drawn.values[np.isfinite(drawn.values)]
+    at = (
+        f"{drawn.name} level, z {_millimetres(drawn.level)} mm: " if drawn.level is not None else ""
+    )
     if not len(known):
         return f"{at}the error map is undetermined everywhere"
     told = f"{at}{number(1e6 * known.min(), 3)} to {number(1e6 * known.max(), 3)} µm"
-    left = 1.0 - len(known) / one.values.size
+    left = 1.0 - len(known) / drawn.values.size
     return told + (f"; undetermined at {number(100 * left, 3)} % of the points" if left else "")

@@ -52,15 +52,15 @@ SHORT = 0.25
 MOST_MARKS = 60
 
 
-def magnification_of(found: VolumetricErrors) -> float:
+def magnification_of(errors: VolumetricErrors) -> float:
     """A round factor that makes the largest error well visible in the volume."""
-    size = float(np.linalg.norm(np.ptp(found.points, axis=0)))
-    largest = float(found.resultant.max())
+    size = float(np.linalg.norm(np.ptp(errors.points, axis=0)))
+    largest = float(errors.resultant.max())
     return round_number(LARGEST * size / largest) if largest else 1.0
 
 
 def draw_grid(
-    found: VolumetricErrors,
+    errors: VolumetricErrors,
     diagonals: LengthErrors,
     counts: tuple[int, int, int],
     magnified: int | None,
@@ -70,10 +70,10 @@ def draw_grid(
 
     :raises OSError: the file cannot be written.
     """
-    factor = magnified or magnification_of(found)
+    factor = magnified or magnification_of(errors)
     view, away = projection(3)
-    nominal = found.points.reshape(*counts, 3)
-    moved = nominal + factor * found.systematic.reshape(*counts, 3)
+    nominal = errors.points.reshape(*counts, 3)
+    moved = nominal + factor * errors.systematic.reshape(*counts, 3)
     with drawing(430.0, WIDTH) as figure:
         axes = blank_axes(figure)
         edges, hidden = box_edges(nominal[0, 0, 0], nominal[-1, -1, -1], away)
@@ -161,21 +161,21 @@ def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
             )
 
 
-def draw_line(found: VolumetricErrors, path: Path) -> None:
+def draw_line(errors: VolumetricErrors, path: Path) -> None:
     """Write a picture of the errors along a line: components, resultant, and twice the random part
     about them.
 
     :raises OSError: the file cannot be written.
     """
-    start, end = 1e3 * found.points[0], 1e3 * found.points[-1]
+    start, end = 1e3 * errors.points[0], 1e3 * errors.points[-1]
     moving = np.flatnonzero(start != end)
     if len(moving) == 1:
         axis = int(moving[0])
-        name, positions = "xyz"[axis], 1e3 * found.points[:, axis]
+        name, positions = "xyz"[axis], 1e3 * errors.points[:, axis]
         where = ", ".join(f"{'xyz'[k]} = {start[k]:.6g} mm" for k in range(3) if k != axis)
         along = f"along {name} at {where}"
     else:
-        name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
+        name, positions = "distance", 1e3 * np.linalg.norm(errors.points - errors.points[0], axis=1)
         ends = [f"({', '.join(f'{value:.6g}' for value in point)})" for point in (start, end)]
         where = along = f"from {ends[0]} to {ends[1]} mm"
     with drawing(320.0, WIDTH) as figure:
@@ -185,50 +185,58 @@ def draw_line(found: VolumetricErrors, path: Path) -> None:
             _band(
                 axes,
                 positions,
-                1e6 * found.systematic[:, k],
-                1e6 * found.deviation[:, k],
+                1e6 * errors.systematic[:, k],
+                1e6 * errors.deviation[:, k],
                 k,
                 letter,
             )
         axes.plot(
             positions,
-            1e6 * found.resultant,
+            1e6 * errors.resultant,
             color=INK,
             linewidth=1.2,
             linestyle=DASHES[3],
             label="resultant",
         )
-        _band_in_legend(axes, bool(found.deviation.any()))
+        _band_in_legend(axes, bool(errors.deviation.any()))
         _finish(axes, f"{name}, mm", "error, µm")
-        worst = int(comparable(found.resultant).argmax())
+        worst = int(comparable(errors.resultant).argmax())
         told = (
-            f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
+            f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
             f" {positions[worst]:.6g} mm"
         )
         save(figure, path, f"Volumetric errors {along}: {told}")
 
 
-def draw_along(one: AlongAxis, path: Path) -> None:
+def draw_along(along: AlongAxis, path: Path) -> None:
     """Write a picture of a parametric error along its axis, as stated and at the reference point.
 
     :raises OSError: the file cannot be written.
     """
-    positions = 1e3 * one.positions
-    name, unit = one.error.name, micro(SHOWN["rad" if one.error.is_rotation else "m"])
+    positions = 1e3 * along.positions
+    name, unit = along.error.name, micro(SHOWN["rad" if along.error.is_rotation else "m"])
     with drawing(280.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
-        band = "" if one.values is None else f", range {number(1e6 * one.range)} {unit}"
+        band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
         axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left", pad=TITLE_PAD)
-        values = np.zeros(len(positions)) if one.values is None else 1e6 * one.values
-        deviation = np.zeros(len(positions)) if one.deviation is None else 1e6 * one.deviation
-        label = "random part alone" if one.values is None else "at the reference point"
+        values = np.zeros(len(positions)) if along.values is None else 1e6 * along.values
+        deviation = np.zeros(len(positions)) if along.deviation is None else 1e6 * along.deviation
+        label = "random part alone" if along.values is None else "at the reference point"
         _band(axes, positions, values, deviation, 0, label, mark=False)
-        if one.stated is not None and one.values is not None and (one.stated != one.values).any():
+        if (
+            along.stated is not None
+            and along.values is not None
+            and (along.stated != along.values).any()
+        ):
             axes.plot(
-                positions, 1e6 * one.stated, color=SERIES[1], linestyle=DASHES[1], label="as stated"
+                positions,
+                1e6 * along.stated,
+                color=SERIES[1],
+                linestyle=DASHES[1],
+                label="as stated",
             )
-        if one.measured is not None:
-            x, y = 1e3 * np.array(one.measured.positions), 1e6 * np.array(one.measured.values)
+        if along.measured is not None:
+            x, y = 1e3 * np.array(along.measured.positions), 1e6 * np.array(along.measured.values)
             axes.plot(
                 x,
                 y,

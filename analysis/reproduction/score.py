@@ -51,9 +51,9 @@ def scores(problem: str, certified: Mapping[str, Any], found: Any) -> list[Score
     return told
 
 
-def all_right(found: Sequence[Score]) -> bool:
+def all_right(scores: Sequence[Score]) -> bool:
     """Whether every rank and every count is right and nothing is without an answer."""
-    return all(score.digits > 0.0 for score in found)
+    return all(score.digits > 0.0 for score in scores)
 
 
 def _part(

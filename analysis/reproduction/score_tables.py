@@ -26,7 +26,7 @@ QUANTITIES = (
 HEADS = ("rank", "S^2", *QUANTITIES[2:])
 
 
-def score_lines(problems: Sequence[CertifiedProblem], found: Sequence[Score]) -> list[str]:
+def score_lines(problems: Sequence[CertifiedProblem], scores: Sequence[Score]) -> list[str]:
     """A line for each problem and part of it, with the digits of every quantity, and notes on what
     is amiss.
     """
@@ -35,7 +35,7 @@ def score_lines(problems: Sequence[CertifiedProblem], found: Sequence[Score]) ->
         for part in ("as drawn", "estimate"):
             own = {
                 score.quantity: score
-                for score in found
+                for score in scores
                 if (score.problem, score.part) == (problem.name, part)
             }
             if own:
@@ -43,7 +43,7 @@ def score_lines(problems: Sequence[CertifiedProblem], found: Sequence[Score]) ->
                 rows.append([problem.name, part, *cells])
     notes = [
         f"{score.problem}, {score.part}: {score.quantity}: {score.note}"
-        for score in found
+        for score in scores
         if not score.digits > 0.0 and score.note
     ]
     return [
@@ -64,7 +64,7 @@ def _cell(score: Score | None) -> str:
     return f"{score.digits:.1f}"
 
 
-def score_data(found: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
+def score_data(scores: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
     """Scores, and the answers that they are of."""
     return {
         "scores": [
@@ -75,7 +75,7 @@ def score_data(found: Sequence[Score], results: dict[str, Any]) -> dict[str, Any
                 "digits": None if math.isnan(score.digits) else score.digits,
                 "note": score.note,
             }
-            for score in found
+            for score in scores
         ],
         "problems": results,
     }

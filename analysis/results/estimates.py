@@ -255,11 +255,13 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     )
 
 
-def parameter_estimates(found: EstimatedFunctions, sigma: float) -> tuple[ParameterEstimate, ...]:
+def parameter_estimates(
+    functions: EstimatedFunctions, sigma: float
+) -> tuple[ParameterEstimate, ...]:
     """The estimates among functions, whose stated uncertainties `sigma` multiplies."""
-    uncertainties = found.uncertainties()
-    values = np.where(np.isnan(uncertainties), np.nan, found.values).tolist()
-    told = zip(found.functions, values, (sigma * uncertainties).tolist(), strict=True)
+    uncertainties = functions.uncertainties()
+    values = np.where(np.isnan(uncertainties), np.nan, functions.values).tolist()
+    told = zip(functions.functions, values, (sigma * uncertainties).tolist(), strict=True)
     return tuple(
         ParameterEstimate(one.name, value, uncertainty, one.unit, one.kind)
         for one, value, uncertainty in told

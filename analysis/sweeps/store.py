@@ -491,16 +491,16 @@ def block_tally(store: Store, key: str, block: int) -> Accumulator | None:
     return None if row is None or row[0] is None else _unpacked(row[0])
 
 
-def _packed(tally: Accumulator) -> bytes:
+def _packed(accumulator: Accumulator) -> bytes:
     """Sums as bytes: a line of JSON, then all arrays as 64-bit numbers."""
-    arrays = [tally.residual]
-    for one in tally.quantities:
+    arrays = [accumulator.residual]
+    for one in accumulator.quantities:
         arrays += [one.errors, one.squares, one.numbers, one.numbers_squared]
     head = {
-        "count": tally.count,
-        "failed": list(tally.failed),
-        "passes": tally.passes,
-        "rejected": tally.rejected,
+        "count": accumulator.count,
+        "failed": list(accumulator.failed),
+        "passes": accumulator.passes,
+        "rejected": accumulator.rejected,
         "sizes": [len(array) for array in arrays],
     }
     return json.dumps(head).encode() + b"\n" + np.concatenate(arrays).astype("<f8").tobytes()

@@ -211,15 +211,15 @@ def plan_figures(
     return figures, details
 
 
-def trial_figures(found: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str, float]:
+def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str, float]:
     """Figures of replicates."""
-    figures = {"trials": float(found.trials), "not_converged": float(len(found.failed))}
+    figures = {"trials": float(outcome.trials), "not_converged": float(len(outcome.failed))}
 
     def add(name: str, figure: MonteCarloEstimate) -> None:
         figures[name] = figure.value
         figures[f"{name}_standard_error"] = figure.error
 
-    for symbol, one in found.comparisons.items():
+    for symbol, one in outcome.comparisons.items():
         if symbol.rstrip("'").partition(" ")[0] not in record:
             continue
         name, unit = symbol_column(symbol), unit_suffix(one.unit)
@@ -230,8 +230,8 @@ def trial_figures(found: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str
         add(f"{name}_bias_ratio", one.bias)
         add(f"{name}_coverage_sigma_given", one.known)
         add(f"{name}_coverage_sigma_estimated", one.estimated)
-    add("sum_of_squares", found.misfit.mean)
-    figures["degrees_of_freedom"] = float(found.misfit.degrees_of_freedom)
+    add("sum_of_squares", outcome.misfit.mean)
+    figures["degrees_of_freedom"] = float(outcome.misfit.degrees_of_freedom)
     return figures
 
 

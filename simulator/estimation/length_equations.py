@@ -331,7 +331,7 @@ def _by_factor() -> Array:
     return derivative
 
 
-def _centres(design: Design, found: _Unknowns) -> Array:
+def _centres(design: Design, unknowns: _Unknowns) -> Array:
     centres = np.full(design.origins.shape, np.nan)
-    centres[found.pivots] = found.values[6 : 6 + 3 * len(found.pivots)].reshape(-1, 3)
+    centres[unknowns.pivots] = unknowns.values[6 : 6 + 3 * len(unknowns.pivots)].reshape(-1, 3)
     return centres

@@ -103,9 +103,9 @@ class Linearisation:
             size = size + MICROMETRE**2 * (as_drawn.balls**2).sum(axis=(1, 2))
         return blank(values, change, np.sqrt(size))
 
-    def covariance(self, one: LinearFunctions, other: LinearFunctions) -> Array:
+    def covariance(self, functions: LinearFunctions, other: LinearFunctions) -> Array:
         """Covariances (m, k) of functions with others, what is undetermined left out."""
-        first, second = self._root(one), self._root(other)
+        first, second = self._root(functions), self._root(other)
         width = min(first.shape[1], second.shape[1])
         return np.asarray(first[:, :width] @ second[:, :width].T)
 

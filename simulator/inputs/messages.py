@@ -54,8 +54,8 @@ class ExperimentError(Exception):
         return type(self), (self.messages,)
 
 
-def _by_number(found: re.Match[str]) -> str:
-    number = ord(found[0])
+def _by_number(match: re.Match[str]) -> str:
+    number = ord(match[0])
     return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
 
 

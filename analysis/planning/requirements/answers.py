@@ -63,64 +63,64 @@ class Reach(Result):
         return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
 
 
-def _lines(found: Reach) -> list[str]:
+def _lines(reach: Reach) -> list[str]:
     """The goal, what the design makes of it, and a row for each unknown."""
-    now = "met" if found.present.is_met else "not met"
+    now = "met" if reach.present.is_met else "not met"
     lines = [
-        f"{found.label}: {found.title}",
-        f"goal: {found.goal}",
-        f"as drawn: {now}; {found.present.words}",
+        f"{reach.label}: {reach.title}",
+        f"goal: {reach.goal}",
+        f"as drawn: {now}; {reach.present.words}",
     ]
-    if found.present.undetermined:
+    if reach.present.undetermined:
         lines.append(
-            f"rank deficiency {found.deficiency}: repair the design first; ballplate check tells"
+            f"rank deficiency {reach.deficiency}: repair the design first; ballplate check tells"
             " what is undetermined"
         )
     rows = [["changed alone", "as drawn", "needed", "what comes of it"]]
-    for one in found.answers:
+    for one in reach.answers:
         rows.append([one.title, one.present, _needed(one), _outcome(one)])
     lines += ["", *aligned(rows, [False] * 4)]
     notes = []
-    for one in found.answers:
+    for one in reach.answers:
         notes += [f"{one.name}: {one.beside}"] if one.beside else []
         notes += [f"{one.name}: {remark}" for remark in one.remarks]
     return lines + ["", *notes] if notes else lines
 
 
-def _needed(one: Answer) -> str:
-    if one.status == "found":
-        return f"at {'least' if one.grows else 'most'} {one.words}"
-    if one.status == "any":
-        return f"any, even {one.words}"
-    return "cannot be varied" if one.status == "varied" else "no value does"
+def _needed(answer: Answer) -> str:
+    if answer.status == "found":
+        return f"at {'least' if answer.grows else 'most'} {answer.words}"
+    if answer.status == "any":
+        return f"any, even {answer.words}"
+    return "cannot be varied" if answer.status == "varied" else "no value does"
 
 
-def _outcome(one: Answer) -> str:
-    if one.status == "none":
+def _outcome(answer: Answer) -> str:
+    if answer.status == "none":
         return (
-            f"even {one.words}: {one.outcome}"
-            if one.name != "size"
-            else f"best of those tried, {one.words}: {one.outcome}"
+            f"even {answer.words}: {answer.outcome}"
+            if answer.name != "size"
+            else f"best of those tried, {answer.words}: {answer.outcome}"
         )
-    return one.outcome
+    return answer.outcome
 
 
-def _data(found: Reach) -> dict[str, Any]:
+def _data(reach: Reach) -> dict[str, Any]:
     """The same as plain data, values in metres or as numbers."""
-    goal = found.goal
+    goal = reach.goal
     told: dict[str, Any] = {"kind": goal.kind}
     if goal.kind == "lengths":
         told["share"] = goal.share
     if goal.kind == "quantity":
         told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
     return {
-        "experiment": found.label,
-        "title": found.title,
+        "experiment": reach.label,
+        "title": reach.title,
         "goal": told,
-        "is_met": found.present.is_met,
-        "as_drawn": found.present.words,
-        "rank_deficiency": found.deficiency,
-        "undetermined": found.present.undetermined,
+        "is_met": reach.present.is_met,
+        "as_drawn": reach.present.words,
+        "rank_deficiency": reach.deficiency,
+        "undetermined": reach.present.undetermined,
         "answers": {
             one.name: {
                 "status": {"varied": "cannot be varied"}.get(one.status, one.status),
@@ -132,6 +132,6 @@ def _data(found: Reach) -> dict[str, Any]:
                 "next": one.beside or None,
                 "remarks": list(one.remarks),
             }
-            for one in found.answers
+            for one in reach.answers
         },
     }

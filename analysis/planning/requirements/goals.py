@@ -186,5 +186,9 @@ def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:
     return Judgement(within == len(ratios), ratios[worst], words, 0)
 
 
-def _open(found: Quantity) -> str:
-    return f", {found.undetermined} of {found.count} undetermined" if found.undetermined else ""
+def _open(quantity: Quantity) -> str:
+    return (
+        f", {quantity.undetermined} of {quantity.count} undetermined"
+        if quantity.undetermined
+        else ""
+    )

@@ -136,8 +136,8 @@ class _Searched:
 class _Trials:
     """Values of an unknown that were tried, each once."""
 
-    def __init__(self, one: Unknown, searched: _Searched) -> None:
-        self.one, self.searched = one, searched
+    def __init__(self, unknown: Unknown, searched: _Searched) -> None:
+        self.one, self.searched = unknown, searched
         self.known: dict[int, Tried] = {}
 
     def at(self, step: int) -> Tried:
@@ -180,17 +180,22 @@ class _Trials:
         return not self.known[step].refusal
 
 
-def _answer(one: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
-    if one.is_monotone and present.undetermined:
+def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
+    if unknown.is_monotone and present.undetermined:
         reason = (
             f"rank deficiency {deficiency} leaves {present.undetermined} undetermined whatever"
             " it is"
         )
         return Answer(
-            one.name, one.title, "undetermined", one.present, one.grows, remarks=(reason,)
+            unknown.name,
+            unknown.title,
+            "undetermined",
+            unknown.present,
+            unknown.grows,
+            remarks=(reason,),
         )
-    trials = _Trials(one, searched)
-    return _monotone(trials, deficiency) if one.is_monotone else _scanned(trials)
+    trials = _Trials(unknown, searched)
+    return _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
 
 
 def _told(
