@@ -123,8 +123,8 @@ class Reference:
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.
 
-    :raises NoReferenceError: a rank deficient design.
-    :raises TooWildError: readings without noise that cannot be fitted.
+    :raises RankDeficientError: a rank deficient design.
+    :raises DivergedError: readings without noise that cannot be fitted.
     :raises NoReadingError: errors of the true machine so large that no reading belongs to some
         location.
     """
