@@ -195,9 +195,9 @@ def _replaced(
         i = _index(node, step, above)
         below = _replaced(node.items[i], rest, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
+    named = format_path(above) or "the experiment"
     raise ValueError(
-        f"{format_path(above) or "the experiment"} is {describe(node.value)} and has nothing below"
-        " it; replace it as a whole"
+        f"{named} is {describe(node.value)} and has nothing below it; replace it as a whole"
     )
 
 
