@@ -14,13 +14,14 @@ from .interruption import signatures, written
 from .outputs import UsageError
 
 if TYPE_CHECKING:
-    from ..checking.check_files import CheckedDesign, CheckedFile
-    from ..requirements.goals import Goal
+    from ..planning.requirements.goals import Goal
+    from .check_files import CheckedDesign, CheckedFile
 
 FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "check",
@@ -84,9 +85,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         action="append",
         default=[],
         help=(
-            "goal that a design must also meet, as for ballplate reach: lengths (U6 within "
-            'target_accuracy), tasks, or a quantity such as "U6 average 0.5 um"; may be '
-            "repeated"
+            "goal that a design must also meet, as for ballplate reach: lengths (U6 within"
+            ' target_uncertainty), tasks, or a quantity such as "U6 average 0.5 um"; may be'
+            " repeated"
         ),
     )
     parser.add_argument(
@@ -110,10 +111,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..checking.check_files import Wanted, check_files
-    from ..checking.file_patterns import matching_files
-    from ..checking.junit import junit_report
+    from .check_files import Wanted, check_files
     from .common import print_json
+    from .file_patterns import matching_files
+    from .junit import junit_report
 
     goals = _goals(options)
     is_repairing = options.fix or options.diff
@@ -147,7 +148,7 @@ def run(options: Namespace) -> int:
 
 
 def _goals(options: Namespace) -> tuple[Goal, ...]:
-    from ..requirements.goals import GoalError, parse_goal
+    from ..planning.requirements.goals import GoalError, parse_goal
 
     if options.share is not None and "lengths" not in options.goal:
         raise UsageError("--share goes with --goal lengths; add it")
@@ -159,9 +160,9 @@ def _goals(options: Namespace) -> tuple[Goal, ...]:
 
 
 def _print(checked: CheckedFile, options: Namespace) -> None:
-    from ..checking.github import advice_lines, annotation_lines
     from .common import print_lines
     from .excerpts import print_errors
+    from .github import advice_lines, annotation_lines
 
     for doubt in checked.doubts:
         print(f"warning: {doubt}", file=sys.stderr)

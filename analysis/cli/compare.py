@@ -54,7 +54,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
-    """Add the choice of the pairs of balls whose distances a rival estimator uses."""
+    """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
     parser.add_argument(
         "--pairs",
         choices=PAIR_SETS,

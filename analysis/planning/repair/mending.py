@@ -25,7 +25,7 @@ from ballplate.simulator.inputs.yamltree import (
 from ...rank.verdict import Verdict
 from ...results.study import check
 from .changes import apply_all
-from .search import Repair, Repairs
+from .repair_search import Repair, Repairs
 from .written import edits, position_settings
 
 PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
