@@ -111,7 +111,7 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
     """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
-    count = np.bincount(place, minlength=len(design.position_names))
+    count = np.bincount(place, minlength=len(design.positions.names))
     end = np.cumsum(count)
     chosen = design.plate_readings[np.argsort(place, kind="stable")]
     lengths = _length_rows(drawn)
@@ -210,7 +210,7 @@ def calibration_rows(
         return _of_calibration(drawn, lay_out(replace(experiment, calibration=(item,), priors=())))
     named = [
         k
-        for k, length in enumerate(drawn.design.length_names)
+        for k, length in enumerate(drawn.design.unknown_lengths.names)
         if length.rpartition(": ")[0] == item.artefact
     ]
     if len(named) != 1 or isinstance(item, CoordinateCalibration):

@@ -11,6 +11,7 @@ from ..experiment.model import (
     Experiment,
     Prior,
     RadiusCalibration,
+    Volume,
 )
 from ..geometry.artefacts import BryanGaugeSettings
 from ..inputs.messages import ExperimentError
@@ -18,8 +19,18 @@ from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
 from ..numerics.rounding import comparable
-from .arrays import Design, pose_size
+from .arrays import Design
 from .length_standards import standard_lengths
+from .objects import (
+    Artefacts,
+    Balls,
+    Evaluation,
+    Flags,
+    Positions,
+    Probes,
+    Tasks,
+    pose_size,
+)
 from .observations import Coordinates, Distances, Priors, Readings
 
 # Evaluation points of an experiment that names none.
@@ -41,10 +52,7 @@ def lay_out(experiment: Experiment) -> Design:
     3
     """
     machine, d = experiment.machine, experiment.dimension
-    lower, upper = machine.volume.lower, machine.volume.upper
-    model = build_error_model(
-        experiment.error_model, tuple(map(float, lower)), tuple(map(float, upper))
-    )
+    model = build_error_model(experiment.error_model, *machine.volume.corners)
     artefacts = list(experiment.artefacts)
     layouts = [experiment.layouts[name] for name in artefacts]
     sizes = [len(layout.names) for layout in layouts]
@@ -58,6 +66,9 @@ def lay_out(experiment: Experiment) -> Design:
             )
             balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
     is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
+    is_gauge = np.array(
+        [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+    )
     probe_index = {name: k for k, name in enumerate(experiment.probes)}
     places = experiment.positions
     readings = _readings(experiment, first_ball, probe_index)
@@ -65,67 +76,53 @@ def lay_out(experiment: Experiment) -> Design:
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
     distances = _distances(experiment, first_ball)
-    lengths, length_names, drawn = standard_lengths(
+    lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
     coordinates = _coordinates(experiment, first_ball)
     ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
     points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
-        points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
+        points = random_points(machine.volume, DEFAULT_POINTS, DEFAULT_SEED)
     held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
-    for k, place in enumerate(places):
-        if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
-            # A pivot has a place; how the bar turns about it is what the readings say.
-            held[k] = np.arange(pose_size(d)) >= d
+    # A pivot has a place; how the bar turns about it is what the readings say.
+    held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     return Design(
-        model=model,
-        lower=lower,
-        upper=upper,
-        repeatability=machine.repeatability,
-        probe_names=tuple(experiment.probes),
-        probes=np.array([experiment.probes[name] for name in experiment.probes]),
-        artefact_names=tuple(artefacts),
-        is_plate=is_plate,
-        ball_names=tuple(name for layout in layouts for name in layout.names),
-        ball_artefact=ball_artefact,
-        balls=balls,
-        position_names=tuple(place.name for place in places),
-        position_artefact=position_artefact,
-        rotations=rotations,
-        origins=origins,
-        held=held,
-        readings=readings,
-        distances=distances,
-        coordinates=coordinates,
-        lengths=lengths,
-        points=points,
-        point_probe=probe_index[experiment.evaluation.probe],
-        priors=_priors(experiment, held, len(model.parameters)),
-        free_offsets=_free_offsets(experiment),
-        is_gauge=np.array(
-            [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+        model,
+        machine,
+        Probes(
+            tuple(experiment.probes), np.array(list(experiment.probes.values())), _free(experiment)
         ),
-        length_names=length_names,
-        drawn_lengths=drawn,
-        task_names=tuple(task.name for task in tasks),
-        task_points=np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
-        task_probes=np.array(
-            [[probe_index[name] for name in task.probes] for task in tasks], np.int64
-        ).reshape(-1, 2),
-        task_targets=tuple(task.target for task in tasks),
+        Artefacts(tuple(artefacts), is_plate, is_gauge),
+        Balls(tuple(name for layout in layouts for name in layout.names), ball_artefact, balls),
+        Positions(
+            tuple(place.name for place in places), position_artefact, rotations, origins, held
+        ),
+        readings,
+        distances,
+        coordinates,
+        lengths,
+        unknown,
+        Evaluation(points, probe_index[experiment.evaluation.probe]),
+        Tasks(
+            tuple(task.name for task in tasks),
+            np.array([task.points for task in tasks], float).reshape(len(tasks), 2, d),
+            np.array(
+                [[probe_index[name] for name in task.probes] for task in tasks], np.int64
+            ).reshape(-1, 2),
+            tuple(task.target for task in tasks),
+        ),
+        _priors(experiment, held, len(model.parameters)),
     )
 
 
-def _free_offsets(experiment: Experiment) -> NDArray[np.bool_] | None:
+def _free(experiment: Experiment) -> Flags:
     """Which probe offsets are parameters (l, d)."""
-    if not experiment.offset_uncertainties:
-        return None
     free = [name in experiment.offset_uncertainties for name in experiment.probes]
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
-def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) -> Priors:
+def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
 
     :raises ExperimentError: a prior is about a pose parameter that is held.
@@ -162,10 +159,10 @@ def _priors(experiment: Experiment, held: NDArray[np.bool_], parameters: int) ->
     )
 
 
-def random_points(lower: Array, upper: Array, count: int, seed: int) -> Array:
+def random_points(volume: Volume, count: int, seed: int) -> Array:
     """Points (count, d) drawn evenly from the volume."""
     generator = np.random.default_rng(np.random.SeedSequence(seed))
-    return np.asarray(lower + (upper - lower) * generator.random((count, len(lower))))
+    return np.asarray(volume.lower + volume.size * generator.random((count, len(volume.lower))))
 
 
 def _readings(
@@ -237,7 +234,7 @@ def _held(
     rotations: Array,
     coordinates: Coordinates,
     d: int,
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Which pose parameters are held (k, pose size).
 
     An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it.
@@ -312,7 +309,7 @@ def _null_space(rows: Array) -> Array:
     return np.asarray(directions[rank:].T)
 
 
-def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+def _pivots(motions: Array, already: Flags | None = None) -> Flags:
     """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first,
     then largest.
     """

@@ -224,7 +224,7 @@ def _derivatives(at: Linearisation, state: State, functions: Functions) -> Linea
         by_balls = np.zeros((n, d, 0))
     else:
         by_shared = np.zeros((n, d, len(at.layout)))
-        by_balls = np.zeros((n, d, len(design.balls), d))
+        by_balls = np.zeros((n, d, len(design.balls.places), d))
         by_balls[np.arange(n)[:, None], np.arange(d), places.index[:, None], np.arange(d)] = 1.0
     by_all = np.concatenate([by_shared, by_balls.reshape(n, d, -1)], axis=2)
     if isinstance(functions, Coordinates):
