@@ -12,7 +12,7 @@ from typing import Any, TextIO
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Functions, function_name
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.numerics.rounding import comparable

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers

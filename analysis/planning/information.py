@@ -555,13 +555,8 @@ def _unplaced(
         # Of balls that no combination moves there is nothing to hold, and rounding must not be
         # taken for it.
         by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
-        lengths = [
-            k
-            for k, length in enumerate(design.unknown_lengths.names)
-            if length.rpartition(": ")[0] == name
-        ]
         by_length = np.eye(drawn.shared)[
-            [drawn.layout.lengths.start - drawn.own.start + k for k in lengths]
+            drawn.layout.lengths.start - drawn.own.start + design.unknown_lengths.of(number)
         ]
         rows = np.concatenate(
             [

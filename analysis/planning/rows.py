@@ -208,11 +208,7 @@ def calibration_rows(
         item, RadiusCalibration
     ):
         return _of_calibration(drawn, lay_out(replace(experiment, calibration=(item,), priors=())))
-    named = [
-        k
-        for k, length in enumerate(drawn.design.unknown_lengths.names)
-        if length.rpartition(": ")[0] == item.artefact
-    ]
+    named = drawn.design.unknown_lengths.of(drawn.design.artefacts.names.index(item.artefact))
     if len(named) != 1 or isinstance(item, CoordinateCalibration):
         text = (
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.objects import pose_size
 from ballplate.simulator.estimation.functions import Balls, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.observations import rotation_sensitivity
 from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.threads import single_threaded

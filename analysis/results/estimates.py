@@ -13,8 +13,11 @@ import numpy as np
 from ballplate.simulator.estimation.corrections import corrected_points, correction_rows
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.parameters import AXIS_NAMES, pose_parameter_names
-from ballplate.simulator.geometry.motions import vector_from_rotation
+from ballplate.simulator.geometry.motions import (
+    AXIS_NAMES,
+    pose_parameter_names,
+    vector_from_rotation,
+)
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 from ballplate.simulator.numerics.threads import single_threaded

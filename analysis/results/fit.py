@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array

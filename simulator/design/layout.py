@@ -14,6 +14,7 @@ from ..experiment.model import (
     Volume,
 )
 from ..geometry.artefacts import BryanGaugeSettings
+from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
@@ -21,16 +22,7 @@ from ..machines.settings import build_error_model
 from ..numerics.rounding import comparable
 from .arrays import Design
 from .length_standards import standard_lengths
-from .objects import (
-    Artefacts,
-    Balls,
-    Evaluation,
-    Flags,
-    Positions,
-    Probes,
-    Tasks,
-    pose_size,
-)
+from .objects import Artefacts, Balls, Evaluation, Flags, Positions, Probes, Tasks
 from .observations import Coordinates, Distances, Priors, Readings
 
 # Evaluation points of an experiment that names none.

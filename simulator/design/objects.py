@@ -15,11 +15,6 @@ from ..machines.protocol import Array, Integers
 Flags = NDArray[np.bool_]
 
 
-def pose_size(dimension: int) -> int:
-    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
-    return dimension * (dimension + 1) // 2
-
-
 @dataclass(frozen=True)
 class Probes:
     """Probes with their `offsets` (l, d); `free` (l, d) marks the offsets that are parameters."""
@@ -85,6 +80,10 @@ class UnknownLengths:
     names: tuple[str, ...]
     artefact: Integers
     drawn: Array
+
+    def of(self, artefact: int) -> Integers:
+        """Indices of the unknown lengths of an artefact."""
+        return np.flatnonzero(self.artefact == artefact)
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..design.arrays import Design, State, locations, reading_uncertainties
-from ..design.objects import pose_size
 from ..design.observations import Readings
-from ..geometry.motions import vector_from_rotation, vector_rate
+from ..geometry.motions import pose_size, vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel, Integers
 from .parameters import SharedLayout
 

@@ -1,4 +1,6 @@
-"""Small rotations as vectors, and the rigid motion that fits two sets of points best."""
+"""Rigid motions: their parameters, small rotations as vectors, and the motion that fits two sets of
+points best.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+AXIS_NAMES = ("x", "y", "z")
+
+
+def pose_size(dimension: int) -> int:
+    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
+    return dimension * (dimension + 1) // 2
+
+
+def pose_parameter_names(dimension: int) -> tuple[str, ...]:
+    """Names of a pose's parameters in order.
+
+    >>> pose_parameter_names(2)
+    ('origin x', 'origin y', 'rotation z')
+    """
+    axes = AXIS_NAMES[:dimension]
+    turns = axes if dimension == 3 else ("z",)
+    return tuple(f"origin {axis}" for axis in axes) + tuple(f"rotation {axis}" for axis in turns)
 
 
 def rotation_from_vector(vector: Array) -> Array:
