@@ -261,9 +261,8 @@ def compare_estimators(
         _refuse_unknown_lengths(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
-    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []

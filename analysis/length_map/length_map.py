@@ -183,12 +183,8 @@ def _tiles(design: Design, points: Array, settings: Settings) -> tuple[int, Iter
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:
     """Points (n, d) of a grid over the whole volume, the last axis changing fastest."""
-    sides = [
-        np.linspace(*ends)
-        for ends in zip(
-            design.machine.volume.lower, design.machine.volume.upper, counts, strict=True
-        )
-    ]
+    ends = zip(*design.machine.volume.corners, counts, strict=True)
+    sides = [np.linspace(*one) for one in ends]
     return np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, design.dimension)
 
 

@@ -82,11 +82,7 @@ def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
     for number, (candidate, base) in enumerate(zip(drawn, found.values(), strict=True)):
         item = _position(candidate)
         own_readings = design.readings.select(np.flatnonzero(design.readings.position == number))
-        first = int(
-            np.flatnonzero(
-                design.balls.artefact == list(design.artefacts.names).index(item.artefact)
-            )[0]
-        )
+        first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
         taken = tuple(_groups(own_readings, first, design.probes.names, experiment, item))
         result.append(_set_up(experiment, candidate, base, taken, candidate.name == name))
     return tuple(result)

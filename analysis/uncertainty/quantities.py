@@ -54,16 +54,16 @@ class QuantityKind:
 
 def evaluation_points(design: Design) -> Points:
     """The evaluation points as places, with the probe that they are evaluated with."""
-    return Points(
-        design.evaluation.points, np.full(len(design.evaluation.points), design.evaluation.probe)
-    )
+    given = design.evaluation
+    return Points(given.points, np.full(len(given.points), given.probe))
 
 
 def task_distances(design: Design) -> Distances:
     """The lengths of the measuring tasks."""
-    ends = Points(design.tasks.points.reshape(-1, design.dimension), design.tasks.probes.ravel())
-    pairs = np.arange(2 * len(design.tasks.names)).reshape(-1, 2)
-    return Distances(ends, pairs, design.tasks.names, design.tasks.targets)
+    given = design.tasks
+    ends = Points(given.points.reshape(-1, design.dimension), given.probes.ravel())
+    pairs = np.arange(2 * len(given.names)).reshape(-1, 2)
+    return Distances(ends, pairs, given.names, given.targets)
 
 
 def _shared(layout: SharedLayout, columns: slice) -> tuple[Functions, ...]:
@@ -92,8 +92,7 @@ def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
 
 def _plates(design: Design) -> tuple[Balls, ...]:
     """The balls of each plate."""
-    plates = design.artefacts.plates
-    return tuple(Balls(design.balls.of(plate)) for plate in plates)
+    return tuple(Balls(design.balls.of(plate)) for plate in design.artefacts.plates)
 
 
 QUANTITIES: dict[str, QuantityKind] = {

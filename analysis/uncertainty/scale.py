@@ -193,11 +193,10 @@ def can_stretch(design: Design, state: State) -> bool:
 
 
 def _points(design: Design) -> Array:
-    if len(design.evaluation.points) > 1 and np.ptp(design.evaluation.points, axis=0).max() > 0:
-        return design.evaluation.points
-    return np.array(
-        list(product(*zip(design.machine.volume.lower, design.machine.volume.upper, strict=True)))
-    )
+    points = design.evaluation.points
+    if len(points) > 1 and np.ptp(points, axis=0).max() > 0:
+        return points
+    return np.array(list(product(*zip(*design.machine.volume.corners, strict=True))))
 
 
 def _linearised(experiment: Experiment) -> Linearisation | None:

@@ -52,12 +52,10 @@ def lay_out(experiment: Experiment) -> Design:
     balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
     for item in experiment.calibration:
         if isinstance(item, RadiusCalibration):
-            own = slice(
-                first_ball[item.artefact],
-                first_ball[item.artefact] + len(experiment.layouts[item.artefact].names),
-            )
+            first = first_ball[item.artefact]
+            own = slice(first, first + len(experiment.layouts[item.artefact].names))
             balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
-    is_plate = np.array([experiment.artefacts[name].role == "plate" for name in artefacts])
+    is_plate = np.array([one.role == "plate" for one in experiment.artefacts.values()])
     is_gauge = np.array(
         [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
     )

@@ -162,10 +162,9 @@ def far_outside(x: Array, design: Design) -> NDArray[np.bool_]:
     """Which co-ordinates (n, d) lie outside the volume by more than its own size: they are in
     another unit.
     """
-    size = float(design.machine.volume.size.max())
-    return np.asarray(
-        (x < design.machine.volume.lower - size) | (x > design.machine.volume.upper + size)
-    )
+    volume = design.machine.volume
+    size = float(volume.size.max())
+    return np.asarray((x < volume.lower - size) | (x > volume.upper + size))
 
 
 def _refuse_far_outside(rows: tuple[Row, ...], x: Array, design: Design) -> None:
