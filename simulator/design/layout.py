@@ -70,11 +70,15 @@ def lay_out(experiment: Experiment) -> Design:
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
     coordinates = _coordinates(experiment, first_ball)
-    ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
     points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
         points = random_points(machine.volume, DEFAULT_POINTS, DEFAULT_SEED)
-    held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
+    laid = Balls(
+        tuple(name for layout in layouts for name in layout.names),
+        np.repeat(np.arange(len(artefacts)), sizes),
+        balls,
+    )
+    held = _held(laid, position_artefact, rotations, coordinates)
     # A pivot has a place; how the bar turns about it is what the readings say.
     held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
     return Design(
@@ -84,7 +88,7 @@ def lay_out(experiment: Experiment) -> Design:
             tuple(experiment.probes), np.array(list(experiment.probes.values())), _free(experiment)
         ),
         Artefacts(tuple(artefacts), is_plate, is_gauge),
-        Balls(tuple(name for layout in layouts for name in layout.names), ball_artefact, balls),
+        laid,
         Positions(
             tuple(place.name for place in places), position_artefact, rotations, origins, held
         ),
@@ -218,12 +222,10 @@ def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
 
 
 def _held(
-    balls: Array,
-    ball_artefact: NDArray[np.int64],
+    balls: Balls,
     position_artefact: NDArray[np.int64],
     rotations: Array,
     coordinates: Coordinates,
-    d: int,
 ) -> Flags:
     """Which pose parameters are held (k, pose size).
 
@@ -232,16 +234,20 @@ def _held(
     distances are known, none with co-ordinates of three balls. Balls on one line leave the turn
     about it open in every pose, a single ball every turn.
     """
+    d = balls.places.shape[1]
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
-        own = np.flatnonzero(ball_artefact == artefact)
-        idle = _idle_turns(balls[own])
+        own = balls.of(artefact)
+        places = balls.places[own]
+        idle = _idle_turns(places)
         for k in positions:
             held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
         chosen = np.isin(coordinates.ball, own)
         fixed = _motion_of_coordinates(
-            balls[coordinates.ball[chosen]] - balls[own].mean(axis=0), coordinates.axis[chosen], d
+            balls.places[coordinates.ball[chosen]] - places.mean(axis=0),
+            coordinates.axis[chosen],
+            d,
         )
         # Turns that no reading shows are dealt with already, in every position.
         free = _null_space(np.concatenate([fixed, idle.T]))

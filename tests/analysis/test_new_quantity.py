@@ -27,7 +27,7 @@ ENTRY = """\
         lambda design, layout: (
             Distances(
                 Points(
-                    np.stack(np.meshgrid(*zip(design.lower, design.upper)), axis=-1).reshape(-1, design.dimension),
+                    np.stack(np.meshgrid(*zip(*design.machine.volume.corners)), axis=-1).reshape(-1, design.dimension),
                     np.full(2**design.dimension, design.point_probe),
                 ),
                 np.array([(i, 2**design.dimension - 1 - i) for i in range(2 ** (design.dimension - 1))]),
