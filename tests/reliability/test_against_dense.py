@@ -292,7 +292,7 @@ def test_patterns_are_what_biases_change_in_the_residuals(text: str, tmp_path: P
         sides = []
         for sign in (1.0, -1.0):
             biased, x = changed(design, given, k, 1e-6 * sign)
-            sides.append(whitened_residuals(biased, layout, state, x))
+            sides.append(whitened_residuals(biased, layout, nominal_state(biased), x))
         expected = (sides[0] - sides[1]) / 2e-6
         np.testing.assert_allclose(
             matrix[:, k], expected, atol=2e-5 * np.abs(expected).max(), err_msg=given.kind[k]
@@ -341,7 +341,7 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_pa
         if given.kind[k] == "scale" and given.design.artefacts.names[given.subject[k]] != "plate":
             continue
         biased, x = changed(design, given, k, size)
-        found = gauss_newton(biased, x, start)
+        found = gauss_newton(biased, x, nominal_state(biased))
         assert found.status == "converged"
         for symbol, was, now in zip(
             ("U5", "U6"), before, distances_of(biased, found.state), strict=True
