@@ -28,7 +28,7 @@ ENTRY = """\
             Distances(
                 Points(
                     np.stack(np.meshgrid(*zip(*design.machine.volume.corners)), axis=-1).reshape(-1, design.dimension),
-                    np.full(2**design.dimension, design.point_probe),
+                    np.full(2**design.dimension, design.evaluation.probe),
                 ),
                 np.array([(i, 2**design.dimension - 1 - i) for i in range(2 ** (design.dimension - 1))]),
                 tuple(f"diagonal {i + 1}" for i in range(2 ** (design.dimension - 1))),
