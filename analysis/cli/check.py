@@ -115,6 +115,7 @@ def run(options: Namespace) -> int:
     from .common import print_json
     from .file_patterns import matching_files
     from .junit import junit_report
+    from .progress import progress
 
     goals = _goals(options)
     is_repairing = options.fix or options.diff
@@ -127,14 +128,16 @@ def run(options: Namespace) -> int:
     if options.fix and not options.diff:
         options.interruption.kept = partial(written, signatures(paths))
     files, statuses = [], [AS_EXPECTED]
-    for checked in check_files(paths, options.variant, wanted):
-        if is_repairing:
-            from .mending import with_repairs
+    with progress(options) as shown:
+        for checked in check_files(paths, options.variant, wanted, shown.show):
+            shown.step_aside()
+            if is_repairing:
+                from .mending import with_repairs
 
-            checked, status = with_repairs(checked, wanted, options)
-            statuses.append(status)
-        files.append(checked)
-        _print(checked, options)
+                checked, status = with_repairs(checked, wanted, options)
+                statuses.append(status)
+            files.append(checked)
+            _print(checked, options)
     if options.format == "junit":
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
@@ -83,15 +84,20 @@ class CheckedFile:
 
 
 def check_files(
-    files: Sequence[Path], variants: Sequence[str] = (), wanted: Wanted = Wanted()
+    files: Sequence[Path],
+    variants: Sequence[str] = (),
+    wanted: Wanted = Wanted(),
+    report: Report = unreported,
 ) -> Iterator[CheckedFile]:
     """Check all files, one after the other; with `variants` only designs of these names.
 
-    A variant that no file has is told last, as the error of all files together.
+    A variant that no file has is told last, as the error of all files together. What is reported
+    are files, the designs of a single file, or the search for repairs of a single design.
     """
     found: set[str | None] = set()
     complete = True
-    for path in files:
+    within = report if len(files) == 1 else unreported
+    for path in counted(files, "files", len(files), report) if len(files) > 1 else files:
         try:
             experiments = load(path, with_modules=wanted.with_modules)
             found |= {experiment.name for experiment in experiments}
@@ -99,7 +105,10 @@ def check_files(
             # What a plan may choose from is loaded where it is asked for only.
             pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
             doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
-            judged = tuple(_checked(one, pools.get(one.name), wanted) for one in chosen)
+            is_single = len(chosen) == 1
+            designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
+            of_search = within if is_single else unreported
+            judged = tuple(_checked(one, pools.get(one.name), wanted, of_search) for one in designs)
             yield CheckedFile(str(path), judged, (), doubts)
         except ExperimentError as error:
             complete = False
@@ -110,14 +119,16 @@ def check_files(
         yield CheckedFile(messages[0].file, (), messages)
 
 
-def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wanted) -> CheckedDesign:
+def _checked(
+    experiment: Experiment, with_pool: Experiment | None, wanted: Wanted, report: Report
+) -> CheckedDesign:
     plan = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
         from ..planning.repair.repair_search import repairs
         from ..planning.repair.scale import scale_certificate
 
-        found = repairs(with_pool)
+        found = repairs(with_pool, report=report)
         certificate = scale_certificate(with_pool, plan.scale)
     goals, missed = _goals(experiment, wanted.goals)
     if wanted.nothing_weak and plan.verdict.weak:
