@@ -230,12 +230,7 @@ def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget
         raise _impossible(experiment, "pool", f"no position can be read with {budget}; allow more")
     for name in {position.artefact for position in positions}:
         own = [position for position in positions if position.artefact == name]
-        read = {
-            int(ball)
-            for position in own
-            for group in position.readings
-            for ball in group.ball_indices
-        }
+        read = {ball for position in own for ball in position.balls.tolist()}
         unread = [ball for k, ball in enumerate(experiment.layouts[name].names) if k not in read]
         if unread and experiment.artefacts[name].role == "plate":
             balls = listing(f'"{ball}"' for ball in unread)

@@ -190,11 +190,8 @@ def _set_up(
         else _with_readings(candidate, (*taken, *missing))
     )
     rest = _with_readings(candidate, missing)
-    probes = {probe for group in missing for probe in group.probes}
-    seconds = (
-        rest.readings * candidate.reading_seconds
-        + (len(probes) - 1) * experiment.pool.changes.probe
-    )
+    changes = (len(_position(rest).probes) - 1) * experiment.pool.changes.probe
+    seconds = rest.readings * candidate.reading_seconds + changes
     rest = replace(rest, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
     return SetUp(base, read, whole, rest, is_last)
 

@@ -42,9 +42,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     if to_left:
         points[:, 0] = width - points[:, 0]
     points = np.column_stack([left + points[:, 0], top + height - points[:, 1]])
-    read = np.zeros(len(points), bool)
-    for group in position.readings:
-        read[group.ball_indices] = True
+    read = np.isin(np.arange(len(points)), position.balls)
     shown = (
         np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
     )

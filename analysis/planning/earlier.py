@@ -67,13 +67,9 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
 
 def _now(offered: Offer, k: int, wanted: Position) -> int:
     for one in offered.interrupted:
-        if one.part == k and _readings(wanted) > offered.candidates[k].readings:
+        if one.part == k and wanted.count > offered.candidates[k].readings:
             return one.again if one.rest is None else one.rest
     return k
-
-
-def _readings(position: Position) -> int:
-    return sum(len(group.probes) * len(group.balls) * group.repeats for group in position.readings)
 
 
 def _same_place(one: Position, other: object) -> bool:

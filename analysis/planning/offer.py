@@ -207,12 +207,7 @@ def open_directions(offered: Offer, information: Information, chosen: Collection
 
 
 def _balls(candidate: Candidate) -> set[int]:
-    item = candidate.item
-    return (
-        {ball for group in item.readings for ball in group.ball_indices.tolist()}
-        if isinstance(item, Position)
-        else set()
-    )
+    return set(candidate.item.balls.tolist()) if isinstance(candidate.item, Position) else set()
 
 
 def _now(k: int, replaced: dict[int, tuple[int, ...]]) -> tuple[int, ...]:

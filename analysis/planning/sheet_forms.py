@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -78,19 +77,8 @@ def sheet_lines(sheet: RunSheet) -> list[str]:
     """The run sheet as lines of text."""
     rows = [["", "start", "min", "position", "probes", "balls", "readings"]]
     for number, step in enumerate(sheet.steps, 1):
-        start = "done" if step.done else _clock(step.start)
-        minutes = "" if step.done else f"{(step.seconds + step.change_seconds) / 60.0:.0f}"
-        rows.append(
-            [
-                str(number),
-                start,
-                minutes,
-                step.name,
-                ", ".join(step.probes),
-                step.balls,
-                str(step.readings),
-            ]
-        )
+        cells = [step.name, ", ".join(step.probes), step.balls, str(step.readings)]
+        rows.append([str(number), *_times(step), *cells])
     lines = aligned(rows, [True, True, True, False, False, False, True]) if sheet.steps else []
     lines += [
         f"{number} {step.name}: {_words(step)}"
@@ -109,7 +97,23 @@ def sheet_csv(sheet: RunSheet) -> str:
     writer = CsvWriter(out)
     writer.writerow(COLUMNS)
     for number, step in enumerate(sheet.steps, 1):
-        writer.writerow(_row(number, step))
+        writer.writerow(
+            (
+                number,
+                "yes" if step.done else "no",
+                step.name,
+                step.artefact,
+                step.plane,
+                step.place,
+                " ".join(step.probes),
+                step.balls,
+                step.readings,
+                step.change,
+                f"{step.change_seconds / 60.0:.10g}",
+                f"{step.seconds / 60.0:.10g}",
+                "" if step.done else f"{step.start / 60.0:.10g}",
+            )
+        )
     for one in sheet.calibration:
         minutes = f"{one.seconds / 60.0:.10g}"
         writer.writerow(
@@ -128,8 +132,7 @@ def sheet_markdown(sheet: RunSheet, title: str) -> str:
     for number, step in enumerate(sheet.steps, 1):
         cells = [
             str(number),
-            "done" if step.done else _clock(step.start),
-            "" if step.done else f"{(step.seconds + step.change_seconds) / 60.0:.0f}",
+            *_times(step),
             step.name,
             step.place,
             ", ".join(step.probes),
@@ -203,11 +206,7 @@ def _step(number: int, step: Step, experiment: Experiment) -> str:
     change = (
         f'<p class="change">First change {_text(step.change)} ({_price(step.change_seconds)})</p>'
     )
-    times = (
-        "done"
-        if step.done
-        else f"{_clock(step.start)}<br>{(step.seconds + step.change_seconds) / 60.0:.0f} min"
-    )
+    times = "done" if step.done else "{}<br>{} min".format(*_times(step))
     rows = [
         ("artefact", _text(step.artefact)),
         ("set up", _text(step.place)),
@@ -228,32 +227,17 @@ def _step(number: int, step: Step, experiment: Experiment) -> str:
     )
 
 
-def _row(number: int, step: Step) -> Sequence[object]:
-    return (
-        number,
-        "yes" if step.done else "no",
-        step.name,
-        step.artefact,
-        step.plane,
-        step.place,
-        " ".join(step.probes),
-        step.balls,
-        step.readings,
-        step.change,
-        f"{step.change_seconds / 60.0:.10g}",
-        f"{step.seconds / 60.0:.10g}",
-        "" if step.done else f"{step.start / 60.0:.10g}",
-    )
-
-
 def _words(step: Step) -> str:
     change = f"change {step.change} ({_price(step.change_seconds)}); " if step.change else ""
     return f"{change}{step.place}"
 
 
-def _clock(seconds: float) -> str:
-    minutes = round(seconds / 60.0)
-    return f"{minutes // 60}:{minutes % 60:02d}"
+def _times(step: Step) -> tuple[str, str]:
+    """When a step begins, in hours and minutes, and how many minutes it takes."""
+    if step.done:
+        return "done", ""
+    hours, minutes = divmod(round(step.start / 60.0), 60)
+    return f"{hours}:{minutes:02d}", f"{(step.seconds + step.change_seconds) / 60.0:.0f}"
 
 
 def _price(seconds: float) -> str:

@@ -266,11 +266,8 @@ def _candidate(
         _or(getattr(own, key, None), _or(getattr(times, key), default))
         for key, default in (("set_up", SET_UP), ("reading", READING))
     )
-    readings = sum(len(one.probes) * len(one.balls) * one.repeats for one in position.readings)
-    probes = {probe for one in position.readings for probe in one.probes}
-    seconds = (
-        set_up + readings * reading + (len(probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
-    )
+    changes = (len(position.probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
+    seconds = set_up + position.count * reading + changes
     across = "" if plane is None or references.dimension == 2 else plane
     stated = {key: value for key, value in stated.items() if key != "times"}
     return Candidate(position.name, position, seconds, across, group, drawn, stated, reading)
@@ -468,7 +465,7 @@ def _selected(
     if of.artefact is not None:
         tests.append(lambda one: one.item.artefact == of.artefact)
     if of.probe is not None:
-        tests.append(lambda one: of.probe in _probes_of(one))
+        tests.append(lambda one: isinstance(one.item, Position) and of.probe in one.item.probes)
     return [i for i, one in enumerate(found) if all(test(one) for test in tests)]
 
 
@@ -481,9 +478,3 @@ def _group_names(root: Any) -> list[str]:
             name = f"candidates[{i}]"
         names += [name] if name is not None else []
     return names
-
-
-def _probes_of(candidate: Candidate) -> set[str]:
-    if not isinstance(candidate.item, Position):
-        return set()
-    return {probe for group in candidate.item.readings for probe in group.probes}

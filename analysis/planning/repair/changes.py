@@ -173,20 +173,6 @@ def _named(experiment: Experiment, name: str) -> Position:
     return next(one for one in experiment.positions if one.name == name)
 
 
-def probes_of(position: Position) -> tuple[str, ...]:
-    """Names of all probes that are used in a position."""
-    return tuple(dict.fromkeys(name for group in position.readings for name in group.probes))
-
-
-def count_readings(positions: Sequence[Position]) -> int:
-    """Readings of balls, every repeat counted."""
-    return sum(
-        len(group.probes) * len(group.balls) * group.repeats
-        for place in positions
-        for group in place.readings
-    )
-
-
 def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
     """Name of the set of pairs that indices (m, 2) are, None if they are none."""
     wanted = {frozenset(pair) for pair in chosen.tolist()}

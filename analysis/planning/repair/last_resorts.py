@@ -24,7 +24,6 @@ from ballplate.simulator.machines.settings import (
 from .changes import (
     Change,
     Kind,
-    count_readings,
     with_artefact,
 )
 
@@ -54,7 +53,8 @@ def more_balls(experiment: Experiment) -> Iterator[Change]:
             changed = with_artefact(experiment, name, new)
             if changed is not None:
                 cost = float(
-                    count_readings(changed.positions) - count_readings(experiment.positions)
+                    sum(one.count for one in changed.positions)
+                    - sum(one.count for one in experiment.positions)
                 )
                 apply = partial(_with_artefact, name=name, settings=new)
                 yield Change(
