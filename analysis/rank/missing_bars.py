@@ -48,13 +48,20 @@ def reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ..
     return tuple(found)
 
 
+def point_changes(design: Design, layout: SharedLayout, roots: Array) -> Array:
+    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
+    metres.
+    """
+    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
+    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
+    return without_rigid_motion(design.points, jacobian @ roots[layout.model])
+
+
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     """Strains (products, k), orthonormal columns, that some open change of the machine's errors
     amounts to.
     """
-    offsets = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    jacobian = design.model.jacobian(design.points, np.zeros(len(design.model.parameters)), offsets)
-    fields = without_rigid_motion(design.points, jacobian @ open_[layout.model])
+    fields = point_changes(design, layout, open_)
     basis = np.stack(
         [design.points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
         2,

@@ -15,7 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .kinematic import cross_matrices, rotation_and_derivatives
+from ..geometry.motions import cross_matrices
+from .kinematic import rotation_and_derivatives
 from .protocol import Array, Line, Parameter, Reported, Unit
 from .terms import Terms
 

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..geometry.motions import cross_matrices
 from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial
 from .protocol import Array, Line, Parameter, Reported, Unit
@@ -147,10 +148,9 @@ class KinematicModel:
                 self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
-            by_translation, by_rotation = (
-                None,
-                _cross_matrices(carried_vectors(self.arrangement, from_origin, p)),
-            )
+            carried = carried_vectors(self.arrangement, from_origin, p)
+            by_translation = None
+            by_rotation = [cross_matrices(sign * vector) for sign, vector in carried]
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
         for f in self.functions:
             values, columns = bases[f.axis, f.basis], self.slices[f.name]
@@ -254,26 +254,6 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
             vector = x * beyond + p if sign > 0 else x * ~beyond + p
             found[axis] = (sign, vector)
     return [found[axis] for axis in AXES]
-
-
-def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector,
-    signed.
-    """
-    return [cross_matrices(sign * vector) for sign, vector in carried]
-
-
-def cross_matrices(v: Array) -> Array:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
-
-    >>> cross_matrices(np.array([[1.0, 2.0, 3.0]]))[0].tolist()
-    [[0.0, 3.0, -2.0], [-3.0, 0.0, 1.0], [2.0, -1.0, 0.0]]
-    """
-    matrix = np.zeros((len(v), 3, 3), v.dtype)
-    matrix[:, 0, 1], matrix[:, 0, 2] = v[:, 2], -v[:, 1]
-    matrix[:, 1, 0], matrix[:, 1, 2] = -v[:, 2], v[:, 0]
-    matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 1], -v[:, 0]
-    return matrix
 
 
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:

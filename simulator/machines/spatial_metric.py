@@ -96,12 +96,7 @@ class SpatialMetricModel:
         )
 
     def reported(self) -> Reported:
-        parameters = self.parameters
-        return Reported(
-            tuple(p.name for p in parameters),
-            tuple(p.unit for p in parameters),
-            np.eye(len(parameters)),
-        )
+        return Reported.as_is(self.parameters)
 
 
 def parameters_of_metric(metric: Array) -> Array:
