@@ -44,6 +44,11 @@ class Volume:
         slightly = SLIGHTLY * (self.upper - self.lower)
         return self.lower - slightly, self.upper + slightly
 
+    @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The same as tuples, as error models take them."""
+        return tuple(self.lower.tolist()), tuple(self.upper.tolist())
+
 
 @dataclass(frozen=True, eq=False)
 class Machine:

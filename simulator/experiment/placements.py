@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-import numpy as np
-
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     IN_PLANE_AXES,
@@ -89,11 +87,7 @@ def _group(
     names = layout.names if balls == "all" else balls
     if not references.count_readings(len(probe_names or ()) * len(names) * settings.repeats, steps):
         return None
-    indices = (
-        np.arange(len(layout.names))
-        if balls == "all"
-        else references.ball_indices(names, layout, (*steps, "balls"))
-    )
+    indices = references.balls(balls, layout, (*steps, "balls"))
     if probe_names is None or indices is None or not is_right:
         return None
     indices.setflags(write=False)
@@ -121,7 +115,7 @@ def _placement(
     is_right = True
     if dimension == 2:
         for key in {"plane", "level"} & set(plane_keys):
-            problems.add((*steps, key), "has no meaning in two dimensions; remove it", of_key=True)
+            references.refuse_in_plane(*steps, key)
             is_right = False
     else:
         is_right &= references.require(
@@ -167,7 +161,7 @@ def _in_plane(
     first, second = sorted(axes)
     is_right = True
     for axis in ("x", "y", "z"):
-        is_written = getattr(point, axis) is not None
+        is_written = axis in point.stated
         if axis in axes:
             is_right &= references.require(is_written, (*steps, axis), f'missing; add "{axis}"')
         elif is_written:
@@ -181,12 +175,7 @@ def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlac
     dimension = references.dimension
     if dimension is None:
         return None
-    is_right = references.require(
-        len(pose.origin) == dimension,
-        (*steps, "origin"),
-        f"has {len(pose.origin)} co-ordinates, but the experiment has {dimension} dimensions; give"
-        f" {dimension}",
-    )
+    is_right = references.has_dimension(pose.origin, (*steps, "origin"))
     is_right &= references.require(
         pose.rotation is None or isinstance(pose.rotation, float) == (dimension == 2),
         (*steps, "rotation"),

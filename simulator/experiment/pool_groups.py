@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..geometry.artefacts import BallLayout, corners
+from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
@@ -326,9 +326,7 @@ def _planes(
     if references.dimension == 2:
         for key in ("planes", "levels"):
             if getattr(settings, key) is not None:
-                references.problems.add(
-                    (*steps, key), "has no meaning in two dimensions; remove it", of_key=True
-                )
+                references.refuse_in_plane(*steps, key)
         return ("z",)
     text = 'missing; add "planes", such as [x, y, z]'
     if not references.require(settings.planes is not None, (*steps, "planes"), text):
@@ -443,19 +441,9 @@ def _balls(
     found = []
     for k, one in enumerate(stated if is_several else (stated,)):
         where = (*steps, k) if is_several else steps
-        indices: Indices | None
-        if one == "all":
-            indices = np.arange(len(layout.names))
-        elif one == "corners":
-            try:
-                indices = corners(layout)
-            except ValueError as error:
-                references.problems.add(where, str(error))
-                continue
-        else:
-            indices = references.ball_indices(one, layout, where)
-            if indices is None:
-                continue
+        indices = references.balls(one, layout, where)
+        if indices is None:
+            continue
         indices.setflags(write=False)
         names = tuple(layout.names[i] for i in indices)
         word = "all balls" if one == "all" else "corners" if one == "corners" else f"set {k + 1}"

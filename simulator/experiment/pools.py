@@ -331,16 +331,12 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
             )
             continue
         ends = np.array([[-np.inf] * 3, [np.inf] * 3])
-        for k, axis in enumerate(AXIS_INDEX):
-            stated = getattr(region, axis)
-            if stated is None:
-                continue
+        for axis, stated in region.stated.items():
+            k = AXIS_INDEX[axis]
             if stated[0] >= stated[1]:
                 problems.add((*steps, axis), "the lower end must be below the upper; correct them")
             if k >= (references.dimension or 3):
-                problems.add(
-                    (*steps, axis), "has no meaning in two dimensions; remove it", of_key=True
-                )
+                references.refuse_in_plane(*steps, axis)
             ends[:, k] = stated
         found[name] = frozen(ends[:, : references.dimension or 3])
     return found

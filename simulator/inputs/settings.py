@@ -51,6 +51,11 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
+    @property
+    def stated(self) -> dict[str, Any]:
+        """Values that are not None, by the names of their fields."""
+        return {key: value for key, value in self if value is not None}
+
 
 def listing(words: Iterable[str], limit: int = 8) -> str:
     """Write words as a comma-separated text, abbreviated beyond ``limit``.
