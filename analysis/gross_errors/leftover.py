@@ -60,13 +60,18 @@ class Leftover:
     @cached_property
     def own_columns(self) -> csr_array:
         """The parts of single balls as a matrix (n, balls d)."""
-        from scipy.sparse import csr_array
+        return columns_of_balls(self.own, self.ball, self.balls)
 
-        d = self.own.shape[1]
-        at = np.flatnonzero(self.ball >= 0)
-        columns = d * self.ball[at][:, None] + np.arange(d)
-        entries = (self.own[at].ravel(), (np.repeat(at, d), columns.ravel()))
-        return csr_array(entries, shape=(len(self.ball), d * self.balls))
+
+def columns_of_balls(own: Array, ball: Integers, balls: int) -> csr_array:
+    """A matrix (n, balls d) of parts `own` (n, d), each in the columns of its `ball`, if any."""
+    from scipy.sparse import csr_array
+
+    d = own.shape[1]
+    at = np.flatnonzero(ball >= 0)
+    columns = d * ball[at][:, None] + np.arange(d)
+    entries = (own[at].ravel(), (np.repeat(at, d), columns.ravel()))
+    return csr_array(entries, shape=(len(ball), d * balls))
 
 
 def entries(design: Design) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.numerics.rounding import comparable
 from ballplate.simulator.numerics.threads import single_threaded
@@ -202,7 +202,7 @@ def _campaign(
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
-    return ExperimentError([Message(str(experiment.source), 0, 0, path, text)])
+    return ExperimentError.about(experiment.source, path, text)
 
 
 def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
@@ -281,8 +281,7 @@ def _as_drawn(
             "positions",
             "there are none to take the budget from; say --hours, or --positions",
         )
-    spent = free.spent(reference)
-    return Budget(spent.seconds, spent.readings, spent.positions)
+    return free.spent(reference).budget
 
 
 def _refuse_impossible(
@@ -300,11 +299,9 @@ def _refuse_impossible(
                 " one of the two"
             )
             raise _impossible(experiment, "pool.limits", text)
-    spent = limits.spent(must)
-    needed = Budget(spent.seconds, spent.readings, spent.positions)
     text = (
-        f"what has to be chosen takes {needed}, more than {limits.budget}; allow more, or keep"
-        " fewer"
+        f"what has to be chosen takes {limits.spent(must).budget}, more than {limits.budget};"
+        " allow more, or keep fewer"
     )
     raise _impossible(experiment, "pool.limits.keep", text)
 

@@ -47,6 +47,11 @@ class Spent:
     readings: int
     positions: int
 
+    @property
+    def budget(self) -> Budget:
+        """The budget that just allows it."""
+        return Budget(self.seconds, self.readings, self.positions)
+
     def is_within(self, budget: Budget) -> bool:
         """Whether a budget allows it."""
         return (

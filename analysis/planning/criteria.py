@@ -18,7 +18,7 @@ import numpy as np
 from ballplate.simulator.estimation.functions import Balls, Distances, Points, point_rows
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
@@ -420,7 +420,7 @@ def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
             f" computes some thousand times, which takes too long; give at most {MOST_POINTS},"
             " better some hundred, or plan for tasks"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
+        raise ExperimentError.about(experiment.source, "evaluation.points", text)
 
 
 def criterion(information: Information, experiment: Experiment, name: CriterionName) -> Criterion:
@@ -438,10 +438,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         model = slice(0, len(drawn.design.model.parameters))
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
         if not kept.all():
-            raise _impossible(
-                experiment,
-                f"{name} takes in parameters that even all candidates leave undetermined",
-            )
+            text = f"{name} takes in parameters that even all candidates leave undetermined"
+            raise ExperimentError.about(experiment.source, "pool", text)
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
         parts: list[Pairs | Linear] = []
@@ -460,7 +458,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         if not functions.count:
             left = "no selection determines any of it; offer other candidates"
             lacks = left if functions.excluded else f"the experiment has no {kind.needs}"
-            raise _impossible(experiment, f"{name} has nothing to make small: {lacks}")
+            text = f"{name} has nothing to make small: {lacks}"
+            raise ExperimentError.about(experiment.source, "pool", text)
     excluded = 0 if functions is None else functions.excluded
     target = _target(experiment, name, functions)
     return Criterion(name, is_about_balls(name), functions, scaled, excluded, target, tuple(needed))
@@ -525,7 +524,3 @@ def _of_points(information: Information, places: Points) -> tuple[Array, Array]:
     return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(
         n, d, -1
     )
-
-
-def _impossible(experiment: Experiment, text: str) -> ExperimentError:
-    return ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])

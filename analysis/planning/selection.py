@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from ..report.campaign import draw_campaign
 from ..results.formatting import aligned, finite, number
 from ..results.result import Result
 from .choice import CurvePoint, Gain, Selection
-from .constraints import HOUR, Budget, Spent
+from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
 from .done import base_name
 from .schedule import RunSheet, run_sheet
@@ -102,7 +102,8 @@ def _lines(found: Campaign) -> list[str]:
         lines.append(f"there is no bound of {found.criterion}")
     else:
         lines.append(
-            f"no choice within the limits is better by more than {_percent(1.0 - found.efficiency)}"
+            "no choice within the limits is better by more than"
+            f" {100 * (1.0 - found.efficiency):.1f} %"
         )
     if found.excluded:
         lines.append(
@@ -183,10 +184,6 @@ def _spent(spent: Spent) -> list[str]:
     return [f"{spent.seconds / HOUR:.2f}", str(spent.readings), str(spent.positions)]
 
 
-def _percent(ratio: float) -> str:
-    return f"{100 * ratio:.1f} %"
-
-
 def _gain_table(found: Campaign) -> list[str]:
     rows = [["", f"{found.criterion} without it", "with it", "minutes"]]
     rows += [["chosen: " + gain.candidate.name, *_gain(found, gain)] for gain in found.gains]
@@ -219,14 +216,14 @@ def _data(found: Campaign) -> dict[str, Any]:
         "dropped": dict(found.pool.dropped),
         "criterion": found.criterion,
         "unit": found.unit,
-        "budget": _budget_data(found.budget),
+        "budget": asdict(found.budget),
         "value": finite(found.value),
         "bound": finite(found.bound),
         "drawn": None if found.drawn is None else finite(found.drawn),
-        "drawn_spent": None if found.drawn_spent is None else _spent_data(found.drawn_spent),
+        "drawn_spent": None if found.drawn_spent is None else asdict(found.drawn_spent),
         "target": found.target,
         "excluded": found.excluded,
-        "spent": _spent_data(found.spent),
+        "spent": asdict(found.spent),
         "chosen": [candidate.name for candidate in found.chosen],
         "done": [candidate.name for candidate in found.done],
         "interrupted": [{"name": one.name, "readings": one.readings} for one in found.interrupted],
@@ -241,14 +238,6 @@ def _data(found: Campaign) -> dict[str, Any]:
     }
 
 
-def _budget_data(budget: Budget) -> dict[str, Any]:
-    return {"seconds": budget.seconds, "readings": budget.readings, "positions": budget.positions}
-
-
-def _spent_data(spent: Spent) -> dict[str, Any]:
-    return {"seconds": spent.seconds, "readings": spent.readings, "positions": spent.positions}
-
-
 def _gain_data(gain: Gain) -> dict[str, Any]:
     return {
         "name": gain.candidate.name,
@@ -260,8 +249,8 @@ def _gain_data(gain: Gain) -> dict[str, Any]:
 
 def _point_data(point: CurvePoint) -> dict[str, Any]:
     return {
-        "budget": _budget_data(point.budget),
-        "spent": _spent_data(point.spent),
+        "budget": asdict(point.budget),
+        "spent": asdict(point.spent),
         "chosen": [candidate.name for candidate in point.chosen],
         "value": finite(point.value),
         "bound": finite(point.bound),

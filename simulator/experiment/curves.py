@@ -50,8 +50,8 @@ def read_numbered_curves(
     file = str(path)
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError(
-            [Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")]
+        raise ExperimentError.about(
+            file, "", f"the file is empty; its first line should be {EXAMPLE}"
         )
     if len(lines) > MOST_POINTS + 1:
         text = (

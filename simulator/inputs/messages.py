@@ -50,6 +50,11 @@ class ExperimentError(Exception):
         self.messages: tuple[Message, ...] = tuple(messages)
         super().__init__("\n".join(str(message) for message in self.messages))
 
+    @classmethod
+    def about(cls, file: object, path: str, text: str) -> ExperimentError:
+        """One error of a file as a whole, or of a path that it need not have."""
+        return cls([Message(str(file), 0, 0, path, text)])
+
     def __reduce__(self) -> tuple[type[ExperimentError], tuple[tuple[Message, ...]]]:
         return type(self), (self.messages,)
 

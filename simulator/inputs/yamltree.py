@@ -455,7 +455,7 @@ class _Builder:
 
 
 def _refusal(file: str, text: str) -> ExperimentError:
-    return ExperimentError([Message(file, 0, 0, "", text)])
+    return ExperimentError.about(file, "", text)
 
 
 def _syntax_message(error: yaml.MarkedYAMLError, text: str, file: str) -> Message:

@@ -109,11 +109,11 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
             f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV"
             " file that begins"
         )
-        raise ExperimentError([Message(file, 0, 0, "", f"{text} with a line such as {EXAMPLE}")])
+        raise ExperimentError.about(file, "", f"{text} with a line such as {EXAMPLE}")
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError(
-            [Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")]
+        raise ExperimentError.about(
+            file, "", f"the file is empty; its first line should be {EXAMPLE}"
         )
     header = _Header(Mark(file, lines[0][0], 1), lines[0][1])
     x_column, y_column, profile = header.choose(x, y)
