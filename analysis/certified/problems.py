@@ -52,7 +52,7 @@ def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]
             "no certified problems here; name their folder, designs/certified in a checkout, with"
             " --designs"
         )
-        raise ExperimentError.about(folder, "", text)
+        raise ExperimentError([Message(str(folder), 0, 0, "", text)])
     unknown = [name for name in names if name not in found]
     if unknown:
         messages = [
@@ -66,12 +66,14 @@ def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]
 def _problem(path: Path) -> CertifiedProblem:
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("certified"), dict):
-        raise ExperimentError.about(path, "", 'no certified problem: it has no key "certified"')
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "", 'no certified problem: it has no key "certified"')]
+        )
     for part in data["certified"].keys() & {"as_drawn", "estimate"}:
         complaint = _complaint(data["certified"][part])
         if complaint:
             text = f"{complaint}; make the file anew, or take the shipped one"
-            raise ExperimentError.about(path, f"certified.{part}", text)
+            raise ExperimentError([Message(str(path), 0, 0, f"certified.{part}", text)])
     return CertifiedProblem(
         str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"]
     )
@@ -122,7 +124,7 @@ def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, 
             'expected {"problems": {NAME: {"as_drawn": …, "estimate": …}}} as in'
             " docs/documents/certified.md"
         )
-        raise ExperimentError.about(path, "", text)
+        raise ExperimentError([Message(str(path), 0, 0, "", text)])
     known = {path.stem for one in problems for path in one.path.parent.glob("*.json")}
     messages = [
         Message(
@@ -148,8 +150,8 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ExperimentError.about(
-            path, "", f"cannot be read ({error.strerror}); name a JSON file"
+        raise ExperimentError(
+            [Message(str(path), 0, 0, "", f"cannot be read ({error.strerror}); name a JSON file")]
         ) from None
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)

@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.length_equations import (
 from ballplate.simulator.estimation.rivals import RivalName, RivalSolution, rival_estimate
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.artefacts import pairs
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import (
@@ -99,8 +99,8 @@ def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
             try:
                 found.append(pairs(layout, chosen) + first)
             except ValueError as error:
-                raise ExperimentError.about(
-                    experiment.source, f"artefacts.{artefact}", str(error)
+                raise ExperimentError(
+                    [Message(str(experiment.source), 0, 0, f"artefacts.{artefact}", str(error))]
                 ) from None
         first += len(layout.names)
     return np.concatenate(found)
@@ -156,7 +156,7 @@ def _refuse_many_terms(
             f"{len(design.model.parameters)} parameters: take fewer --pairs, such as corners, or"
             " fewer balls"
         )
-        raise ExperimentError.about(experiment.source, "artefacts", text)
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
 
 
 def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
@@ -172,7 +172,7 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
         text = (
             f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         )
-        raise ExperimentError.about(experiment.source, "artefacts", text)
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "artefacts", text)])
 
 
 def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
@@ -195,7 +195,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
             " ballplate check"
         )
     if text:
-        raise ExperimentError.about(experiment.source, what, text)
+        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
 
 
 def fit_rival(

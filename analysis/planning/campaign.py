@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.numerics.rounding import comparable
 from ballplate.simulator.numerics.threads import single_threaded
@@ -202,7 +202,7 @@ def _campaign(
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
-    return ExperimentError.about(experiment.source, path, text)
+    return refused(experiment.source, text, path)
 
 
 def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:

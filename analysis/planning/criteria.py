@@ -18,7 +18,7 @@ import numpy as np
 from ballplate.simulator.estimation.functions import Balls, Distances, Points, point_rows
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
@@ -420,7 +420,7 @@ def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
             f" computes some thousand times, which takes too long; give at most {MOST_POINTS},"
             " better some hundred, or plan for tasks"
         )
-        raise ExperimentError.about(experiment.source, "evaluation.points", text)
+        raise refused(experiment.source, text, "evaluation.points")
 
 
 def criterion(information: Information, experiment: Experiment, name: CriterionName) -> Criterion:
@@ -439,7 +439,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
         if not kept.all():
             text = f"{name} takes in parameters that even all candidates leave undetermined"
-            raise ExperimentError.about(experiment.source, "pool", text)
+            raise refused(experiment.source, text, "pool")
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
         parts: list[Pairs | Linear] = []
@@ -459,7 +459,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
             left = "no selection determines any of it; offer other candidates"
             lacks = left if functions.excluded else f"the experiment has no {kind.needs}"
             text = f"{name} has nothing to make small: {lacks}"
-            raise ExperimentError.about(experiment.source, "pool", text)
+            raise refused(experiment.source, text, "pool")
     excluded = 0 if functions is None else functions.excluded
     target = _target(experiment, name, functions)
     return Criterion(name, is_about_balls(name), functions, scaled, excluded, target, tuple(needed))

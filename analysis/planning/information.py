@@ -27,7 +27,7 @@ from ballplate.simulator.estimation.observations import (
     rotation_sensitivity,
 )
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.threads import scipy_linalg, single_threaded
 
@@ -191,7 +191,7 @@ def pool_information(
     positions = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
     if not positions:
         text = "has no position to choose; add candidates"
-        raise ExperimentError.about(experiment.source, "pool", text)
+        raise refused(experiment.source, text, "pool")
     drawn = draw(experiment, positions)
     some = replace(experiment, positions=tuple(positions[:1]))
     items: dict[int, list[Rows]] = {
@@ -224,7 +224,7 @@ def pool_information(
             f"{len(candidates)} candidates with {size} parameters each take {taken}; offer at most "
             f"{MOST_BYTES // each}, positions of the experiment and certificates counted"
         )
-        raise ExperimentError.about(experiment.source, "pool", text)
+        raise refused(experiment.source, text, "pool")
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in known])
     of_positions = position_rows(drawn)

@@ -12,7 +12,7 @@ import numpy as np
 from ballplate.simulator.experiment.load import build
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import override
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar
 from ballplate.simulator.numerics.rounding import comparable
@@ -80,7 +80,7 @@ def reach(
             f"it tries, some dozens, which takes too long; give at most {MOST_POINTS}, better some"
             " hundred"
         )
-        raise ExperimentError.about(experiment.source, "evaluation.points", text)
+        raise refused(experiment.source, text, "evaluation.points")
     root = experiment.tree
     # Planning is at zero machine error, and true machines take time to check.
     zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
-from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.tables import (
@@ -50,9 +50,7 @@ def read_numbered_curves(
     file = str(path)
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError.about(
-            file, "", f"the file is empty; its first line should be {EXAMPLE}"
-        )
+        raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
     if len(lines) > MOST_POINTS + 1:
         text = (
             f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"

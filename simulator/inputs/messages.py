@@ -50,13 +50,13 @@ class ExperimentError(Exception):
         self.messages: tuple[Message, ...] = tuple(messages)
         super().__init__("\n".join(str(message) for message in self.messages))
 
-    @classmethod
-    def about(cls, file: object, path: str, text: str) -> ExperimentError:
-        """One error of a file as a whole, or of a path that it need not have."""
-        return cls([Message(str(file), 0, 0, path, text)])
-
     def __reduce__(self) -> tuple[type[ExperimentError], tuple[tuple[Message, ...]]]:
         return type(self), (self.messages,)
+
+
+def refused(file: object, text: str, path: str = "") -> ExperimentError:
+    """The one error of a whole file, or of a place in it, without a line."""
+    return ExperimentError([Message(str(file), 0, 0, path, text)])
 
 
 def _by_number(found: re.Match[str]) -> str:

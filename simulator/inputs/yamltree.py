@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps
+from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, Step, Steps, refused
 from .settings import listing, shorten
 
 DEEPEST = 50
@@ -455,7 +455,7 @@ class _Builder:
 
 
 def _refusal(file: str, text: str) -> ExperimentError:
-    return ExperimentError.about(file, "", text)
+    return refused(file, text)
 
 
 def _syntax_message(error: yaml.MarkedYAMLError, text: str, file: str) -> Message:

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import (
     ANGLE_UNITS,
     LENGTH_UNITS,
@@ -109,12 +109,10 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Point
             f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV"
             " file that begins"
         )
-        raise ExperimentError.about(file, "", f"{text} with a line such as {EXAMPLE}")
+        raise refused(file, f"{text} with a line such as {EXAMPLE}")
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError.about(
-            file, "", f"the file is empty; its first line should be {EXAMPLE}"
-        )
+        raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
     header = _Header(Mark(file, lines[0][0], 1), lines[0][1])
     x_column, y_column, profile = header.choose(x, y)
     wanted = [*([] if x_column is None else [x_column]), y_column, *profile]
