@@ -17,6 +17,7 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.numerics.rounding import comparable
 
+from ..rank.proposed_bars import listed
 from ..results.formatting import SHOWN, aligned, finite, number
 from ..results.result import Result
 from ..uncertainty.quantities import QUANTITIES
@@ -189,8 +190,8 @@ def _heading(result: Reliability) -> list[str]:
             f"{number(result.fit_noncentrality)} standard deviations"
         ),
         (
-            f"effects: the most that a bias just detectable changes in {', '.join(effects[:-1])}"
-            f" and {effects[-1]}, with the standard uncertainty there in brackets"
+            f"effects: the most that a bias just detectable changes in {listed(effects)},"
+            " with the standard uncertainty there in brackets"
         ),
     ]
     if result.among_repeats:

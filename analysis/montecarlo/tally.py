@@ -9,6 +9,7 @@ its standard error that of the mean.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import add
 
 import numpy as np
 from ballplate.simulator.machines.protocol import Array
@@ -62,12 +63,7 @@ class QuantityTally:
     numbers_squared: Array
 
     def __add__(self, other: QuantityTally) -> QuantityTally:
-        return QuantityTally(
-            self.errors + other.errors,
-            self.squares + other.squares,
-            self.numbers + other.numbers,
-            self.numbers_squared + other.numbers_squared,
-        )
+        return QuantityTally(*map(add, vars(self).values(), vars(other).values()))
 
 
 @dataclass(frozen=True)

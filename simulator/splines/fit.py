@@ -158,7 +158,12 @@ def _contradiction(
     others = [
         constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING
     ]
-    if len(others) == 1 and _is_same(constraints[k], others[0]):
+    # One that prescribes the same thing.
+    if (
+        len(others) == 1
+        and (one := others[0]).words == constraints[k].words
+        and np.allclose(one.places, constraints[k].places, rtol=1e-12, atol=0.0)
+    ):
         return Problem(
             f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
             constraints[k].places,
@@ -174,13 +179,6 @@ def _contradiction(
         " knot"
     )
     return Problem(text, tuple(places))
-
-
-def _is_same(one: Constraint, other: Constraint) -> bool:
-    """Whether two constraints prescribe the same thing."""
-    return one.words == other.words and bool(
-        np.allclose(one.places, other.places, rtol=1e-12, atol=0.0)
-    )
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:

@@ -92,7 +92,7 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
         now = getattr(model, key)
         for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
             new = model.model_copy(update={key: value})
-            apply = partial(_with_model, settings=new)
+            apply = partial(replace, error_model=new)
             what = (
                 words
                 if value != 1
@@ -100,7 +100,3 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
             )
             told = f"ask for {value} {what} instead of {now}"
             yield Change(Kind.MODEL, told, float(now - value), frozenset({"model"}), apply)
-
-
-def _with_model(experiment: Experiment, settings: Any) -> Experiment:
-    return replace(experiment, error_model=settings)
