@@ -14,11 +14,11 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..inputs.messages import ExperimentError, Message, Steps
-from ..inputs.problems import Problems
+from ..inputs.problems import Problems, in_order
 from ..inputs.quantities import format_angle, format_length
 from ..inputs.settings import describe, listing
 from ..inputs.wording import explain
-from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python, walk
+from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
 from ..machines.curves import NAMES, Points
 from ..machines.description import (
@@ -64,18 +64,14 @@ def load_machine(
         )
         problems.add((), text)
     else:
-        for steps, node in walk(root):
-            if isinstance(node, Scalar) and node.value is None:
-                problems.add(steps, "empty; give a value, or leave it out")
+        problems.add_empty()
         found = _machine(root, source, problems)
         if found is not None and not refused:
             if doubts is not None:
                 _doubt_what_is_taken_off(found, problems)
                 doubts += problems.doubts
             return found
-    made_up = {(one.file, one.line, one.column) for one in refused}
-    told = [one for one in problems.messages if (one.file, one.line, one.column) not in made_up]
-    raise ExperimentError(sorted({*told, *refused}, key=lambda one: (one.file != str(source), one)))
+    raise ExperimentError(in_order(problems.messages, refused, source))
 
 
 def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescription | None:
