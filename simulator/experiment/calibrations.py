@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from ..geometry.artefacts import COINCIDENT, BallLayout, BryanGaugeSettings, pairs
+from ..geometry.artefacts import COINCIDENT, BallLayout, BryanGaugeSettings, frozen, pairs
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.settings import hint, listing
 from ..inputs.tables import read_table
@@ -20,7 +20,7 @@ from .model import (
     RadiusCalibration,
 )
 from .position_sections import CoordinatesSettings, DistancesSettings, RadiusSettings
-from .references import References, frozen
+from .references import References
 
 AXES = ("x", "y", "z")
 
@@ -304,7 +304,6 @@ def _coordinates(
     )
     if values is None:
         return None
-    balls.setflags(write=False)
     axes = tuple(AXES.index(axis) for axis in by_axis)
     return CoordinateCalibration(
         artefact,

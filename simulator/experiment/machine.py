@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.artefacts import frozen
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems
 from ..inputs.quantities import LengthFunction, Target, format_length
@@ -16,7 +17,7 @@ from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
 from .model import Evaluation, Floats, Machine, Task, Volume
-from .references import References, frozen
+from .references import References
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 

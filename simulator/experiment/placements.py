@@ -10,7 +10,6 @@ from ..geometry.positions import (
     Axis,
     FreePlacement,
     PlanePlacement,
-    Pose,
     nominal_pose,
 )
 from ..inputs.messages import Steps
@@ -39,9 +38,7 @@ def resolve_position(
     ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
-    for array in (pose.rotation, pose.origin):
-        array.setflags(write=False)
-    return Position(settings.name, artefact, Pose(pose.rotation, pose.origin), readings)
+    return Position(settings.name, artefact, pose, readings)
 
 
 def _readings(
@@ -90,7 +87,6 @@ def _group(
     indices = references.balls(balls, layout, (*steps, "balls"))
     if probe_names is None or indices is None or not is_right:
         return None
-    indices.setflags(write=False)
     return ReadingGroup(probe_names, tuple(names), indices, settings.repeats, uncertainty)
 
 

@@ -237,7 +237,7 @@ def _candidates(
                     if reason:
                         yield Generated(full, None, plane, {}, reason)
                         continue
-                    pose = pose or _pose(
+                    pose = pose or nominal_pose(
                         PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d
                     )
                     position = Position(full, group.artefact, pose, readings[probes, k])
@@ -249,13 +249,6 @@ def _candidates(
                     stated |= {"balls": balls.written} if balls.written != "all" else {}
                     stated |= group.written
                     yield Generated(full, position, "" if d == 2 else plane, stated, "")
-
-
-def _pose(placement: PlanePlacement, layout: BallLayout, dimension: int) -> Pose:
-    pose = nominal_pose(placement, layout, dimension)
-    for array in (pose.rotation, pose.origin):
-        array.setflags(write=False)
-    return pose
 
 
 def _both(first: float, second: float) -> str:
@@ -444,7 +437,6 @@ def _balls(
         indices = references.balls(one, layout, where)
         if indices is None:
             continue
-        indices.setflags(write=False)
         names = tuple(layout.names[i] for i in indices)
         word = "all balls" if one == "all" else "corners" if one == "corners" else f"set {k + 1}"
         found.append(_Balls(word, names, indices, "all" if one == "all" else list(names)))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.artefacts import frozen
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
 from ..inputs.messages import Steps, format_path
 from ..inputs.problems import written_count, written_text
@@ -43,7 +44,7 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .references import References, Tally, frozen
+from .references import References, Tally
 from .structure import Sections
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0

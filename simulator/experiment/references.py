@@ -17,6 +17,7 @@ from ..geometry.artefacts import (
     BryanGaugeSettings,
     coincident_balls,
     corners,
+    frozen,
 )
 from ..inputs.messages import ExperimentError, Step, Steps
 from ..inputs.problems import Problems, written_keys, written_text
@@ -127,18 +128,21 @@ class References:
         """Return the indices of balls, all, the corners or listed ones, or None after saying what
         is wrong.
         """
+        index = {name: i for i, name in enumerate(layout.names)}
         if chosen == "all":
-            return np.arange(len(layout.names))
-        if chosen == "corners":
+            found = np.arange(len(index))
+        elif chosen == "corners":
             try:
-                return corners(layout)
+                found = corners(layout)
             except ValueError as error:
                 self.problems.add(steps, str(error))
                 return None
-        index = {name: i for i, name in enumerate(layout.names)}
-        if not self._known_once("ball", index, chosen, steps):
+        elif self._known_once("ball", index, chosen, steps):
+            found = np.array([index[name] for name in chosen], dtype=np.intp)
+        else:
             return None
-        return np.array([index[name] for name in chosen], dtype=np.intp)
+        found.setflags(write=False)
+        return found
 
     def has_dimension(self, point: Sequence[float], steps: Steps) -> bool:
         """Tell whether a point has as many co-ordinates as the experiment, after saying where
@@ -340,13 +344,6 @@ def lengths_per_axis(
         f" {dimension}"
     )
     return frozen(given), references.require(len(given) == dimension, steps, text)
-
-
-def frozen(values: Any) -> Floats:
-    """Return values as an array that cannot be changed."""
-    array = np.array(values, dtype=float)
-    array.setflags(write=False)
-    return array
 
 
 def _with_coordinates(

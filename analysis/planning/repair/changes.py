@@ -115,8 +115,6 @@ def with_calibration(experiment: Experiment, item: Calibration) -> Experiment:
 
 def moved(position: Position, rotation: Array, origin: Array) -> Position:
     """The position in another pose."""
-    for array in (rotation, origin):
-        array.setflags(write=False)
     return replace(position, pose=Pose(rotation, origin))
 
 

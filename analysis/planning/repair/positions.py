@@ -16,7 +16,7 @@ from ballplate.simulator.experiment.model import (
 from ballplate.simulator.geometry.artefacts import (
     TwoSpheresSettings,
 )
-from ballplate.simulator.geometry.positions import AXIS_INDEX, Axis, Pose
+from ballplate.simulator.geometry.positions import AXIS_INDEX, Axis, Pose, plane_rotation
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.machines.protocol import Array
 
@@ -27,7 +27,7 @@ from .changes import (
     with_position,
 )
 from .placing import along_rotation, bars, clean, is_plate, middle_of, pitch
-from .written import plane_of, plane_rotation
+from .written import plane_of
 
 PLANES: tuple[Axis, ...] = ("x", "y", "z")
 # Where they may be along the normal of their plane, in fractions of the volume.

@@ -19,8 +19,8 @@ from ballplate.simulator.experiment.model import (
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
-    QUARTER_TURNS,
     ball_coordinates,
+    plane_rotation,
 )
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.machines.protocol import Array
@@ -133,18 +133,6 @@ def plane_of(rotation: Array) -> tuple[Any, int] | None:
             if np.abs(rotation - plane_rotation(plane, turns, len(rotation))).max() < 1e-12:
                 return plane, turns
     return None
-
-
-def plane_rotation(plane: str, turns: int, dimension: int = 3) -> Array:
-    """The rotation (d, d) of an artefact in a plane after quarter-turns."""
-    turn = QUARTER_TURNS[turns % 4]
-    if dimension == 2:
-        return turn.copy()
-    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
-    rotation = np.zeros((3, 3))
-    rotation[np.ix_([first, second], [0, 1])] = turn
-    rotation[AXIS_INDEX[plane], 2] = 1.0
-    return rotation
 
 
 def _angles(rotation: Array) -> Any:
