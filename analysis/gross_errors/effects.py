@@ -168,12 +168,12 @@ def _distances(
     n, d = made.places.shape
     places, common, null, drawn = relative(made)
     first, second = pairs.T
-    apart = np.sqrt(((places[first] - places[second]) ** 2).sum(axis=1)) > 0.0
+    apart = np.linalg.norm(places[first] - places[second], axis=1) > 0.0
     first, second = first[apart], second[apart]
 
     def by_places(places: Array) -> csr_array:
         unit = places[first] - places[second]
-        length = np.sqrt((unit**2).sum(axis=1))
+        length = np.linalg.norm(unit, axis=1)
         unit /= np.where(length > 0.0, length, 1.0)[:, None]
         row = np.repeat(np.arange(len(first)), 2 * d)
         column = np.concatenate(
@@ -184,7 +184,7 @@ def _distances(
 
     operator = by_places(places)
     change = (by_places(drawn) if null.shape[2] else operator) @ null.reshape(n * d, null.shape[2])
-    known = np.sqrt((change**2).sum(axis=1)) <= open_above(null)
+    known = np.linalg.norm(change, axis=1) <= open_above(null)
     operator, first, second = operator[known], first[known], second[known]
     flat = common.reshape(n * d, common.shape[2])
     variance = np.zeros(len(first))

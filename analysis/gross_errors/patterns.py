@@ -195,7 +195,7 @@ class Place:
         given = self.design.lengths
         other = displacement[np.maximum(given.second, 0)]
         apart = displacement[given.first] - np.where(given.to_pivot[:, None, None], 0.0, other)
-        return np.asarray(np.einsum("md,mdk->mk", self.unit, apart))
+        return np.einsum("md,mdk->mk", self.unit, apart)
 
     def of_lengths(self, columns: Array) -> tuple[Integers, Integers, Array]:
         """Entries of changes (lengths, k) of measured less known lengths."""
@@ -261,7 +261,7 @@ def _different(columns: Array) -> list[int]:
     """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of
     the first.
     """
-    size = np.sqrt((columns**2).sum(axis=0))
+    size = np.linalg.norm(columns, axis=0)
     chosen: list[int] = []
     for k in np.argsort(-(size / size.max()).round(6), kind="stable").tolist():
         cosine = np.abs(columns[:, chosen].T @ columns[:, k]) / (

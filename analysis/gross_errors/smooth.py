@@ -118,7 +118,7 @@ def _in_time(design: Design, state: State, x: Array) -> Displacements:
 def _fractions(x: Array) -> Array:
     """Scale readings (m, d) between -1 and 1."""
     low, extent = x.min(axis=0), np.ptp(x, axis=0)
-    return np.asarray(2.0 * (x - low) / np.where(extent > 0.0, extent, 1.0) - 1.0)
+    return 2.0 * (x - low) / np.where(extent > 0.0, extent, 1.0) - 1.0
 
 
 def _places(x: Array) -> Array:
@@ -129,7 +129,7 @@ def _places(x: Array) -> Array:
     if place.max(initial=0) < MOST_PLACES:
         return np.eye(int(place.max(initial=0)) + 1)[place]
     t = 0.5 * (_fractions(x[:, None])[:, 0] + 1.0)
-    return np.asarray(np.cos(np.pi * np.arange(1, WAVES + 1) * t[:, None]))
+    return np.cos(np.pi * np.arange(1, WAVES + 1) * t[:, None])
 
 
 def _time_within(design: Design) -> Array:

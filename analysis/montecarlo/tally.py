@@ -102,7 +102,7 @@ def _against_typical(errors: Array, aim: Target) -> Array:
     units = np.array(aim.units)
     for unit in np.unique(units):
         typical[units == unit] = (aim.uncertainty[units == unit] ** 2).mean()
-    return np.asarray((errors**2 / typical).mean(axis=1))
+    return (errors**2 / typical).mean(axis=1)
 
 
 def tally(shared: Reference, aims: tuple[Target, ...], found: Estimates, count: int) -> Tally:

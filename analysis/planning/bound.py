@@ -139,7 +139,7 @@ class _Mixture:
 
     @property
     def weights(self) -> Array:
-        return np.asarray(self.shares @ self.vertices)
+        return self.shares @ self.vertices
 
     def with_vertex(self, vertex: Array) -> _Mixture:
         share = 1.0 / (len(self.shares) + 2)

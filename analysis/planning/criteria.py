@@ -230,7 +230,7 @@ class Linear:
         yield self.sizes
 
     def uncertainties(self, root: Array) -> Iterator[Array]:
-        yield np.sqrt(((self.rows @ root) ** 2).sum(axis=1))
+        yield np.linalg.norm(self.rows @ root, axis=1)
 
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
@@ -311,7 +311,7 @@ class Pairs:
 
     def _block(self, first: slice, second: slice) -> PairBlock:
         vector, chosen = self._apart(first, second)
-        length = np.sqrt((vector**2).sum(axis=2))
+        length = np.linalg.norm(vector, axis=2)
         change = np.zeros_like(length)
         for k in range(self.open_.shape[2]):
             moved = self.open_[first, None, :, k] - self.open_[None, second, :, k]
@@ -479,7 +479,7 @@ def _target(experiment: Experiment, name: str, functions: Functions | None) -> f
 
 def _of_shared(information: Information, rows: Array) -> Array:
     """Rows (m, z) of the shared part of z from rows (m, c) of shared columns."""
-    return np.asarray(rows @ information.basis.shared_root)
+    return rows @ information.basis.shared_root
 
 
 def _distances(information: Information, given: Distances) -> Pairs | Linear:
@@ -493,7 +493,7 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
         return Pairs(places, displacement, open_)
     first, second = given.pairs.T
     unit = places[first] - places[second]
-    length = np.sqrt((unit**2).sum(axis=1))
+    length = np.linalg.norm(unit, axis=1)
     unit /= length[:, None]
     change, rows = (
         np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement)

@@ -128,7 +128,7 @@ class Information:
         """Information (z, z) of candidates that count in part, by `weights` (candidates,)."""
         members = np.flatnonzero(weights > 0)
         total = np.tensordot(weights[members], self.matrices[members], axes=1)
-        return np.asarray(self.base + total + self.frames.held(members.tolist()))
+        return self.base + total + self.frames.held(members.tolist())
 
 
 @dataclass(frozen=True)
@@ -165,9 +165,9 @@ class Frames:
         _, values, directions = np.linalg.svd(np.concatenate([told, np.zeros((1, told.shape[1]))]))
         rank = int((values > 1e-9 * values.max(initial=0.0)).sum())
         left = directions[rank:] @ self.rows
-        size = np.sqrt((left**2).sum(axis=1))
+        size = np.linalg.norm(left, axis=1)
         left = left[size > 1e-9] / size[size > 1e-9, None]
-        return np.asarray(left.T @ left)
+        return left.T @ left
 
 
 @single_threaded
@@ -311,7 +311,7 @@ def _position_weight(drawn: Drawn) -> float:
 
 def _sizes(rows: Rows) -> Array:
     """Lengths (m,) of rows."""
-    return np.asarray(np.sqrt((rows.by_ball**2).sum(axis=1) + (rows.by_shared**2).sum(axis=1)))
+    return np.sqrt((rows.by_ball**2).sum(axis=1) + (rows.by_shared**2).sum(axis=1))
 
 
 def _differs(rows: Rows, weight: float) -> bool:
@@ -331,10 +331,10 @@ def _weighted(rows: Rows, least: float, most: float) -> Rows:
 
 def _range(columns: Array) -> Array:
     """Orthonormal basis of what columns span."""
-    size = np.sqrt((columns**2).sum(axis=0))
+    size = np.linalg.norm(columns, axis=0)
     used = columns[:, size > 0] / size[size > 0]
     vectors, values, _ = np.linalg.svd(used, full_matrices=False)
-    return np.asarray(vectors[:, values > ROUNDING * values.max(initial=0.0)])
+    return vectors[:, values > ROUNDING * values.max(initial=0.0)]
 
 
 def _reduced(rows: Array) -> Array:
@@ -441,11 +441,9 @@ class _Span:
         return int(self.vectors.shape[1] + self._without.shape[1])
 
     def add(self, columns: Array) -> None:
-        self._largest = max(
-            self._largest, float(np.sqrt((columns**2).sum(axis=0)).max(initial=0.0))
-        )
+        self._largest = max(self._largest, float(np.linalg.norm(columns, axis=0).max(initial=0.0)))
         columns = self._new(columns)
-        size = np.sqrt((columns**2).sum(axis=0))
+        size = np.linalg.norm(columns, axis=0)
         columns = columns[:, size > ROUNDING * self._largest]
         if not columns.shape[1]:
             return

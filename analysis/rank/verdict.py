@@ -303,7 +303,7 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
     artefacts = []
     for artefact in np.flatnonzero(design.is_plate):
         members = np.flatnonzero(design.ball_artefact == artefact)
-        moved = np.sqrt((balls[members] ** 2).sum(axis=1))
+        moved = np.linalg.norm(balls[members], axis=1)
         if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
             touched = tuple(design.ball_names[b] for b in members[above(moved, 0.1 * moved.max())])
             words = deformation(design.balls[members], balls[members])

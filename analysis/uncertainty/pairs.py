@@ -97,15 +97,15 @@ def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
         part = slice(start, start + 2 * TILE)
         i, j = pairs[part].T
         apart = places[i] - places[j]
-        lengths[part] = np.sqrt((apart**2).sum(axis=1))
+        lengths[part] = np.linalg.norm(apart, axis=1)
         unit = apart / lengths[part, None]
         variance[part] = (np.einsum("md,mdr->mr", unit, common[i] - common[j]) ** 2).sum(axis=1)
         for end in (i, j):
             variance[part] += (np.einsum("md,mdr->mr", unit, moved.own[end]) ** 2).sum(axis=1)
         as_drawn = drawn[i] - drawn[j]
-        as_drawn /= np.sqrt((as_drawn**2).sum(axis=1))[:, None]
+        as_drawn /= np.linalg.norm(as_drawn, axis=1)[:, None]
         change[part] = np.einsum("md,mdk->mk", as_drawn, null[i] - null[j])
-    open_ = np.sqrt((change**2).sum(axis=1)) > open_above(null)
+    open_ = np.linalg.norm(change, axis=1) > open_above(null)
     return PairTile(pairs[:, 0], pairs[:, 1], lengths, np.sqrt(variance), open_)
 
 
@@ -196,4 +196,4 @@ def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> 
 
 def open_above(null: Array) -> float:
     """What a null direction must change a distance by to leave it open: well above rounding."""
-    return 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
+    return 1e-7 * float(np.linalg.norm(null, axis=2).max(initial=0.0)) + 1e-13

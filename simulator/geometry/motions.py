@@ -31,7 +31,7 @@ def rotation_from_vector(vector: Array) -> Array:
     if vector.shape[1] == 1:
         c, s = np.cos(vector[:, 0]), np.sin(vector[:, 0])
         return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
-    angle = np.sqrt((vector**2).sum(axis=1))
+    angle = np.linalg.norm(vector, axis=1)
     # sin(t)/t and (1 - cos t)/t^2, both smooth at 0, where np.sinc is exact.
     first = np.sinc(angle / np.pi)[:, None, None]
     second = (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None]
@@ -55,9 +55,9 @@ def vector_from_rotation(rotation: Array) -> Array:
         ],
         axis=1,
     )
-    sine = 0.5 * np.sqrt((double_sine**2).sum(axis=1))
+    sine = 0.5 * np.linalg.norm(double_sine, axis=1)
     angle = np.arctan2(sine, 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0))
-    return np.asarray(0.5 * double_sine / np.sinc(angle / np.pi)[:, None])
+    return 0.5 * double_sine / np.sinc(angle / np.pi)[:, None]
 
 
 def vector_rate(vector: Array) -> Array:
@@ -67,12 +67,12 @@ def vector_rate(vector: Array) -> Array:
     m, q = vector.shape
     if q == 1:
         return np.ones((m, 1, 1))
-    angle = np.sqrt((vector**2).sum(axis=1))
+    angle = np.linalg.norm(vector, axis=1)
     half = 0.5 * np.where(angle > 1e-4, angle, 1e-4)
     # (1 - (t/2) cot(t/2)) / t^2, which is 1/12 for small t.
     second = np.where(angle > 1e-4, (1.0 - half / np.tan(half)) / (4.0 * half**2), 1.0 / 12.0)
     cross = cross_matrices(-vector)
-    return np.asarray(np.eye(3) - 0.5 * cross + second[:, None, None] * (cross @ cross))
+    return np.eye(3) - 0.5 * cross + second[:, None, None] * (cross @ cross)
 
 
 def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:

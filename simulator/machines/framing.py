@@ -58,7 +58,7 @@ class FramedModel:
     def error(self, x: Array, a: Array, p: Array) -> Array:
         own, shift, turn = a[:-6], a[-6:-3], a[-3:]
         found = self.model.error(x, own, p) - self.model.error(self._at_corner(x), own, p) + p
-        return np.asarray(found + shift + np.cross(turn, x - self._at_corner(x)))
+        return found + shift + np.cross(turn, x - self._at_corner(x))
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         own, corner = a[:-6], self._at_corner(x)

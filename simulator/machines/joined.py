@@ -32,7 +32,7 @@ class JoinedModel:
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.first.parameters)
-        return np.asarray(self.first.error(x, a[:n], p) + self.second.error(x, a[n:], p) - p)
+        return self.first.error(x, a[:n], p) + self.second.error(x, a[n:], p) - p
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.first.parameters)

@@ -112,7 +112,7 @@ class KinematicModel:
     def scaled(self, x: Array) -> Array:
         """Positions x (m, 3) scaled to [0, 1] over the volume."""
         lower = np.asarray(self.lower)
-        return np.asarray((x - lower) / (np.asarray(self.upper) - lower))
+        return (x - lower) / (np.asarray(self.upper) - lower)
 
     def _bases(self, x: Array) -> dict[tuple[int, Basis], Array]:
         t = self.scaled(x)
@@ -137,7 +137,7 @@ class KinematicModel:
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
             moved = moved + sign * np.cross(rotation[:, axis], vector)
-        return np.asarray(moved)
+        return moved
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         bases = self._bases(x)
@@ -303,7 +303,7 @@ class _Chain:
             return displaced
 
         def turned(matrix: Array, vector: Array) -> Array:
-            return np.asarray(np.einsum("mij,mj->mi", matrix, vector))
+            return np.einsum("mij,mj->mi", matrix, vector)
 
         tip = self.p.astype(dtype, copy=True)
         on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]

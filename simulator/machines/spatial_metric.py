@@ -91,9 +91,7 @@ class SpatialMetricModel:
         return from_lower @ (self.axes(a) - np.eye(3)).T + p
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        return np.asarray(
-            np.einsum("nij,mj->min", self._derivatives(a)[1], x - np.array(self.lower))
-        )
+        return np.einsum("nij,mj->min", self._derivatives(a)[1], x - np.array(self.lower))
 
     def reported(self) -> Reported:
         return Reported.as_is(self.parameters)

@@ -124,16 +124,14 @@ class VolumetricModel:
         return (*self.chain.parameters, *found)
 
     def _from_origin(self, x: Array) -> Array:
-        return np.asarray(
-            x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin)
-        )
+        return x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)
         found = self.chain.error(x, a[:n], p)
         for field, value in zip(self.fields, a[n:], strict=True):
             found = found + value * field.values(self._from_origin(x))
-        return np.asarray(found)
+        return found
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)

@@ -57,21 +57,19 @@ class SplineFit:
 
         :raises SplineError: an x beyond the ends.
         """
-        return np.asarray(self.space.rows(x, derivative, side) @ self.coefficients)
+        return self.space.rows(x, derivative, side) @ self.coefficients
 
     def spread(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
         """Standard uncertainty of the curve or a derivative at x (m,) for sigma 1.
 
         :raises SplineError: an x beyond the ends.
         """
-        return np.asarray(
-            np.sqrt(((self.space.rows(x, derivative, side) @ self.root) ** 2).sum(axis=1))
-        )
+        return np.linalg.norm(self.space.rows(x, derivative, side) @ self.root, axis=1)
 
     @cached_property
     def residuals(self) -> Array:
         """Points less curve (m,)."""
-        return np.asarray(self.y - self.values(self.x))
+        return self.y - self.values(self.x)
 
     @cached_property
     def sum_of_squares(self) -> float:
