@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, probe_offsets
 from ballplate.simulator.estimation.observations import rotation_sensitivity
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
 

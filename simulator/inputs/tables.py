@@ -10,7 +10,7 @@ from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
 
-from .messages import ENOUGH, MOST_MESSAGES, ExperimentError, Message
+from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
 from .quantities import (
     LENGTH_UNITS,
     QuantityError,
@@ -32,7 +32,7 @@ MOST_KNOWN = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class FileRow:
     """A line of a table: texts of its named columns and lengths, in metres, of its length
     columns.
     """
@@ -60,7 +60,7 @@ def read_table(
     lengths: Sequence[str],
     optional: Sequence[str] = (),
     problems: list[Message] | None = None,
-) -> tuple[Row, ...]:
+) -> tuple[FileRow, ...]:
     """Read a comma-separated file whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
@@ -87,7 +87,7 @@ def read_table(
     for number, line in islice(lines, 1, MOST_ROWS + 1):
         mark = Mark(file, number, 1)
         if len(messages) >= MOST_MESSAGES:
-            messages.append(mark.message("", ENOUGH))
+            messages.append(mark.message("", MORE_ERRORS))
             break
         row = plain.row(mark, line)
         if row is not None:
@@ -109,7 +109,9 @@ def read_table(
                     Mark(file, number, by_name[name][0]).message("", f"no {name}; write its name")
                 )
         rows.append(
-            Row(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths))
+            FileRow(
+                mark, tuple(text_of_cell(by_name[name][1]) for name in texts), tuple(row_lengths)
+            )
         )
     if len(lines) == 1:
         messages.append(
@@ -155,7 +157,7 @@ class _PlainRows:
         ]
         return cls(len(places), tuple(by_name[name] for name in texts), tuple(powers), {})
 
-    def row(self, mark: Mark, line: str) -> Row | None:
+    def row(self, mark: Mark, line: str) -> FileRow | None:
         """The row of a line; None where it has to be looked at more closely."""
         if '"' in line:
             return None
@@ -176,7 +178,7 @@ class _PlainRows:
             texts = tuple(map(text_of_cell, own))
             if len(self.known) < MOST_KNOWN:
                 self.known[own] = texts
-        return Row(mark, texts, tuple(lengths))
+        return FileRow(mark, texts, tuple(lengths))
 
 
 def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, str, str, str]]:

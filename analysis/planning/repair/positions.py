@@ -22,7 +22,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from .changes import (
     Change,
-    Kind,
+    ChangeKind,
     is_inside,
     with_position,
 )
@@ -57,7 +57,7 @@ def positions(experiment: Experiment) -> Iterator[Change]:
                     )
                 add = partial(with_added, position=new)
                 yield Change(
-                    Kind.ADD_POSITION,
+                    ChangeKind.ADD_POSITION,
                     told,
                     float(new.count),
                     frozenset({f"more {words}"}),
