@@ -50,8 +50,8 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
     parts = [
         (
-            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{_text(candidate.name)}" '
-            'font-family="sans-serif" font-size="10">'
+            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{escaped(candidate.name)}"'
+            ' font-family="sans-serif" font-size="10">'
         ),
         (
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
@@ -74,7 +74,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
     parts.append(
         f'{label} stroke="white" stroke-width="3"'
-        f' paint-order="stroke">{_text(layout.names[0])}</text>'
+        f' paint-order="stroke">{escaped(layout.names[0])}</text>'
     )
     arrow = f"← {across}" if to_left else f"{across} →"
     parts.append(
@@ -94,5 +94,6 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     return "".join(parts)
 
 
-def _text(text: str) -> str:
+def escaped(text: str) -> str:
+    """A text within a page, in one line."""
     return escape(in_one_line(text))

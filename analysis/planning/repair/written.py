@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +24,7 @@ from ballplate.simulator.geometry.positions import (
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.machines.protocol import Array
 
+from ..experiment_file import to_list
 from .changes import ball_set, pair_set
 
 AXES = "xyz"
@@ -81,13 +81,9 @@ def _fields(path: str, before: Any, after: Any) -> list[Edit]:
     if before is after:
         return []
     old, new = before.model_dump(), after.model_dump()
-    return [Edit(f"{path}.{key}", _plain(value)) for key, value in new.items() if value != old[key]]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
+    return [
+        Edit(f"{path}.{key}", to_list(value)) for key, value in new.items() if value != old[key]
+    ]
 
 
 def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:
