@@ -138,7 +138,7 @@ def evenly(count: int) -> Integers:
 
 def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_array:
     """The parts (places d, n d) that balls have alone, in the columns of all balls."""
-    n, d = at.design.balls.shape
+    n, d = at.design.balls.places.shape
     own = columns_of_balls(made.own.reshape(-1, d), np.repeat(index, d), n)
     own.eliminate_zeros()
     return own

@@ -50,8 +50,8 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
     parts = [
         (
-            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{escaped(candidate.name)}"'
-            ' font-family="sans-serif" font-size="10">'
+            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img"'
+            f' aria-label="{escaped(candidate.name)}" font-family="sans-serif" font-size="10">'
         ),
         (
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'

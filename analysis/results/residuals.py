@@ -65,13 +65,13 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
         if k >= 0:
             words, second = "radius", design.lengths.second[k]
             if second >= 0:
-                other = design.ball_names[design.readings.ball[second]]
+                other = design.balls.names[design.readings.ball[second]]
                 ball, words = f"{ball}-{other}", "length"
         found.append(
             Residual(
-                design.position_names[design.readings.position[reading]],
+                design.positions.names[design.readings.position[reading]],
                 ball,
-                design.probe_names[design.readings.probe[reading]],
+                design.probes.names[design.readings.probe[reading]],
                 words,
                 float(value[place]),
                 float(standardised[place]),

@@ -39,15 +39,20 @@ class Volume:
     upper: Floats
 
     @property
-    def of_readings(self) -> tuple[Floats, Floats]:
-        """Limits (d,) of scale readings, a thousandth of the volume outside it."""
-        slightly = SLIGHTLY * (self.upper - self.lower)
-        return self.lower - slightly, self.upper + slightly
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The lower and the upper corner, as numbers."""
+        return tuple(self.lower.tolist()), tuple(self.upper.tolist())
 
     @property
-    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The same as tuples, as error models take them."""
-        return tuple(self.lower.tolist()), tuple(self.upper.tolist())
+    def size(self) -> Floats:
+        """Lengths (d,) of the sides."""
+        return np.asarray(self.upper - self.lower)
+
+    @property
+    def of_readings(self) -> tuple[Floats, Floats]:
+        """Limits (d,) of scale readings, a thousandth of the volume outside it."""
+        slightly = SLIGHTLY * self.size
+        return self.lower - slightly, self.upper + slightly
 
 
 @dataclass(frozen=True, eq=False)
