@@ -226,7 +226,7 @@ class Search:
         return bool(((rest**2).sum(axis=0) <= SAME).all())
 
     def _dense(self, columns: Integers) -> Array:
-        return np.asarray(self.patterns.matrix[:, columns].toarray())
+        return self.patterns.matrix[:, columns].toarray()
 
     def _take_out(self, columns: Integers) -> None:
         self.left = self.left.without(self._dense(columns))
@@ -279,7 +279,7 @@ class Search:
         if len(columns) == 1:
             return columns
         dense = self._dense(columns)
-        size = np.sqrt((dense**2).sum(axis=0))
+        size = np.linalg.norm(dense, axis=0)
         size[size == 0.0] = 1.0
         rest, kept = self.left.of(dense / size), np.zeros(len(columns), bool)
         while True:
@@ -336,10 +336,10 @@ class Search:
             return
         sigma = math.sqrt(self.left.sum_of_squares / self.left.freedom) if self.estimated else 1.0
         matrix = self._dense(np.concatenate([one.columns for one in chosen]))
-        size = np.sqrt((matrix**2).sum(axis=0))
+        size = np.linalg.norm(matrix, axis=0)
         inverse = np.linalg.pinv(self.start.of(matrix / size), rcond=HIDDEN)
         values = inverse @ self.start.residual / size
-        uncertainties = sigma * np.sqrt((inverse**2).sum(axis=1)) / size
+        uncertainties = sigma * np.linalg.norm(inverse, axis=1) / size
         at = 0
         for one in chosen:
             mine = slice(at, at + len(one.columns))
@@ -382,7 +382,7 @@ class Search:
 
 def _basis(left: Leftover, columns: Array) -> Array:
     """An orthonormal basis (n, q) of what is left of columns (n, k)."""
-    return orthonormal(left.of(columns), np.sqrt((columns**2).sum(axis=0)))
+    return orthonormal(left.of(columns), np.linalg.norm(columns, axis=0))
 
 
 def _further(left: Leftover, basis: Array, since: int) -> Array:

@@ -19,10 +19,11 @@ from ballplate.simulator.estimation.functions import (
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from ..uncertainty.pairs import open_above, relative
 from ..uncertainty.quantities import QUANTITIES
+from .leftover import columns_of_balls
 from .response import Response
 
 if TYPE_CHECKING:
@@ -137,14 +138,8 @@ def evenly(count: int) -> Integers:
 
 def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_array:
     """The parts (places d, n d) that balls have alone, in the columns of all balls."""
-    from scipy.sparse import coo_array
-
     n, d = at.design.balls.places.shape
-    row = d * np.arange(len(index))[:, None, None] + np.arange(d)[:, None] + np.zeros(d, np.int64)
-    column = d * index[:, None, None] + np.zeros((d, 1), np.int64) + np.arange(d)
-    own = coo_array(
-        (made.own.ravel(), (row.ravel(), column.ravel())), shape=(len(index) * d, n * d)
-    ).tocsr()
+    own = columns_of_balls(made.own.reshape(-1, d), np.repeat(index, d), n)
     own.eliminate_zeros()
     return own
 
@@ -171,17 +166,14 @@ def _distances(
     from scipy.sparse import coo_array
 
     n, d = made.places.shape
-    places, drawn = (
-        where - where.mean(axis=0) if n else where for where in (made.places, made.drawn)
-    )
-    common, null = without_rigid_motion(places, made.common), without_rigid_motion(drawn, made.null)
+    places, common, null, drawn = relative(made)
     first, second = pairs.T
-    apart = np.sqrt(((places[first] - places[second]) ** 2).sum(axis=1)) > 0.0
+    apart = np.linalg.norm(places[first] - places[second], axis=1) > 0.0
     first, second = first[apart], second[apart]
 
     def by_places(places: Array) -> csr_array:
         unit = places[first] - places[second]
-        length = np.sqrt((unit**2).sum(axis=1))
+        length = np.linalg.norm(unit, axis=1)
         unit /= np.where(length > 0.0, length, 1.0)[:, None]
         row = np.repeat(np.arange(len(first)), 2 * d)
         column = np.concatenate(
@@ -192,8 +184,7 @@ def _distances(
 
     operator = by_places(places)
     change = (by_places(drawn) if null.shape[2] else operator) @ null.reshape(n * d, null.shape[2])
-    limit = 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
-    known = np.sqrt((change**2).sum(axis=1)) <= limit
+    known = np.linalg.norm(change, axis=1) <= open_above(null)
     operator, first, second = operator[known], first[known], second[known]
     flat = common.reshape(n * d, common.shape[2])
     variance = np.zeros(len(first))

@@ -46,13 +46,11 @@ class Leftover:
     def of(self, columns: Array) -> Array:
         """What is left of biases (n, k)."""
         own = self.own_columns
-        return np.asarray(
-            columns - self.common @ (self.common.T @ columns) - own @ (own.T @ columns)
-        )
+        return columns - self.common @ (self.common.T @ columns) - own @ (own.T @ columns)
 
     def without(self, columns: Array) -> Leftover:
         """The same after biases (n, k) have been taken out, those that are not hidden."""
-        unit = orthonormal(self.of(columns), np.sqrt((columns**2).sum(axis=0)))
+        unit = orthonormal(self.of(columns), np.linalg.norm(columns, axis=0))
         residual = self.residual - unit @ (unit.T @ self.residual)
         common = np.concatenate([self.common, unit], axis=1)
         return replace(self, residual=residual, common=common, freedom=self.freedom - unit.shape[1])
@@ -60,13 +58,18 @@ class Leftover:
     @cached_property
     def own_columns(self) -> csr_array:
         """The parts of single balls as a matrix (n, balls d)."""
-        from scipy.sparse import csr_array
+        return columns_of_balls(self.own, self.ball, self.balls)
 
-        d = self.own.shape[1]
-        at = np.flatnonzero(self.ball >= 0)
-        columns = d * self.ball[at][:, None] + np.arange(d)
-        entries = (self.own[at].ravel(), (np.repeat(at, d), columns.ravel()))
-        return csr_array(entries, shape=(len(self.ball), d * self.balls))
+
+def columns_of_balls(own: Array, ball: Integers, balls: int) -> csr_array:
+    """A matrix (n, balls d) of parts `own` (n, d), each in the columns of its `ball`, if any."""
+    from scipy.sparse import csr_array
+
+    d = own.shape[1]
+    at = np.flatnonzero(ball >= 0)
+    columns = d * ball[at][:, None] + np.arange(d)
+    entries = (own[at].ravel(), (np.repeat(at, d), columns.ravel()))
+    return csr_array(entries, shape=(len(ball), d * balls))
 
 
 def entries(design: Design) -> tuple[int, int]:
@@ -101,7 +104,7 @@ def orthonormal(left: Array, size: Array) -> Array:
     """An orthonormal basis (n, q) of what is left (n, k) of columns of some size (k,)."""
     use = size > 0.0
     u, values, _ = np.linalg.svd(left[:, use] / size[use], full_matrices=False)
-    return np.asarray(u[:, values**2 > HIDDEN])
+    return u[:, values**2 > HIDDEN]
 
 
 def leftover(at: Linearisation, x: Array | None, freedom: int) -> Leftover:
@@ -164,9 +167,7 @@ class Columns:
     def statistics(self) -> Array:
         """Estimated biases (k,) in their standard uncertainties, 0 for what cannot be tested."""
         can = self.information > 0.0
-        return np.asarray(
-            np.where(can, self.product / np.sqrt(np.where(can, self.information, 1.0)), 0.0)
-        )
+        return np.where(can, self.product / np.sqrt(np.where(can, self.information, 1.0)), 0.0)
 
     def _gram(self, index: Integers, common: Array, own: csr_array) -> Array:
         """Products (g, q, q) of what is left of the columns of groups (g, q), each column in units
@@ -190,7 +191,7 @@ class Columns:
                 found[:, i, j] += value
                 if i != j:
                     found[:, j, i] += value
-        return np.asarray(found)
+        return found
 
     def explained(self, number: int) -> Explained:
         """What the groups of some number explain together."""

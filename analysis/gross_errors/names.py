@@ -18,10 +18,8 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
     if kind in ("reading", "end"):
         return f"{reading_name(design, subject, with_position)}, {letter}"
     if kind == "length":
-        return (
-            f"{length_name(design, subject)} in position"
-            f" {design.positions.names[_position(design, subject)]}"
-        )
+        position = design.readings.position[design.lengths.first[subject]]
+        return f"{length_name(design, subject)} in position {design.positions.names[position]}"
     if kind == "prior":
         return f"prior of {design.priors.names[subject]}"
     if kind == "coordinate":
@@ -98,7 +96,3 @@ def length_name(design: Design, length: int, of_reading: bool = True) -> str:
         return f"radius of {artefact}" + (f" to ball {balls.names[ball]}" if of_reading else "")
     second = balls.names[readings.ball[given.second[length]]]
     return f"length {balls.names[ball]}-{second} of {artefact}"
-
-
-def _position(design: Design, length: int) -> int:
-    return int(design.readings.position[design.lengths.first[length]])

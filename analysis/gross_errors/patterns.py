@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, locations
-from ballplate.simulator.estimation.hat import RowPlaces, row_places
+from ballplate.simulator.estimation.hat import row_places
 from ballplate.simulator.estimation.observations import (
     expected_readings,
     length_directions,
@@ -126,7 +126,7 @@ def patterns(design: Design, state: State, x: Array | None, every_start: bool = 
     """
     from scipy.sparse import coo_array
 
-    at = _Place(design, state, x, row_places(design), every_start)
+    at = Place(design, state, x, every_start)
     blocks = [block for build in BUILDERS for block in build(at)]
     start = np.cumsum([0, *(block.count for block in blocks)])
     column = np.concatenate(
@@ -157,13 +157,14 @@ def prior_unit(design: Design, prior: int) -> Literal["m", "rad", "1"]:
     return design.model.parameters[int(used[0])].unit if len(used) else "1"
 
 
-class _Place:
+class Place:
     """A design where it is linearised, with what several kinds of patterns need."""
 
     def __init__(
-        self, design: Design, state: State, x: Array | None, places: RowPlaces, every_start: bool
+        self, design: Design, state: State, x: Array | None, every_start: bool = False
     ) -> None:
-        self.design, self.state, self.places, self.every_start = design, state, places, every_start
+        self.design, self.state, self.every_start = design, state, every_start
+        self.places = row_places(design)
         self.chosen = design.plate_readings
         self.readings = design.readings.select(self.chosen)
         self.weight = reading_weights(design, self.readings)
@@ -188,6 +189,13 @@ class _Place:
         column = np.broadcast_to(k * number[:, None, None] + np.arange(k), value.shape)
         used = value != 0.0
         return row[used], column[used], value[used]
+
+    def along_lengths(self, displacement: Array) -> Array:
+        """Changes (lengths, k) of lengths by displacements (readings, d, k) of all readings."""
+        given = self.design.lengths
+        other = displacement[np.maximum(given.second, 0)]
+        apart = displacement[given.first] - np.where(given.to_pivot[:, None, None], 0.0, other)
+        return np.einsum("md,mdk->mk", self.unit, apart)
 
     def of_lengths(self, columns: Array) -> tuple[Integers, Integers, Array]:
         """Entries of changes (lengths, k) of measured less known lengths."""
@@ -215,7 +223,7 @@ def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integer
     return row, column, value
 
 
-def _single_readings(at: _Place) -> Iterator[BiasPatterns]:
+def _single_readings(at: Place) -> Iterator[BiasPatterns]:
     m, d = at.weight.shape
     rows = np.arange(m * d)
     yield _block(
@@ -226,7 +234,7 @@ def _single_readings(at: _Place) -> Iterator[BiasPatterns]:
     )
 
 
-def _single_lengths(at: _Place) -> Iterator[BiasPatterns]:
+def _single_lengths(at: Place) -> Iterator[BiasPatterns]:
     """Lengths that share no reading with others."""
     alone, white = at.white.alone, at.white.single
     row, column = _pairs_within(white, white.group)
@@ -235,7 +243,7 @@ def _single_lengths(at: _Place) -> Iterator[BiasPatterns]:
     yield _block("length", (at.places.lengths.start + row, column, value), alone)
 
 
-def _ends(at: _Place) -> Iterator[BiasPatterns]:
+def _ends(at: Place) -> Iterator[BiasPatterns]:
     """Readings of standards whose lengths are read together, each along the axes that change
     lengths differently.
     """
@@ -253,7 +261,7 @@ def _different(columns: Array) -> list[int]:
     """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of
     the first.
     """
-    size = np.sqrt((columns**2).sum(axis=0))
+    size = np.linalg.norm(columns, axis=0)
     chosen: list[int] = []
     for k in np.argsort(-(size / size.max()).round(6), kind="stable").tolist():
         cosine = np.abs(columns[:, chosen].T @ columns[:, k]) / (
@@ -277,7 +285,7 @@ def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers
     return row, column
 
 
-def _single_items(at: _Place) -> Iterator[BiasPatterns]:
+def _single_items(at: Place) -> Iterator[BiasPatterns]:
     """Priors, co-ordinates and distances: a value that is stated too large makes residuals
     smaller.
     """
@@ -293,7 +301,7 @@ def _single_items(at: _Place) -> Iterator[BiasPatterns]:
         yield _block(kind, (rows.start + every, every, -1.0 / uncertainty), every, axis)
 
 
-def _dirty_balls(at: _Place) -> Iterator[BiasPatterns]:
+def _dirty_balls(at: Place) -> Iterator[BiasPatterns]:
     """A ball that is read several times in a position, displaced there; read once, it is the same
     as its reading.
     """
@@ -311,7 +319,7 @@ def _dirty_balls(at: _Place) -> Iterator[BiasPatterns]:
     yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
 
 
-def _moved_balls(at: _Place) -> Iterator[BiasPatterns]:
+def _moved_balls(at: Place) -> Iterator[BiasPatterns]:
     """Balls that have been displaced on their plate, along its axes, from one position on."""
     d, readings = at.design.dimension, at.readings
     place = position_order(at.design)[readings.position]
@@ -349,7 +357,7 @@ def position_order(design: Design) -> Integers:
     return order
 
 
-def _slip_starts(at: _Place, rows: Integers) -> Integers:
+def _slip_starts(at: Place, rows: Integers) -> Integers:
     """Places among a position's `rows` that a slip may come before."""
     if at.every_start:
         count = len(rows) - 2 * LEAST_PART + 1
@@ -367,7 +375,7 @@ def _slip_starts(at: _Place, rows: Integers) -> Integers:
     return np.unique(np.append(between, len(rows) // 2))
 
 
-def _slips(at: _Place) -> Iterator[BiasPatterns]:
+def _slips(at: Place) -> Iterator[BiasPatterns]:
     """Plates that slipped within a position."""
     d = at.design.dimension
     for k in at.has_plate:
@@ -389,13 +397,12 @@ def _slips(at: _Place) -> Iterator[BiasPatterns]:
         yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
 
 
-def _probes(at: _Place) -> Iterator[BiasPatterns]:
+def _probes(at: Place) -> Iterator[BiasPatterns]:
     """Probes whose offsets are stated too large; of one that is estimated only its prior can be
     wrong.
     """
     design, state = at.design, at.state
     offsets = state.probes[design.readings.probe]
-    given = design.lengths
     all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
     for probe in np.unique(design.readings.probe):
         fixed = ~design.probes.free[probe]
@@ -405,15 +412,12 @@ def _probes(at: _Place) -> Iterator[BiasPatterns]:
             :, :, fixed
         ]
         rows = np.flatnonzero(at.readings.probe == probe)
-        apart = rate[given.first] - np.where(
-            given.to_pivot[:, None, None], 0.0, rate[np.maximum(given.second, 0)]
-        )
-        of_lengths = np.einsum("md,mdk->mk", at.unit, apart)
-        entries = _joined(at.of_readings(rows, rate[at.chosen[rows]]), at.of_lengths(of_lengths))
+        of_lengths = at.of_lengths(at.along_lengths(rate))
+        entries = _joined(at.of_readings(rows, rate[at.chosen[rows]]), of_lengths)
         yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
 
 
-def _length_values(at: _Place) -> Iterator[BiasPatterns]:
+def _length_values(at: Place) -> Iterator[BiasPatterns]:
     """Certified lengths that are stated too long and are read several times, or together with
     others.
     """
@@ -428,7 +432,7 @@ def _length_values(at: _Place) -> Iterator[BiasPatterns]:
         yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
 
 
-def _scales(at: _Place) -> Iterator[BiasPatterns]:
+def _scales(at: Place) -> Iterator[BiasPatterns]:
     """Certificates of an artefact of which all values are too long by one ratio."""
     design, places = at.design, at.places
     known = (
@@ -464,7 +468,7 @@ def _scales(at: _Place) -> Iterator[BiasPatterns]:
         yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
 
 
-def _expansions(at: _Place) -> Iterator[BiasPatterns]:
+def _expansions(at: Place) -> Iterator[BiasPatterns]:
     """Artefacts that are larger in one position."""
     design = at.design
     values = length_values(design, at.state)
@@ -480,7 +484,7 @@ def _expansions(at: _Place) -> Iterator[BiasPatterns]:
         )
 
 
-BUILDERS: tuple[Callable[[_Place], Iterator[BiasPatterns]], ...] = (
+BUILDERS: tuple[Callable[[Place], Iterator[BiasPatterns]], ...] = (
     _single_readings,
     _single_lengths,
     _single_items,

@@ -13,7 +13,7 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.functions import Functions, Parameters
+from ballplate.simulator.estimation.functions import Parameters
 from ballplate.simulator.estimation.hat import row_places
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
@@ -86,7 +86,11 @@ def reliability_of(
         np.zeros(len(given)),
         np.zeros(len(given)),
     )
-    effects = {symbol: _nothing(len(given), groups) for symbol, groups in functions.items()}
+    none = np.full(len(given), -1)
+    effects = {
+        symbol: Effects(groups, np.zeros(len(given)), none.copy(), none.copy(), none * np.nan)
+        for symbol, groups in functions.items()
+    }
     done = 0
     for one in responses(at, None, given):
         report("observations", done, len(places))
@@ -133,12 +137,6 @@ def reliability_of(
         power,
         noncentrality(false_alarm, power, freedom - 1 if sigma_is_estimated else math.inf),
         noncentrality(limit, power, freedom - 1 if sigma_is_estimated else math.inf),
-    )
-
-
-def _nothing(count: int, groups: tuple[Functions, ...]) -> Effects:
-    return Effects(
-        groups, np.zeros(count), np.full(count, -1), np.full(count, -1), np.full(count, np.nan)
     )
 
 

@@ -19,6 +19,7 @@ from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..presentation.formatting import SHOWN, aligned, finite, number
 from ..presentation.result import Result
+from ..rank.proposed_bars import listed
 from ..uncertainty.quantities import QUANTITIES
 from .effects import LENGTHS, MOST_PLACES, SYMBOLS
 from .names import name
@@ -190,9 +191,8 @@ def _heading(result: Reliability) -> list[str]:
             f"{number(result.fit_noncentrality)} standard deviations"
         ),
         (
-            "effects: the most that a bias of the size of the MDB changes in"
-            f" {', '.join(effects[:-1])} and {effects[-1]}, with the standard uncertainty there in"
-            " brackets"
+            f"effects: the most that a bias of the size of the MDB changes in {listed(effects)},"
+            " with the standard uncertainty there in brackets"
         ),
     ]
     if result.among_repeats:

@@ -11,6 +11,7 @@ from ballplate.simulator.estimation.hat import hat_rows
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from .leftover import columns_of_balls
 from .patterns import Patterns
 
 if TYPE_CHECKING:
@@ -57,11 +58,7 @@ def responses(at: Linearisation, x: Array | None, given: Patterns) -> Iterator[R
     common, own = np.zeros((len(wide), at.balls.common.shape[2])), csr_array((len(wide), n * d))
     for some in hat_rows(at, x):
         hat = (some.common**2).sum(axis=1) + (some.own**2).sum(axis=1)
-        of_ball = some.ball >= 0
-        rows = np.flatnonzero(of_ball)
-        columns = d * some.ball[rows][:, None] + np.arange(d)
-        entries = (some.own[rows].ravel(), (np.repeat(rows, d), columns.ravel()))
-        private = csr_array(entries, shape=(len(some.rows), n * d))
+        private = columns_of_balls(some.own, some.ball, n)
         here = np.zeros(matrix.shape[0], bool)
         here[some.rows] = True
         local = np.flatnonzero(given.is_local & here[first_row])

@@ -10,14 +10,12 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.observations import (
-    length_directions,
-    reading_weights,
-    rotation_sensitivity,
-)
+from ballplate.simulator.estimation.observations import rotation_sensitivity
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
+
+from .patterns import Place
 
 # Scale readings closer than this (m) count as the same place on a scale.
 SAME_PLACE = 1e-3
@@ -49,9 +47,10 @@ def smooth_errors(design: Design, state: State, x: Array) -> Iterator[Smooth]:
     """All smooth errors that are looked for, at scale readings x (readings, d) in the order they
     were taken in.
     """
+    at = Place(design, state, x)
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, x):
-            yield Smooth(words, _rows(design, state, x, displacement))
+            yield Smooth(words, _rows(at, displacement))
 
 
 def _on_scales(design: Design, state: State, x: Array) -> Displacements:
@@ -119,7 +118,7 @@ def _in_time(design: Design, state: State, x: Array) -> Displacements:
 def _fractions(x: Array) -> Array:
     """Scale readings (m, d) between -1 and 1."""
     low, extent = x.min(axis=0), np.ptp(x, axis=0)
-    return np.asarray(2.0 * (x - low) / np.where(extent > 0.0, extent, 1.0) - 1.0)
+    return 2.0 * (x - low) / np.where(extent > 0.0, extent, 1.0) - 1.0
 
 
 def _places(x: Array) -> Array:
@@ -130,7 +129,7 @@ def _places(x: Array) -> Array:
     if place.max(initial=0) < MOST_PLACES:
         return np.eye(int(place.max(initial=0)) + 1)[place]
     t = 0.5 * (_fractions(x[:, None])[:, 0] + 1.0)
-    return np.asarray(np.cos(np.pi * np.arange(1, WAVES + 1) * t[:, None]))
+    return np.cos(np.pi * np.arange(1, WAVES + 1) * t[:, None])
 
 
 def _time_within(design: Design) -> Array:
@@ -153,17 +152,10 @@ def _in_all_directions(values: Array, d: int) -> Array:
     return found.reshape(len(values), d, -1)
 
 
-def _rows(design: Design, state: State, x: Array, displacement: Array) -> Array:
+def _rows(at: Place, displacement: Array) -> Array:
     """Biases (rows, k) of all observations by displacements (readings, d, k) of all readings."""
-    chosen: Integers = design.plate_readings
-    weight = reading_weights(design, design.readings.select(chosen))
-    d, k = design.dimension, displacement.shape[2]
-    of_plates = (weight[:, :, None] * displacement[chosen]).reshape(-1, k)
-    given = design.lengths
-    unit = length_directions(design, state, x)
-    second = np.where(given.to_pivot[:, None, None], 0.0, displacement[np.maximum(given.second, 0)])
-    along = np.einsum("md,mdk->mk", unit, displacement[given.first] - second)
-    of_lengths = design.length_whitening.whitened(along)
-    others = len(design.priors) + len(design.coordinates) + len(design.distances)
-    assert of_plates.shape[0] == d * len(chosen)
+    k = displacement.shape[2]
+    of_plates = (at.weight[:, :, None] * displacement[at.chosen]).reshape(-1, k)
+    of_lengths = at.white.whitened(at.along_lengths(displacement))
+    others = len(at.places) - len(of_plates) - len(of_lengths)
     return np.concatenate([of_plates, of_lengths, np.zeros((others, k))])

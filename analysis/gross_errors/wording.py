@@ -14,6 +14,7 @@ from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
 
 from ..presentation.formatting import SHOWN, number
+from ..rank.proposed_bars import listed
 from .cause_search import MOST
 from .names import common_ball, length_name, name, reading_name
 from .patterns import Patterns, position_order
@@ -201,7 +202,7 @@ def _from(ball: int, suspect: Suspect) -> str:
         )
         other = ends[second if first == ball else first]
         parts.append(f"to {other} {size} um too {'long' if value > 0 else 'short'}")
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return listed(parts)
 
 
 def _significant(suspect: Suspect) -> Integers:
@@ -227,7 +228,7 @@ def _sizes(suspect: Suspect, how: str) -> str:
         else:
             preposition = "about" if given.kind[column] == "turn" else "along"
             parts.append(f"{'' if value > 0 else '-'}{size} {unit} {preposition} {letter}")
-    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
+    return listed(parts)
 
 
 def _moment(suspect: Suspect, marks: Sequence[Mark]) -> str:
@@ -259,14 +260,10 @@ def _touched(suspect: Suspect) -> list[int]:
     if kind in ("ball", "moved"):
         order = position_order(design)[readings.position]
         here = order == order[subject] if kind == "ball" else order >= order[subject]
-        return _indices(np.flatnonzero((readings.ball == readings.ball[subject]) & here))
+        return np.flatnonzero((readings.ball == readings.ball[subject]) & here).tolist()
     if kind in ("shift", "turn"):
         return [int(given.start[k])]
     return []
-
-
-def _indices(indices: Integers) -> list[int]:
-    return [int(i) for i in indices]
 
 
 def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
@@ -277,9 +274,7 @@ def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
         return ""
     numbers = [str(marks[i].line) for i in readings]
     file = Path(marks[readings[0]].file).name
-    if len(numbers) == 1:
-        return f"line {numbers[0]} of {file}"
-    return f"lines {', '.join(numbers[:-1])} and {numbers[-1]} of {file}"
+    return f"line{'s' * (len(numbers) > 1)} {listed(numbers)} of {file}"
 
 
 def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:

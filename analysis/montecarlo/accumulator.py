@@ -9,6 +9,7 @@ its standard error that of the mean.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import add
 
 import numpy as np
 from ballplate.montecarlo.reference import Reference
@@ -62,12 +63,7 @@ class QuantityAccumulator:
     numbers_squared: Array
 
     def __add__(self, other: QuantityAccumulator) -> QuantityAccumulator:
-        return QuantityAccumulator(
-            self.errors + other.errors,
-            self.squares + other.squares,
-            self.numbers + other.numbers,
-            self.numbers_squared + other.numbers_squared,
-        )
+        return QuantityAccumulator(*map(add, vars(self).values(), vars(other).values()))
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,7 @@ def _against_typical(errors: Array, aim: MonteCarloQuantity) -> Array:
     units = np.array(aim.units)
     for unit in np.unique(units):
         typical[units == unit] = (aim.uncertainty[units == unit] ** 2).mean()
-    return np.asarray((errors**2 / typical).mean(axis=1))
+    return (errors**2 / typical).mean(axis=1)
 
 
 def accumulate(

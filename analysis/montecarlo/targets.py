@@ -154,7 +154,7 @@ def _parameters(
     error = Deviations(balls, turned[None], origins[None], a[None], offsets[None], steps)
 
     def change(replicates: Deviations) -> Array:
-        return np.asarray(_shared(layout, replicates)[:, used] @ rows.T)
+        return _shared(layout, replicates)[:, used] @ rows.T
 
     return MonteCarloQuantity(
         symbol, change(error)[0], at.of_shared(functions.rows), functions.units, change
@@ -195,8 +195,8 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
         ends, sampled = list(functions.pairs.T), False
     first, second = ends
     between = places[first] - places[second]
-    length = np.sqrt((between**2).sum(axis=1))
-    true_length = np.sqrt(((of.truly[first] - of.truly[second]) ** 2).sum(axis=1))
+    length = np.linalg.norm(between, axis=1)
+    true_length = np.linalg.norm(of.truly[first] - of.truly[second], axis=1)
     uncertainty = pairs_of(of.moved, np.stack(ends, axis=1)).uncertainties
 
     def change(replicates: Deviations) -> Array:
@@ -210,7 +210,7 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
             part = difference + 2.0 * between[:, axis]
             part *= difference
             gained += part
-        return np.asarray(gained / (np.sqrt(length**2 + gained) + length))
+        return gained / (np.sqrt(length**2 + gained) + length)
 
     return MonteCarloQuantity(
         symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled

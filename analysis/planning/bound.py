@@ -21,7 +21,7 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.machines.protocol import Array
 
-from .search import Losses, SelectionProblem, counted_root, fill, full_root, square_root
+from .search import Losses, SelectionProblem, fill, full_root
 
 # Relative distance of bound and relaxation at which the weights are good enough, and steps at most.
 CLOSE = 1e-3
@@ -78,13 +78,11 @@ class Bound:
 class _Tangent:
     """Tangent of the reciprocal square at some weights: `constant` + `slope` (n,) v.
 
-    `smooth` is what is made small: the criterion, or for a largest value a mean of high power.
-    `value` is the mean that the tangent touches.
+    `value` is the mean that it touches.
     """
 
     constant: float
     slope: Array
-    smooth: float
     value: float
 
     def at(self, weights: Array) -> float:
@@ -141,7 +139,7 @@ class _Mixture:
 
     @property
     def weights(self) -> Array:
-        return np.asarray(self.shares @ self.vertices)
+        return self.shares @ self.vertices
 
     def with_vertex(self, vertex: Array) -> _Mixture:
         share = 1.0 / (len(self.shares) + 2)
@@ -176,15 +174,14 @@ def _tangent(problem: SelectionProblem, weights: Array, power: float) -> _Tangen
     root = full_root(information.weighted(weights))
     if root is None:
         return None
-    own = slice(None) if problem.criterion.about_balls else information.shared
-    smooth, value, weight = problem.criterion.tangent(counted_root(problem, root), power)
+    _, value, weight = problem.tangent(root, power)
     if value <= 0.0:
         return None
-    half = root @ (root[own].T @ square_root(weight))
+    half = root @ (root[problem.counted].T @ weight)
     # By the covariance C the derivative is W, and by the information -C W C.
     squared = 2.0 * value**-3 * (half @ half.T)
     slope = np.tensordot(information.matrices, squared, axes=2)
-    return _Tangent(float((information.base * squared).sum()), slope, smooth, value)
+    return _Tangent(float((information.base * squared).sum()), slope, value)
 
 
 def _improved(problem: SelectionProblem, mixture: _Mixture, power: float) -> _Mixture:
@@ -196,15 +193,14 @@ def _improved(problem: SelectionProblem, mixture: _Mixture, power: float) -> _Mi
     information = problem.information
     used = np.flatnonzero(mixture.vertices.any(axis=0))
     matrices = np.tensordot(mixture.vertices[:, used], information.matrices[used], axes=1)
-    own = slice(None) if problem.criterion.about_balls else information.shared
     held = information.frames.held(used.tolist())
 
     def logarithm(shares: Array) -> tuple[float, Array]:
         root = full_root(information.base + held + np.tensordot(shares, matrices, axes=1))
         if root is None:
             return 1e3, np.zeros(len(shares))
-        smooth, value, weight = problem.criterion.tangent(counted_root(problem, root), power)
-        half = root @ (root[own].T @ square_root(weight))
+        smooth, value, weight = problem.tangent(root, power)
+        half = root @ (root[problem.counted].T @ weight)
         return float(np.log(smooth)), -np.tensordot(matrices, half @ half.T, axes=2) / value
 
     found = minimize(

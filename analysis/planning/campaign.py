@@ -15,7 +15,7 @@ from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 
 from ..results.study import predict
@@ -203,7 +203,7 @@ def _campaign(
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
-    return ExperimentError([Message(str(experiment.source), 0, 0, path, text)])
+    return refused(experiment.source, text, path)
 
 
 def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
@@ -231,12 +231,7 @@ def _refuse_unusable(experiment: Experiment, chosen: Sequence[Candidate], budget
         raise _impossible(experiment, "pool", f"no position can be read with {budget}; allow more")
     for name in {position.artefact for position in positions}:
         own = [position for position in positions if position.artefact == name]
-        read = {
-            int(ball)
-            for position in own
-            for group in position.readings
-            for ball in group.ball_indices
-        }
+        read = {ball for position in own for ball in position.balls.tolist()}
         unread = [ball for k, ball in enumerate(experiment.layouts[name].names) if k not in read]
         if unread and experiment.artefacts[name].role == "plate":
             balls = listing(f'"{ball}"' for ball in unread)
@@ -290,8 +285,7 @@ def _as_drawn(
             "positions",
             "there are none to take the budget from; say --hours, or --positions",
         )
-    spent = free.spent(reference)
-    return Budget(spent.seconds, spent.readings, spent.positions)
+    return free.spent(reference).budget
 
 
 def _refuse_impossible(
@@ -309,11 +303,9 @@ def _refuse_impossible(
                 " one of the two"
             )
             raise _impossible(experiment, "pool.limits", text)
-    spent = limits.spent(must)
-    needed = Budget(spent.seconds, spent.readings, spent.positions)
     text = (
-        f"what has to be chosen takes {needed}, more than {limits.budget}; allow more, or keep"
-        " fewer"
+        f"what has to be chosen takes {limits.spent(must).budget}, more than {limits.budget};"
+        " allow more, or keep fewer"
     )
     raise _impossible(experiment, "pool.limits.keep", text)
 

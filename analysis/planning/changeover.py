@@ -49,12 +49,7 @@ def kind_of(candidate: Candidate) -> Setup:
     """
     if not isinstance(candidate.item, Position):
         raise TypeError(f"{candidate.name} is no position")
-    return Setup(candidate.item.artefact, candidate.plane, frozenset(probes_of(candidate.item)))
-
-
-def probes_of(position: Position) -> tuple[str, ...]:
-    """The probes that a position is read with, each once, in the order of the file."""
-    return tuple(dict.fromkeys(probe for group in position.readings for probe in group.probes))
+    return Setup(candidate.item.artefact, candidate.plane, frozenset(candidate.item.probes))
 
 
 def changeover(kinds: Collection[Setup], changes: ChangeTimes, first: Setup | None = None) -> float:

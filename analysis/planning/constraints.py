@@ -47,6 +47,11 @@ class Spent:
     readings: int
     positions: int
 
+    @property
+    def budget(self) -> Budget:
+        """The budget that just allows it."""
+        return Budget(self.seconds, self.readings, self.positions)
+
     def is_within(self, budget: Budget) -> bool:
         """Whether a budget allows it."""
         return (
@@ -151,64 +156,47 @@ class Constraints:
         artefact changes, each at least as large as any of its members. Changes of probe between
         positions are left out.
         """
-        from scipy.sparse import csr_array
+        from scipy.sparse import csr_array, vstack
 
         n = self.count
         groups = sorted({(k.artefact, k.plane) for k in self.kinds if k is not None})
         timed = self.budget.seconds is not None and self.changes.plane > 0 and len(groups) > 1
         size = n + (len(groups) if timed else 0)
-        rows: list[Array] = []
-        limits: list[float] = []
-        of_done = np.isin(np.arange(n), list(self.done))
-        for cost, limit in (
-            (self.seconds, self.budget.seconds),
-            (self.readings, self.budget.readings),
-            (self.positions, self.budget.positions),
-        ):
-            if limit is None:
-                continue
-            row = np.zeros(size)
-            row[:n] = np.where(of_done, 0, cost)
-            rows.append(row)
-            limits.append(float(limit))
+        every = np.arange(n)
+        is_left = ~np.isin(every, list(self.done))
+        bounded: list[tuple[Any, float]] = [
+            (cost * is_left, limit)
+            for cost, limit in (
+                (self.seconds, self.budget.seconds),
+                (self.readings, self.budget.readings),
+                (self.positions, self.budget.positions),
+            )
+            if limit is not None
+        ]
+        bounded += [(np.isin(every, limit.members), limit.count) for limit in self.at_most]
+        bounded += [(-1.0 * np.isin(every, members), -1.0) for members in self.at_least]
+        rows = np.zeros((len(bounded), size))
+        rows[:, :n] = np.reshape([row for row, _ in bounded], (-1, n))
+        limits = np.array([limit for _, limit in bounded], float)
         if timed:
-            rows[0][n:] = self.changes.plane
+            rows[0, n:] = self.changes.plane
             # The first position needs no change.
             limits[0] += self.changes.plane + SLACK
-        for one in self.at_most:
-            row = np.zeros(size)
-            row[list(one.members)] = 1.0
-            rows.append(row)
-            limits.append(float(one.count))
-        for members in self.at_least:
-            row = np.zeros(size)
-            row[list(members)] = -1.0
-            rows.append(row)
-            limits.append(-1.0)
-        matrix = csr_array(np.array(rows).reshape(len(rows), size))
-        if timed:
-            place = {group: n + i for i, group in enumerate(groups)}
-            moved = [
-                k for k, kind in enumerate(self.kinds) if kind is not None and k not in self.done
-            ]
-            group = [
-                place[kind.artefact, kind.plane]
-                for k in moved
-                if (kind := self.kinds[k]) is not None
-            ]
-            at = np.arange(len(moved))
-            entries = np.concatenate([np.ones(len(moved)), -np.ones(len(moved))])
-            columns = np.concatenate([moved, group])
-            linked = csr_array(
-                (entries, (np.concatenate([at, at]), columns)), shape=(len(moved), size)
-            )
-            from scipy.sparse import vstack
-
-            matrix = vstack([matrix, linked], format="csr")
-            limits += [0.0] * len(moved)
+        # Positions that need a change of plane or artefact, and the groups that they are in.
+        moved = [
+            (k, n + groups.index((kind.artefact, kind.plane)))
+            for k, kind in enumerate(self.kinds)
+            if timed and kind is not None and k not in self.done
+        ]
+        columns = np.reshape(moved, (-1, 2)).astype(int)
+        entries = np.tile([1.0, -1.0], len(moved))
+        places = np.repeat(np.arange(len(moved)), 2), columns.ravel()
+        linked = csr_array((entries, places), shape=(len(moved), size))
+        matrix = vstack([csr_array(rows), linked], format="csr")
+        limits = np.append(limits, np.zeros(len(moved)))
         low = np.zeros(size)
         low[list(self.must)] = 1.0
-        return matrix, np.array(limits), low, np.ones(size)
+        return matrix, limits, low, np.ones(size)
 
 
 def constraints(

@@ -23,7 +23,7 @@ from ballplate.simulator.estimation.functions import (
 )
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
@@ -235,7 +235,7 @@ class Linear:
         yield self.sizes
 
     def uncertainties(self, root: Array) -> Iterator[Array]:
-        yield np.sqrt(((self.rows @ root) ** 2).sum(axis=1))
+        yield np.linalg.norm(self.rows @ root, axis=1)
 
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
@@ -316,7 +316,7 @@ class Pairs:
 
     def _block(self, first: slice, second: slice) -> PairBlock:
         vector, chosen = self._apart(first, second)
-        length = np.sqrt((vector**2).sum(axis=2))
+        length = np.linalg.norm(vector, axis=2)
         change = np.zeros_like(length)
         for k in range(self.open_.shape[2]):
             moved = self.open_[first, None, :, k] - self.open_[None, second, :, k]
@@ -425,7 +425,7 @@ def refuse_many_points(experiment: Experiment, name: CriterionName) -> None:
             f" computes some thousand times, which takes too long; give at most {MOST_POINTS},"
             " better some hundred, or plan for tasks"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
+        raise refused(experiment.source, text, "evaluation.points")
 
 
 def criterion(information: Information, experiment: Experiment, name: CriterionName) -> Criterion:
@@ -443,10 +443,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         model = slice(0, len(drawn.design.model.parameters))
         kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
         if not kept.all():
-            raise _impossible(
-                experiment,
-                f"{name} takes in parameters that even all candidates leave undetermined",
-            )
+            text = f"{name} takes in parameters that even all candidates leave undetermined"
+            raise refused(experiment.source, text, "pool")
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
         parts: list[Pairs | Linear] = []
@@ -465,7 +463,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         if not functions.count:
             left = "no selection determines any of it; offer other candidates"
             lacks = left if functions.excluded else f"the experiment has no {kind.needs}"
-            raise _impossible(experiment, f"{name} has nothing to make small: {lacks}")
+            text = f"{name} has nothing to make small: {lacks}"
+            raise refused(experiment.source, text, "pool")
     excluded = 0 if functions is None else functions.excluded
     target = _target(experiment, name, functions)
     return Criterion(name, is_about_balls(name), functions, scaled, excluded, target, tuple(needed))
@@ -485,7 +484,7 @@ def _target(experiment: Experiment, name: str, functions: Functions | None) -> f
 
 def _of_shared(information: Information, rows: Array) -> Array:
     """Rows (m, z) of the shared part of z from rows (m, c) of shared columns."""
-    return np.asarray(rows @ information.basis.shared_root)
+    return rows @ information.basis.shared_root
 
 
 def _distances(information: Information, given: Distances) -> Pairs | Linear:
@@ -501,7 +500,7 @@ def _distances(information: Information, given: Distances) -> Pairs | Linear:
         return Pairs(places, displacement, open_)
     first, second = given.pairs.T
     unit = places[first] - places[second]
-    length = np.sqrt((unit**2).sum(axis=1))
+    length = np.linalg.norm(unit, axis=1)
     unit /= length[:, None]
     change, rows = (
         np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement)
@@ -532,7 +531,3 @@ def _of_points(information: Information, places: MeasuredPoints) -> tuple[Array,
     return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(
         n, d, -1
     )
-
-
-def _impossible(experiment: Experiment, text: str) -> ExperimentError:
-    return ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -68,7 +68,7 @@ def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
     name = ""
     for row in read_table(path, texts, AXES[: experiment.dimension], ["u"]):
         name = row.texts[0]
-        base = _base(name, places)
+        base = places.get(name, places.get(base_name(name)))
         if base is not None:
             found[name] = base
         elif name not in messages:
@@ -113,11 +113,6 @@ def next_name(name: str, taken: Sequence[str]) -> str:
         k += 1
         found = f"{name} again {k}"
     return found
-
-
-def _base(name: str, places: Mapping[str, int]) -> int | None:
-    """The candidate that a position's name stands for."""
-    return places.get(name, places.get(base_name(name)))
 
 
 def base_name(name: str) -> str:
@@ -186,11 +181,8 @@ def _set_up(
         else _with_readings(candidate, (*taken, *missing))
     )
     rest = _with_readings(candidate, missing)
-    probes = {probe for group in missing for probe in group.probes}
-    seconds = (
-        rest.readings * candidate.reading_seconds
-        + (len(probes) - 1) * experiment.pool.changes.probe
-    )
+    changes = (len(_position(rest).probes) - 1) * experiment.pool.changes.probe
+    seconds = rest.readings * candidate.reading_seconds + changes
     rest = replace(rest, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
     return SetUp(base, read, whole, rest, is_last)
 

@@ -43,17 +43,15 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     if to_left:
         points[:, 0] = width - points[:, 0]
     points = np.column_stack([left + points[:, 0], top + height - points[:, 1]])
-    read = np.zeros(len(points), bool)
-    for group in position.readings:
-        read[group.ball_indices] = True
+    read = np.isin(np.arange(len(points)), position.balls)
     shown = (
         np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
     )
     first, second = (points[0], points[1]) if len(points) > 1 else (points[0], points[0])
     parts = [
         (
-            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" aria-label="{_text(candidate.name)}" '
-            'font-family="sans-serif" font-size="10">'
+            f'<svg viewBox="0 0 {SIZE:g} {SIZE:g}" role="img"'
+            f' aria-label="{escaped(candidate.name)}" font-family="sans-serif" font-size="10">'
         ),
         (
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
@@ -76,7 +74,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     label = f'<text x="{first[0]:.1f}" y="{y:.1f}" text-anchor="middle" fill="#222"'
     parts.append(
         f'{label} stroke="white" stroke-width="3"'
-        f' paint-order="stroke">{_text(layout.names[0])}</text>'
+        f' paint-order="stroke">{escaped(layout.names[0])}</text>'
     )
     arrow = f"← {across}" if to_left else f"{across} →"
     parts.append(
@@ -96,5 +94,6 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     return "".join(parts)
 
 
-def _text(text: str) -> str:
+def escaped(text: str) -> str:
+    """A text within a page, in one line."""
     return escape(in_one_line(text))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import partial
 
 import numpy as np
 from ballplate.simulator.experiment.model import Calibration, Experiment, Position
@@ -22,6 +23,7 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
 
     :raises ExperimentError: a position is no candidate.
     """
+    message = partial(Message, str(chosen.source), 0, 0, "positions")
     candidates = offered.candidates
     rests = {one.rest for one in offered.interrupted}
     places = {
@@ -31,30 +33,18 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
     }
     unknown = [position.name for position in chosen.positions if position.name not in places]
     if unknown:
-        messages = [
-            Message(
-                str(chosen.source),
-                0,
-                0,
-                "positions",
-                f'"{name}" is no candidate of the pool; {hint(name, places)}',
-            )
+        raise ExperimentError(
+            message(f'"{name}" is no candidate of the pool; {hint(name, places)}')
             for name in unknown
-        ]
-        raise ExperimentError(messages)
+        )
     moved = [
         one.name
         for one in chosen.positions
         if not _same_place(one, candidates[places[one.name]].item)
     ]
     if moved:
-        texts = [
-            f'"{name}" stands elsewhere, or of another artefact, in the pool; give it another name'
-            for name in moved
-        ]
-        raise ExperimentError(
-            [Message(str(chosen.source), 0, 0, "positions", text) for text in texts]
-        )
+        told = "stands elsewhere, or of another artefact, in the pool; give it another name"
+        raise ExperimentError(message(f'"{name}" {told}') for name in moved)
     found = [_now(offered, places[position.name], position) for position in chosen.positions]
     for k, candidate in enumerate(candidates):
         item = candidate.item
@@ -67,13 +57,9 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
 
 def _now(offered: Offer, k: int, wanted: Position) -> int:
     for one in offered.interrupted:
-        if one.part == k and _readings(wanted) > offered.candidates[k].readings:
+        if one.part == k and wanted.count > offered.candidates[k].readings:
             return one.again if one.rest is None else one.rest
     return k
-
-
-def _readings(position: Position) -> int:
-    return sum(len(group.probes) * len(group.balls) * group.repeats for group in position.readings)
 
 
 def _same_place(one: Position, other: object) -> bool:

@@ -29,7 +29,7 @@ from ballplate.simulator.estimation.observations import (
     rotation_sensitivity,
 )
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.protocol import Array
 
 from .rows import STEP, PoolDesign, Rows, always, calibration_rows, draw, position_rows
@@ -128,7 +128,7 @@ class Information:
         """Information (z, z) of candidates that count in part, by `weights` (candidates,)."""
         members = np.flatnonzero(weights > 0)
         total = np.tensordot(weights[members], self.matrices[members], axes=1)
-        return np.asarray(self.base + total + self.frames.held(members.tolist()))
+        return self.base + total + self.frames.held(members.tolist())
 
 
 @dataclass(frozen=True)
@@ -165,9 +165,9 @@ class Frames:
         _, values, directions = np.linalg.svd(np.concatenate([told, np.zeros((1, told.shape[1]))]))
         rank = int((values > 1e-9 * values.max(initial=0.0)).sum())
         left = directions[rank:] @ self.rows
-        size = np.sqrt((left**2).sum(axis=1))
+        size = np.linalg.norm(left, axis=1)
         left = left[size > 1e-9] / size[size > 1e-9, None]
-        return np.asarray(left.T @ left)
+        return left.T @ left
 
 
 # In one piece: two sets of rows, as stated and evenly weighted, pass through the same steps.
@@ -192,7 +192,7 @@ def pool_information(
     positions = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
     if not positions:
         text = "has no position to choose; add candidates"
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
+        raise refused(experiment.source, text, "pool")
     drawn = draw(experiment, positions)
     some = replace(experiment, positions=tuple(positions[:1]))
     items: dict[int, list[Rows]] = {
@@ -225,7 +225,7 @@ def pool_information(
             f"{len(candidates)} candidates with {size} parameters each take {taken}; offer at most "
             f"{MOST_BYTES // each}, positions of the experiment and certificates counted"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "pool", text)])
+        raise refused(experiment.source, text, "pool")
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in known])
     of_positions = position_rows(drawn)
@@ -312,7 +312,7 @@ def _position_weight(drawn: PoolDesign) -> float:
 
 def _sizes(rows: Rows) -> Array:
     """Lengths (m,) of rows."""
-    return np.asarray(np.sqrt((rows.by_ball**2).sum(axis=1) + (rows.by_shared**2).sum(axis=1)))
+    return np.sqrt((rows.by_ball**2).sum(axis=1) + (rows.by_shared**2).sum(axis=1))
 
 
 def _differs(rows: Rows, weight: float) -> bool:
@@ -332,10 +332,10 @@ def _weighted(rows: Rows, least: float, most: float) -> Rows:
 
 def _range(columns: Array) -> Array:
     """Orthonormal basis of what columns span."""
-    size = np.sqrt((columns**2).sum(axis=0))
+    size = np.linalg.norm(columns, axis=0)
     used = columns[:, size > 0] / size[size > 0]
     vectors, values, _ = np.linalg.svd(used, full_matrices=False)
-    return np.asarray(vectors[:, values > ROUNDING * values.max(initial=0.0)])
+    return vectors[:, values > ROUNDING * values.max(initial=0.0)]
 
 
 def _reduced(rows: Array) -> Array:
@@ -442,11 +442,9 @@ class _Span:
         return int(self.vectors.shape[1] + self._without.shape[1])
 
     def add(self, columns: Array) -> None:
-        self._largest = max(
-            self._largest, float(np.sqrt((columns**2).sum(axis=0)).max(initial=0.0))
-        )
+        self._largest = max(self._largest, float(np.linalg.norm(columns, axis=0).max(initial=0.0)))
         columns = self._new(columns)
-        size = np.sqrt((columns**2).sum(axis=0))
+        size = np.linalg.norm(columns, axis=0)
         columns = columns[:, size > ROUNDING * self._largest]
         if not columns.shape[1]:
             return

@@ -178,7 +178,7 @@ def offer(pool: Pool, taken: Sequence[SetUp] = (), standing: bool = True) -> Off
         done,
         tuple(one[0] for one in left if len(one) == 1),
         tuple(
-            AtMost(tuple(m for k in one.members for m in _now(k, replaced)), one.count)
+            AtMost(tuple(m for k in one.members for m in replaced.get(k, (k,))), one.count)
             for one in pool.at_most
         ),
         tuple(one for one in left if len(one) > 1),
@@ -207,13 +207,4 @@ def open_directions(offered: Offer, information: Information, chosen: Collection
 
 
 def _balls(candidate: Candidate) -> set[int]:
-    item = candidate.item
-    return (
-        {ball for group in item.readings for ball in group.ball_indices.tolist()}
-        if isinstance(item, Position)
-        else set()
-    )
-
-
-def _now(k: int, replaced: dict[int, tuple[int, ...]]) -> tuple[int, ...]:
-    return replaced.get(k, (k,))
+    return set(candidate.item.balls.tolist()) if isinstance(candidate.item, Position) else set()

@@ -29,7 +29,7 @@ from ballplate.simulator.experiment.model import (
     Position,
     RadiusCalibration,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.machines.protocol import Array, Integers
 
 # A micrometre: columns are scaled so that a unit step moves some point by up to this.
@@ -214,7 +214,7 @@ def calibration_rows(
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
             " its certificates"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "pool.calibration", text)])
+        raise refused(experiment.source, text, "pool.calibration")
     if isinstance(item, RadiusCalibration):
         uncertainty = item.standard_uncertainty
     else:

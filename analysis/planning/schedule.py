@@ -12,7 +12,7 @@ from typing import Any
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.inputs.settings import listing
 
-from .changeover import Visit, cheapest, kind_of, probes_of
+from .changeover import Visit, cheapest, kind_of
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def ordered(
         None if after is None else kind_of(after),
         is_paid=first is not None,
     )
-    found = [(one, probes_of(one.item)) for one in done if isinstance(one.item, Position)]
+    found = [(one, one.item.probes) for one in done if isinstance(one.item, Position)]
     if first is not None:
         found.append((first, _ending_with(first, order.before)))
     for visit in order.visits:
@@ -275,11 +275,11 @@ def _handed_on(visit: Visit, first: str, left: int) -> str:
 def _ending_with(candidate: Candidate, last: str | None) -> tuple[str, ...]:
     """The probes of a position, the last one last."""
     assert isinstance(candidate.item, Position)
-    probes = probes_of(candidate.item)
+    probes = candidate.item.probes
     return probes if last is None else (*(probe for probe in probes if probe != last), last)
 
 
 def _sequence(candidate: Candidate, first: str, last: str) -> tuple[str, ...]:
     assert isinstance(candidate.item, Position)
-    between = [probe for probe in probes_of(candidate.item) if probe not in (first, last)]
+    between = [probe for probe in candidate.item.probes if probe not in (first, last)]
     return (first,) if first == last and not between else (first, *between, last)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -57,17 +58,32 @@ class SelectionProblem:
     criterion: Criterion
     constraints: Constraints
 
-    @property
+    @cached_property
     def limits(self) -> Constraints:
         """The constraints with what the criterion needs of every choice."""
         needed = tuple(placing for _, placing in self.criterion.needed)
         return replace(self.constraints, at_least=(*self.constraints.at_least, *needed))
 
+    @property
+    def counted(self) -> slice:
+        """The z that the criterion is about, the last: what is left when balls are eliminated."""
+        return slice(None) if self.criterion.about_balls else self.information.shared
+
     def lacking(self, chosen: Collection[int]) -> list[tuple[int, ...]]:
         """Sets of candidates of which one has to be chosen, and none is."""
-        members = frozenset(chosen)
-        needed = [placing for _, placing in self.criterion.needed]
-        return [one for one in (*self.constraints.at_least, *needed) if members.isdisjoint(one)]
+        return [one for one in self.limits.at_least if set(one).isdisjoint(chosen)]
+
+    def value(self, root: Array) -> float:
+        """The criterion where root root' is the covariance of all z."""
+        return self.criterion.value(root[self.counted, self.counted])
+
+    def tangent(self, root: Array, *power: float) -> tuple[float, float, Array]:
+        """As that of the criterion, with a square root H of the derivative by the covariance in
+        place of it: the derivative by the covariance of what counts is H H'.
+        """
+        smooth, value, weight = self.criterion.tangent(root[self.counted, self.counted], *power)
+        scale, directions = np.linalg.eigh(weight)
+        return smooth, value, np.asarray(directions * np.sqrt(np.maximum(scale, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -99,16 +115,6 @@ def full_root(information: Array) -> Array | None:
     return None if _is_deficient(inverse) else inverse.T
 
 
-def counted_root(problem: SelectionProblem, root: Array) -> Array:
-    """The part of a root of all z that the criterion is about: what is left of the last z when
-    balls are eliminated.
-    """
-    if problem.criterion.about_balls:
-        return root
-    own = problem.information.shared
-    return root[own, own]
-
-
 def value(problem: SelectionProblem, chosen: Collection[int]) -> float:
     """Criterion of a selection, infinite if it leaves something undetermined, or lacks what every
     choice needs.
@@ -116,13 +122,7 @@ def value(problem: SelectionProblem, chosen: Collection[int]) -> float:
     if problem.lacking(chosen):
         return np.inf
     root = full_root(problem.information.of(chosen))
-    return np.inf if root is None else problem.criterion.value(counted_root(problem, root))
-
-
-def square_root(weight: Array) -> Array:
-    """H with H H' the semidefinite `weight` (z, z)."""
-    scale, directions = np.linalg.eigh(weight)
-    return np.asarray(directions * np.sqrt(np.maximum(scale, 0.0)))
+    return np.inf if root is None else problem.value(root)
 
 
 def _inverse(triangle: Array) -> Array:
@@ -165,7 +165,7 @@ class Losses:
             if root is None:
                 found = lacking + _in_place(information)
             else:
-                found = lacking or self._problem.criterion.value(counted_root(self._problem, root))
+                found = lacking or self._problem.value(root)
             found = float(comparable(found, COMPARED))
             self._known[members] = found
         return found
@@ -221,8 +221,7 @@ def _sieve(
     # All candidates together have the identity, up to what the base has.
     mean = (whole - problem.information.base) / len(matrices)
     root = _inverse(np.asarray(np.linalg.cholesky(_ridged(information + mean)), float)).T
-    half = square_root(problem.criterion.tangent(counted_root(problem, root))[2])
-    own = slice(None) if problem.criterion.about_balls else problem.information.shared
+    own, (_, _, half) = problem.counted, problem.tangent(root)
     if len(added) > SLOPED:
         spread = root @ (root[own].T @ half)
         slope = np.tensordot(matrices, spread @ spread.T, axes=2)[added]

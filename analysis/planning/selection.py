@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from ..presentation.formatting import aligned, finite, number
 from ..presentation.result import Result
 from .campaign_picture import draw_campaign
 from .choice import CurvePoint, Gain, Selection
-from .constraints import HOUR, Budget, Spent
+from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
 from .done import base_name
 from .schedule import RunSheet, run_sheet
@@ -106,7 +106,7 @@ def _lines(campaign: Campaign) -> list[str]:
     else:
         lines.append(
             "no choice within the limits is better by more than"
-            f" {_percent(1.0 - campaign.efficiency)}"
+            f" {100 * (1.0 - campaign.efficiency):.1f} %"
         )
     if campaign.excluded:
         lines.append(
@@ -187,10 +187,6 @@ def _spent(spent: Spent) -> list[str]:
     return [f"{spent.seconds / HOUR:.2f}", str(spent.readings), str(spent.positions)]
 
 
-def _percent(ratio: float) -> str:
-    return f"{100 * ratio:.1f} %"
-
-
 def _gain_table(campaign: Campaign) -> list[str]:
     rows = [["", f"{campaign.criterion} without it", "with it", "minutes"]]
     rows += [["chosen: " + gain.candidate.name, *_gain(campaign, gain)] for gain in campaign.gains]
@@ -227,14 +223,14 @@ def _data(campaign: Campaign) -> dict[str, Any]:
         "dropped": dict(campaign.pool.dropped),
         "criterion": campaign.criterion,
         "unit": campaign.unit,
-        "budget": _budget_data(campaign.budget),
+        "budget": asdict(campaign.budget),
         "value": finite(campaign.value),
         "bound": finite(campaign.bound),
         "drawn": None if campaign.drawn is None else finite(campaign.drawn),
-        "drawn_spent": None if campaign.drawn_spent is None else _spent_data(campaign.drawn_spent),
+        "drawn_spent": None if campaign.drawn_spent is None else asdict(campaign.drawn_spent),
         "target": campaign.target,
         "excluded": campaign.excluded,
-        "spent": _spent_data(campaign.spent),
+        "spent": asdict(campaign.spent),
         "chosen": [candidate.name for candidate in campaign.chosen],
         "done": [candidate.name for candidate in campaign.done],
         "interrupted": [
@@ -251,14 +247,6 @@ def _data(campaign: Campaign) -> dict[str, Any]:
     }
 
 
-def _budget_data(budget: Budget) -> dict[str, Any]:
-    return {"seconds": budget.seconds, "readings": budget.readings, "positions": budget.positions}
-
-
-def _spent_data(spent: Spent) -> dict[str, Any]:
-    return {"seconds": spent.seconds, "readings": spent.readings, "positions": spent.positions}
-
-
 def _gain_data(gain: Gain) -> dict[str, Any]:
     return {
         "name": gain.candidate.name,
@@ -270,8 +258,8 @@ def _gain_data(gain: Gain) -> dict[str, Any]:
 
 def _point_data(point: CurvePoint) -> dict[str, Any]:
     return {
-        "budget": _budget_data(point.budget),
-        "spent": _spent_data(point.spent),
+        "budget": asdict(point.budget),
+        "spent": asdict(point.spent),
         "chosen": [candidate.name for candidate in point.chosen],
         "value": finite(point.value),
         "bound": finite(point.bound),

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
-from html import escape
 from typing import Any
 
 from ballplate.simulator.experiment.model import Experiment
@@ -13,7 +11,7 @@ from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 
 from ..presentation.formatting import aligned
-from .drawings import place_drawing
+from .drawings import escaped, place_drawing
 from .schedule import RunSheet, Step
 
 COLUMNS = (
@@ -78,19 +76,8 @@ def sheet_lines(sheet: RunSheet) -> list[str]:
     """The run sheet as lines of text."""
     rows = [["", "start", "min", "position", "probes", "balls", "readings"]]
     for number, step in enumerate(sheet.steps, 1):
-        start = "done" if step.done else _clock(step.start)
-        minutes = "" if step.done else f"{(step.seconds + step.change_seconds) / 60.0:.0f}"
-        rows.append(
-            [
-                str(number),
-                start,
-                minutes,
-                step.name,
-                ", ".join(step.probes),
-                step.balls,
-                str(step.readings),
-            ]
-        )
+        cells = [step.name, ", ".join(step.probes), step.balls, str(step.readings)]
+        rows.append([str(number), *_times(step), *cells])
     lines = aligned(rows, [True, True, True, False, False, False, True]) if sheet.steps else []
     lines += [
         f"{number} {step.name}: {_words(step)}"
@@ -109,7 +96,23 @@ def sheet_csv(sheet: RunSheet) -> str:
     writer = CsvWriter(out)
     writer.writerow(COLUMNS)
     for number, step in enumerate(sheet.steps, 1):
-        writer.writerow(_row(number, step))
+        writer.writerow(
+            (
+                number,
+                "yes" if step.done else "no",
+                step.name,
+                step.artefact,
+                step.plane,
+                step.place,
+                " ".join(step.probes),
+                step.balls,
+                step.readings,
+                step.change,
+                f"{step.change_seconds / 60.0:.10g}",
+                f"{step.seconds / 60.0:.10g}",
+                "" if step.done else f"{step.start / 60.0:.10g}",
+            )
+        )
     for one in sheet.calibration:
         minutes = f"{one.seconds / 60.0:.10g}"
         writer.writerow(
@@ -128,8 +131,7 @@ def sheet_markdown(sheet: RunSheet, title: str) -> str:
     for number, step in enumerate(sheet.steps, 1):
         cells = [
             str(number),
-            "done" if step.done else _clock(step.start),
-            "" if step.done else f"{(step.seconds + step.change_seconds) / 60.0:.0f}",
+            *_times(step),
             step.name,
             step.place,
             ", ".join(step.probes),
@@ -175,12 +177,13 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
 
     `experiment` has the artefacts and the volume.
     """
-    parts = [f"<h1>{_text(title)}</h1>", f"<p>{_text(summary(sheet))}</p>"]
+    parts = [f"<h1>{escaped(title)}</h1>", f"<p>{escaped(summary(sheet))}</p>"]
     for number, step in enumerate(sheet.steps, 1):
         parts.append(_step(number, step, experiment))
     if sheet.calibration:
         items = [
-            f"<td>{_text(one.name)}</td><td>{_price(one.seconds)}</td>" for one in sheet.calibration
+            f"<td>{escaped(one.name)}</td><td>{_price(one.seconds)}</td>"
+            for one in sheet.calibration
         ]
         rows = "".join(f"<tr>{item}</tr>" for item in items)
         parts.append(
@@ -188,7 +191,7 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
         )
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta'
-        f' charset="utf-8"><title>{_text(title)}</title><style>{STYLE}</style></head>\n<body>\n'
+        f' charset="utf-8"><title>{escaped(title)}</title><style>{STYLE}</style></head>\n<body>\n'
         + "\n".join(parts)
         + "\n</body></html>\n"
     )
@@ -196,23 +199,19 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
 
 def _step(number: int, step: Step, experiment: Experiment) -> str:
     probes = "".join(
-        f'<li><input type="checkbox" class="tick" aria-label="{_text(probe)} read">'
-        f" {_text(probe)}</li>"
+        f'<li><input type="checkbox" class="tick" aria-label="{escaped(probe)} read">'
+        f" {escaped(probe)}</li>"
         for probe in step.probes
     )
     change = (
-        f'<p class="change">First change {_text(step.change)} ({_price(step.change_seconds)})</p>'
+        f'<p class="change">First change {escaped(step.change)} ({_price(step.change_seconds)})</p>'
     )
-    times = (
-        "done"
-        if step.done
-        else f"{_clock(step.start)}<br>{(step.seconds + step.change_seconds) / 60.0:.0f} min"
-    )
+    times = "done" if step.done else "{}<br>{} min".format(*_times(step))
     rows = [
-        ("artefact", _text(step.artefact)),
-        ("set up", _text(step.place)),
-        ("probes", f"<ul>{probes}</ul>" if len(step.probes) > 1 else _text(step.probes[0])),
-        ("balls", f"{_text(step.balls)}; {_count(step.readings, 'reading')}"),
+        ("artefact", escaped(step.artefact)),
+        ("set up", escaped(step.place)),
+        ("probes", f"<ul>{probes}</ul>" if len(step.probes) > 1 else escaped(step.probes[0])),
+        ("balls", f"{escaped(step.balls)}; {_count(step.readings, 'reading')}"),
     ]
     if len(experiment.artefacts) < 2:
         rows = rows[1:]
@@ -221,28 +220,10 @@ def _step(number: int, step: Step, experiment: Experiment) -> str:
         f'<section class="step{" done" if step.done else ""}">'
         f'<input type="checkbox" class="tick" aria-label="position {number} done"{checked}><div'
         ' class="words">'
-        f"<h2>{number}. {_text(step.name)}</h2>{change if step.change else ''}"
+        f"<h2>{number}. {escaped(step.name)}</h2>{change if step.change else ''}"
         f"<dl>{''.join(f'<dt>{key}</dt><dd>{value}</dd>' for key, value in rows)}</dl></div>"
         f"{place_drawing(step.candidate, experiment)}"
         f'<div class="time">{times}</div></section>'
-    )
-
-
-def _row(number: int, step: Step) -> Sequence[object]:
-    return (
-        number,
-        "yes" if step.done else "no",
-        step.name,
-        step.artefact,
-        step.plane,
-        step.place,
-        " ".join(step.probes),
-        step.balls,
-        step.readings,
-        step.change,
-        f"{step.change_seconds / 60.0:.10g}",
-        f"{step.seconds / 60.0:.10g}",
-        "" if step.done else f"{step.start / 60.0:.10g}",
     )
 
 
@@ -251,9 +232,12 @@ def _words(step: Step) -> str:
     return f"{change}{step.place}"
 
 
-def _clock(seconds: float) -> str:
-    minutes = round(seconds / 60.0)
-    return f"{minutes // 60}:{minutes % 60:02d}"
+def _times(step: Step) -> tuple[str, str]:
+    """When a step begins, in hours and minutes, and how many minutes it takes."""
+    if step.done:
+        return "done", ""
+    hours, minutes = divmod(round(step.start / 60.0), 60)
+    return f"{hours}:{minutes:02d}", f"{(step.seconds + step.change_seconds) / 60.0:.0f}"
 
 
 def _price(seconds: float) -> str:
@@ -272,7 +256,3 @@ def _cell(text: str) -> str:
         .replace("<", "&lt;")
         .replace("*", "\\*")
     )
-
-
-def _text(text: str) -> str:
-    return escape(in_one_line(text))

@@ -30,9 +30,8 @@ def _text_rows(table: Table) -> list[str]:
     stubs, count = len(table.headings), len(table.columns)
     right = [False] * stubs + [True] * count
     indent = "  " if table.block else ""
-    spanned = f"{table.spanner} " if table.spanner else ""
     head = [*table.headings, *table.columns]
-    head[0] = head[0] or spanned.strip()
+    head[0] = head[0] or table.spanner
     rows, titles = [head], {}
     for block in table.blocks:
         if block.title:
@@ -56,8 +55,7 @@ def as_markdown(title: str, tables: Sequence[Table]) -> str:
         for block in table.blocks:
             if block.title:
                 parts += ["", f"### {_markdown(block.title)}"]
-            spanned = f"{table.spanner} " if table.spanner else ""
-            head = [*table.headings, *(spanned + column for column in table.columns)]
+            head = [*table.headings, *table.spanned]
             marks = [" --- "] * len(table.headings) + [" ---: "] * len(table.columns)
             parts += ["", _markdown_row(head), f"|{'|'.join(marks)}|"]
             parts += [_markdown_row(_texts(row)) for row in block.rows]
@@ -83,8 +81,7 @@ def as_html(title: str, tables: Sequence[Table]) -> str:
     """Tables as elements of a page, with a title in front."""
     parts = [f"<p><strong>{escape(title)}</strong></p>"] if title else []
     for table in tables:
-        spanned = f"{table.spanner} " if table.spanner else ""
-        head = [*table.headings, *(spanned + column for column in table.columns)]
+        head = [*table.headings, *table.spanned]
         stubs = len(table.headings)
         parts.append(f"<table><caption>{escape(table.caption)}</caption>")
         parts.append(f"<thead>{_html_row(head, 'th', stubs)}</thead>")
@@ -116,10 +113,9 @@ def as_csv(title: str, tables: Sequence[Table]) -> str:
     for table in tables:
         found = io.StringIO()
         writer = CsvWriter(found)
-        spanned = f"{table.spanner} " if table.spanner else ""
         first = [table.block] if table.block else []
         headings = [heading or "figure" for heading in table.headings]
-        writer.writerow([*first, *headings, *(spanned + column for column in table.columns)])
+        writer.writerow([*first, *headings, *table.spanned])
         for block in table.blocks:
             label = [block.title.removeprefix(f"{table.block} ")] if table.block else []
             writer.writerows([*label, *_texts(row)] for row in block.rows)

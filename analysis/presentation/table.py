@@ -51,6 +51,11 @@ class Table:
     notes: tuple[str, ...] = ()
 
     @property
+    def spanned(self) -> list[str]:
+        """Columns, each with the spanner in front."""
+        return [f"{self.spanner} {column}".lstrip() for column in self.columns]
+
+    @property
     def size(self) -> int:
         """Number of rows."""
         return sum(len(block.rows) for block in self.blocks)

@@ -73,7 +73,7 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     flat = flat[:, (flat**2).sum(axis=0) > 0.0]
     if not flat.shape[1]:
         return np.zeros((_size(design.dimension), 0))
-    u, values, _ = np.linalg.svd(flat / np.sqrt((flat**2).sum(axis=0)), full_matrices=False)
+    u, values, _ = np.linalg.svd(flat / np.linalg.norm(flat, axis=0), full_matrices=False)
     spanned = u[:, values > MISSING * values[0]]
     strain = wanted.reshape(len(flat), -1)
     left = strain - spanned @ (spanned.T @ strain)
@@ -218,7 +218,7 @@ def _unit_strain(form: Array) -> Array:
     """The strain of a symmetric matrix, of length one."""
     pairs = combinations_with_replacement(range(len(form)), 2)
     strain = np.array([form[i, j] if i == j else 2.0 * form[i, j] for i, j in pairs])
-    return np.asarray(strain / np.linalg.norm(strain))
+    return strain / np.linalg.norm(strain)
 
 
 def _is_among(strain: Array, span: Array) -> bool:
@@ -229,7 +229,7 @@ def _is_among(strain: Array, span: Array) -> bool:
 def _less(span: Array, direction: Array) -> Array:
     """Orthonormal columns that span what of `span` is orthogonal to a direction in it."""
     coefficients = span.T @ direction
-    return np.asarray(span @ _null_space(coefficients[None]))
+    return span @ _null_space(coefficients[None])
 
 
 def _null_space(rows: Array, size: float | None = None) -> Array:

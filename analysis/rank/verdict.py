@@ -188,8 +188,7 @@ def null_directions(at: Linearisation) -> tuple[Direction, ...]:
     found = []
     for mixture in independent_mixture(at).T:
         shared, balls = at.shared_null @ mixture, at.ball_null @ mixture
-        moved = np.abs(shared / at.layout.scale).max(initial=0.0)
-        size = max(float(moved), float(np.abs(balls).max(initial=0.0))) / 1e-6
+        size = _largest(at.layout, shared, balls) / 1e-6
         found.append(_describe(at.design, at.layout, shared / size, balls / size))
     return tuple(found)
 
@@ -272,18 +271,25 @@ def _describe(design: Design, layout: SharedLayout, shared: Array, balls: Array)
     return told if first >= 0.0 else _told(design, layout, -shared, -balls)
 
 
+def _largest(layout: SharedLayout, shared: Array, balls: Array) -> float:
+    """What a direction moves points by at the most, in metres."""
+    parts = np.abs(shared / layout.scale), np.abs(balls)
+    return max(float(part.max(initial=0.0)) for part in parts)
+
+
 def _less_rounding(layout: SharedLayout, shared: Array, balls: Array) -> tuple[Array, Array]:
     """A direction with zeros for what is mere rounding."""
-    effect = np.abs(shared / layout.scale)
-    least = ROUNDING * max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
-    return np.where(effect > least, shared, 0.0), np.where(np.abs(balls) > least, balls, 0.0)
+    least = ROUNDING * _largest(layout, shared, balls)
+    return np.where(np.abs(shared / layout.scale) > least, shared, 0.0), np.where(
+        np.abs(balls) > least, balls, 0.0
+    )
 
 
 def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
     d = design.dimension
     functions = _function_parts(design, layout, shared)
     effect = np.abs(shared / layout.scale)
-    largest = max(float(effect.max(initial=0.0)), float(np.abs(balls).max(initial=0.0)))
+    largest = _largest(layout, shared, balls)
     positions = []
     for k in design.posed_positions:
         columns = layout.pose_columns[k]
@@ -297,7 +303,7 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
     artefacts = []
     for artefact in design.artefacts.plates:
         members = design.balls.of(artefact)
-        moved = np.sqrt((balls[members] ** 2).sum(axis=1))
+        moved = np.linalg.norm(balls[members], axis=1)
         if above(moved.max(initial=0.0), NEGLIGIBLE * largest):
             touched = tuple(design.balls.names[b] for b in members[above(moved, 0.1 * moved.max())])
             words = deformation(design.balls.places[members], balls[members])
@@ -347,22 +353,12 @@ def _function_parts(
             peak = float(values.flat[comparable(np.abs(values)).argmax()])
             k = int(comparable(np.ptp(values, axis=1)).argmax())
             form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
-            parts.append(
-                (effect[members].max(), name, parameter.meaning, peak, parameter.unit, form)
-            )
         else:
-            parts.append(
-                (
-                    effect[members].max(),
-                    name,
-                    parameter.meaning,
-                    float(a[members[0]]),
-                    parameter.unit,
-                    "",
-                )
-            )
-    order = np.argsort(-comparable([part[0] for part in parts]), kind="stable")
-    return tuple(FunctionPart(*parts[k][1:]) for k in order)
+            peak, form = float(a[members[0]]), ""
+        told = FunctionPart(name, parameter.meaning, peak, parameter.unit, form)
+        parts.append((effect[members].max(), told))
+    order = np.argsort(-comparable([size for size, _ in parts]), kind="stable")
+    return tuple(parts[k][1] for k in order)
 
 
 def shape(t: Array, values: Array) -> str:
@@ -479,13 +475,12 @@ def in_words(direction: Direction) -> str:
 
 def _function_words(part: FunctionPart) -> str:
     form = f", {part.shape}" if part.shape else ""
-    amount = {"m": length, "rad": angle, "1": ratio}[part.unit](part.peak)
-    return f"{part.name} ({part.meaning}{form}) by {amount}"
+    return f"{part.name} ({part.meaning}{form}) by {_amount(part.peak, part.unit)}"
 
 
 def _position_words(part: PositionPart) -> str:
     amounts = [length(part.shift) + part.along] if part.shift > 1e-12 else []
-    amounts += [angle(part.turn) + part.about] if part.turn > 1e-12 else []
+    amounts += [_amount(part.turn, "rad") + part.about] if part.turn > 1e-12 else []
     return f"{part.name} ({', '.join(amounts)})"
 
 
@@ -495,14 +490,9 @@ def length(value: float) -> str:
     >>> length(2.5e-7)
     '0.25 um'
     """
-    return f"{printable(value * 1e6):.3g} um"
+    return _amount(value, "m")
 
 
-def angle(value: float) -> str:
-    """A small angle in microradians."""
-    return f"{printable(value * 1e6):.3g} urad"
-
-
-def ratio(value: float) -> str:
-    """A small ratio in parts per million."""
-    return f"{printable(value * 1e6):.3g} ppm"
+def _amount(value: float, unit: str) -> str:
+    shown = {"m": "um", "rad": "urad", "1": "ppm"}[unit]
+    return f"{printable(value * 1e6):.3g} {shown}"

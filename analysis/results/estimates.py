@@ -143,7 +143,7 @@ class EstimatedFunctions:
         is_open = np.isnan(self.uncertainties())
         result[is_open] = np.nan
         result[:, is_open] = np.nan
-        return np.asarray(result)
+        return result
 
 
 def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
@@ -288,7 +288,7 @@ class CorrectedPoints:
     @property
     def standard_uncertainties(self) -> Array:
         """Of each co-ordinate (n, d), in metres."""
-        return np.asarray(np.sqrt((self.root**2).sum(axis=2)))
+        return np.linalg.norm(self.root, axis=2)
 
     @property
     def covariance(self) -> Array:
@@ -296,14 +296,14 @@ class CorrectedPoints:
         metres.
         """
         flat = self.root.reshape(-1, self.root.shape[2])
-        return np.asarray(flat @ flat.T)
+        return flat @ flat.T
 
     @property
     def blocks(self) -> Array:
         """Of each point by itself (n, d, d), in square metres: the diagonal blocks of
         `covariance`.
         """
-        return np.asarray(self.root @ self.root.transpose(0, 2, 1))
+        return self.root @ self.root.transpose(0, 2, 1)
 
 
 @single_threaded

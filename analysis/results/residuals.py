@@ -63,10 +63,10 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
         reading = int(chosen[i] if k < 0 else design.lengths.first[k])
         ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
         if k >= 0:
-            second = design.lengths.second[k]
-            ball, words = (
-                (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
-            )
+            words, second = "radius", design.lengths.second[k]
+            if second >= 0:
+                other = design.balls.names[design.readings.ball[second]]
+                ball, words = f"{ball}-{other}", "length"
         found.append(
             Residual(
                 design.positions.names[design.readings.position[reading]],
@@ -78,7 +78,3 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
             )
         )
     return tuple(found)
-
-
-def _ball(design: Design, reading: int) -> str:
-    return design.balls.names[design.readings.ball[reading]]

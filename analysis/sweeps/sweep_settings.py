@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ballplate.simulator.experiment.sections import Line, Seed
 from ballplate.simulator.geometry.artefacts import Name
-from ballplate.simulator.inputs.settings import FORM, Settings
-from pydantic import Field, Tag
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings
+from pydantic import Field
 
 from ..uncertainty.quantities import QUANTITIES, RECORDED
 
@@ -22,15 +22,9 @@ KEPT = f"{RECORDED[0]} to {RECORDED[-1]}"
 
 Path = Annotated[str, Field(min_length=1)]
 Scalar = str | int | float | bool
-SomeValues = Annotated[tuple[Any, ...], Field(min_length=1)]
-Values = Annotated[
-    Annotated[SomeValues, Tag("<list>")]
-    | Annotated[dict[Name, Any], Field(min_length=1), Tag("<mapping>")]
-    # A single value is none of these; the list's message says what is expected.
-    | Annotated[SomeValues, Tag("<one>")],
-    FORM,
-]
-VariantNames = Annotated[tuple[Name, ...], Field(min_length=1)]
+SomeValues = NonEmpty[Any]
+Values = Forms[SomeValues, SomeValues, Annotated[dict[Name, Any], Field(min_length=1)]]
+VariantNames = NonEmpty[Name]
 
 
 # Synthetic data sets of a cell, which are done in blocks, each of which is kept.
@@ -40,7 +34,7 @@ MOST_TRIALS = 10_000_000
 class SubsetSettings(Settings):
     """Which entries of a list are kept, in the order of the list."""
 
-    sizes: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] = Field(
+    sizes: NonEmpty[Annotated[int, Field(ge=1)]] = Field(
         description="how many entries, those of always included"
     )
     always: tuple[Name, ...] = Field((), description="names of entries that every subset holds")
@@ -55,7 +49,7 @@ class AxisSettings(Settings):
     path: Path | None = Field(
         None, description="path of what the values replace, as in error messages"
     )
-    paths: Annotated[tuple[Path, ...], Field(min_length=1)] | None = Field(
+    paths: NonEmpty[Path] | None = Field(
         None, description="several paths that take the same values"
     )
     values: Values | None = Field(None, description="list of values, or name: value")
@@ -80,15 +74,9 @@ class AxisSettings(Settings):
     subsets: SubsetSettings | None = Field(
         None, description="subsets of the list at path, such as positions"
     )
-    variants: (
-        Annotated[
-            Annotated[Literal["all"], Tag("<one>")]
-            | Annotated[VariantNames, Tag("<list>")]
-            | Annotated[VariantNames, Tag("<mapping>")],
-            FORM,
-        ]
-        | None
-    ) = Field(None, description="variants of the base file: all, or a list of names")
+    variants: Forms[Literal["all"], VariantNames, VariantNames] | None = Field(
+        None, description="variants of the base file: all, or a list of names"
+    )
 
 
 class BoundsSettings(Settings):
@@ -98,12 +86,7 @@ class BoundsSettings(Settings):
     below: Scalar | None = Field(None, description="holds for values below this")
 
 
-Condition = Annotated[
-    Annotated[Scalar, Tag("<one>")]
-    | Annotated[tuple[Any, ...], Field(min_length=1), Tag("<list>")]
-    | Annotated[BoundsSettings, Tag("<mapping>")],
-    FORM,
-]
+Condition = Forms[Scalar, NonEmpty[Any], BoundsSettings]
 
 
 class SweepSettings(Settings):
@@ -133,6 +116,6 @@ class SweepSettings(Settings):
         None, description="synthetic data sets of each cell; default: none"
     )
     seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
-    record: Annotated[tuple[Quantity, ...], Field(min_length=1)] = Field(
+    record: NonEmpty[Quantity] = Field(
         RECORDED, description=f"quantities that are kept, {KEPT} and tasks; default: all of {KEPT}"
     )

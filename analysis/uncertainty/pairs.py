@@ -79,7 +79,7 @@ def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
 
     Places that coincide make no pair. Memory is that of a tile.
     """
-    places, common, null, drawn = _relative(moved)
+    places, common, null, drawn = relative(moved)
     single = common @ common.transpose(0, 2, 1) + moved.own @ moved.own.transpose(0, 2, 1)
     for rows, columns in _tiles(len(places)):
         yield _tile(places, common, single, null, drawn, rows, columns)
@@ -89,7 +89,7 @@ def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
     """Standard uncertainties of the distances between some pairs (m, 2) of places that are
     apart.
     """
-    places, common, null, drawn = _relative(moved)
+    places, common, null, drawn = relative(moved)
     lengths, variance = np.zeros(len(pairs)), np.zeros(len(pairs))
     change = np.zeros((len(pairs), null.shape[2]))
     # A slice of the pairs at a time: the products of all would take far more memory than the pairs.
@@ -97,19 +97,19 @@ def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
         part = slice(start, start + 2 * TILE)
         i, j = pairs[part].T
         apart = places[i] - places[j]
-        lengths[part] = np.sqrt((apart**2).sum(axis=1))
+        lengths[part] = np.linalg.norm(apart, axis=1)
         unit = apart / lengths[part, None]
         variance[part] = (np.einsum("md,mdr->mr", unit, common[i] - common[j]) ** 2).sum(axis=1)
         for end in (i, j):
             variance[part] += (np.einsum("md,mdr->mr", unit, moved.own[end]) ** 2).sum(axis=1)
         as_drawn = drawn[i] - drawn[j]
-        as_drawn /= np.sqrt((as_drawn**2).sum(axis=1))[:, None]
+        as_drawn /= np.linalg.norm(as_drawn, axis=1)[:, None]
         change[part] = np.einsum("md,mdk->mk", as_drawn, null[i] - null[j])
-    open_ = np.sqrt((change**2).sum(axis=1)) > _open_above(null)
+    open_ = np.linalg.norm(change, axis=1) > open_above(null)
     return PairTile(pairs[:, 0], pairs[:, 1], lengths, np.sqrt(variance), open_)
 
 
-def _relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
+def relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
     """Places, displacements, those along undetermined directions, and places as drawn, without what
     all do together.
     """
@@ -169,7 +169,7 @@ def _tile(
         )
         length = (apart**2).sum(axis=2)
         size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
-        open_ = size[chosen] > _open_above(null)
+        open_ = size[chosen] > open_above(null)
     first, second = np.nonzero(chosen)
     return PairTile(
         rows.start + first, columns.start + second, np.sqrt(squared[chosen]), values, open_
@@ -194,6 +194,6 @@ def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> 
     )
 
 
-def _open_above(null: Array) -> float:
+def open_above(null: Array) -> float:
     """What a null direction must change a distance by to leave it open: well above rounding."""
-    return 1e-7 * float(np.sqrt((null**2).sum(axis=2)).max(initial=0.0)) + 1e-13
+    return 1e-7 * float(np.linalg.norm(null, axis=2).max(initial=0.0)) + 1e-13

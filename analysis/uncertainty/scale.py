@@ -174,7 +174,7 @@ def scale_row(at: Linearisation) -> Array:
         at.design, at.layout, at.state, points, np.full(len(points), at.design.evaluation.probe)
     )
     centred = points - points.mean(axis=0)
-    return np.asarray(np.einsum("nd,nds->s", centred, rows) / (centred**2).sum())
+    return np.einsum("nd,nds->s", centred, rows) / (centred**2).sum()
 
 
 def can_stretch(design: Design, state: State) -> bool:
@@ -184,7 +184,7 @@ def can_stretch(design: Design, state: State) -> bool:
     jacobian = design.model.jacobian(points, state.a, offsets)
     centred = points - points.mean(axis=0)
     columns = (jacobian - jacobian.mean(axis=0)).reshape(centred.size, -1)
-    size = np.sqrt((columns**2).sum(axis=0))
+    size = np.linalg.norm(columns, axis=0)
     columns = columns[:, size > 0] / size[size > 0]
     if not columns.shape[1]:
         return False

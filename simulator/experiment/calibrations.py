@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from ..geometry.artefacts import COINCIDENT, BallLayout, BryanGaugeSettings, corners, pairs
+from ..geometry.artefacts import COINCIDENT, BallLayout, BryanGaugeSettings, frozen, pairs
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.settings import hint, listing
 from ..inputs.tables import read_table
@@ -20,7 +20,7 @@ from .model import (
     RadiusCalibration,
 )
 from .position_sections import CoordinatesSettings, DistancesSettings, RadiusSettings
-from .references import References, frozen
+from .references import References
 
 AXES = ("x", "y", "z")
 
@@ -285,14 +285,10 @@ def _coordinates(
         problems.add((*steps, "kind"), text)
         return None
     uncertainty = settings.standard_uncertainty
-    by_axis = (
+    by_axis: dict[str, float] = (
         dict.fromkeys(AXES[:dimension], uncertainty)
         if isinstance(uncertainty, float)
-        else {
-            axis: getattr(uncertainty, axis)
-            for axis in AXES
-            if getattr(uncertainty, axis) is not None
-        }
+        else uncertainty.stated
     )
     place = (*steps, "standard_uncertainty")
     is_right = references.require(
@@ -300,17 +296,7 @@ def _coordinates(
     )
     text = "has no meaning in two dimensions; remove it"
     is_right &= references.require(dimension != 2 or "z" not in by_axis, (*place, "z"), text)
-    balls: Indices | None
-    if settings.balls == "corners":
-        try:
-            balls = corners(layout)
-        except ValueError as error:
-            problems.add((*steps, "balls"), str(error))
-            balls = None
-    elif settings.balls == "all":
-        balls = np.arange(len(layout.names))
-    else:
-        balls = references.ball_indices(settings.balls, layout, (*steps, "balls"))
+    balls = references.balls(settings.balls, layout, (*steps, "balls"))
     if balls is None or not is_right or dimension is None:
         return None
     values = _certified_coordinates(
@@ -318,7 +304,6 @@ def _coordinates(
     )
     if values is None:
         return None
-    balls.setflags(write=False)
     axes = tuple(AXES.index(axis) for axis in by_axis)
     return CoordinateCalibration(
         artefact,

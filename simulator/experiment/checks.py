@@ -507,11 +507,7 @@ def check_lengths(
         name for name, one in references.artefacts.items() if isinstance(one, BryanGaugeSettings)
     }
     pivots = [one for one in positions if one.artefact in gauges]
-    rows = sum(
-        len(group.balls) * len(group.probes) * group.repeats
-        for one in pivots
-        for group in one.readings
-    )
+    rows = sum(one.count for one in pivots)
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
@@ -520,12 +516,7 @@ def check_lengths(
         if references.artefacts[name].role == "length_standard" and isinstance(
             calibration, DistanceCalibration
         ):
-            probes = [
-                {probe for group in one.readings for probe in group.probes} for one in positions
-            ]
-            times = sum(
-                len(own) for own, one in zip(probes, positions, strict=True) if one.artefact == name
-            )
+            times = sum(len(one.probes) for one in positions if one.artefact == name)
             if len(calibration.pairs) * times > MOST_LENGTHS:
                 text = (
                     f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too'
@@ -590,8 +581,7 @@ def read_balls(positions: Iterable[Position]) -> np.ndarray[tuple[int], np.dtype
     """Return the indices of the balls that are read in any of the positions of one artefact, in
     order.
     """
-    groups = [group.ball_indices for position in positions for group in position.readings]
-    return np.unique(np.concatenate(groups)) if groups else np.zeros(0, dtype=np.intp)
+    return np.unique(np.concatenate([np.zeros(0, np.intp), *(one.balls for one in positions)]))
 
 
 def _check_balls_read(name: str, positions: list[Position], references: References) -> None:

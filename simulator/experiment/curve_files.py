@@ -8,16 +8,15 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
-from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
-from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS, QuantityError, metres_or_radians
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
+from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.tables import (
-    _cells,
-    refuse_columns,
-    refuse_separators,
+    header_cells,
+    read_number,
+    split_cells,
     table_lines,
     wrong_count,
-    wrong_number,
 )
 from ..inputs.yamltree import Mark
 from ..machines.curves import NAMES, Points
@@ -51,9 +50,7 @@ def read_numbered_curves(
     file = str(path)
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError(
-            [Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")]
-        )
+        raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
     if len(lines) > MOST_POINTS + 1:
         text = (
             f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"
@@ -68,18 +65,14 @@ def read_numbered_curves(
         if len(messages) >= MOST_MESSAGES:
             messages.append(Message(file, number, 1, "", MORE_ERRORS))
             break
-        cells = _cells(line)
+        cells = split_cells(line)
         if cells is None or len(cells) != len(names):
             messages.append(Message(file, number, 1, "", wrong_count(line, cells, len(names))))
             continue
-        row = []
-        for (column, cell), name, factor in zip(cells, names, factors, strict=True):
-            try:
-                row.append(metres_or_radians(cell, factor))
-            except QuantityError as error:
-                messages.append(
-                    Message(file, number, column, "", wrong_number(cell, name) or str(error))
-                )
+        row = [
+            read_number(cell, name, factor, Mark(file, number, column), messages)
+            for (column, cell), name, factor in zip(cells, names, factors, strict=True)
+        ]
         rows.append((number, row))
     if messages:
         raise ExperimentError(messages)
@@ -106,12 +99,7 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
     messages: list[Message] = []
     names: list[str] = []
     factors: list[Fraction] = []
-    refuse_columns(mark, header, EXAMPLE)
-    refuse_separators(mark, header, EXAMPLE)
-    for column, cell in _cells(header) or []:
-        place = Mark(mark.file, mark.line, column)
-        name, _, unit = cell.rpartition("_")
-        unit = unit.replace("µ", "u").replace("μ", "u")
+    for place, cell, name, unit in header_cells(mark, header, EXAMPLE):
         if name != POSITION and name not in errors:
             known = cell in (POSITION, *errors)
             remedy = (

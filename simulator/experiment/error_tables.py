@@ -5,9 +5,10 @@ measured.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.quantities import QuantityError, format_length, parse_length
@@ -20,7 +21,6 @@ from ..machines.straightness import Criterion
 from .curve_files import BANDWIDTH, read_numbered_curves
 
 COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
-KEYS = ("line", "straightness", "straightedge", "probe")
 
 # Words that may be meant for a key, and what a value without its colon looks like.
 OTHER_WORDS = {"offset": "probe", "reflector": "probe", "criterion": "straightness"}
@@ -119,11 +119,16 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         else:
             begin = match.end(1) - len(value.lstrip()) + 1
             stated[key] = (Mark(str(path), number, begin), value.strip())
-    line_of, probe, criterion = (
-        _line(stated, name, messages),
-        _probe(stated, messages),
-        _criterion(stated, messages),
-    )
+    values: dict[str, Any] = {}
+    for key, (mark, text) in stated.items():
+        try:
+            values[key] = KEYS[key](text)
+        except LineError as error:
+            messages.append(mark.message("", str(error)))
+    line_of, along = values.get("line", {}), name[2].lower()
+    if along in line_of:
+        mark = stated["line"][0]
+        messages.append(mark.message("", f"the line runs along {along}; leave it out"))
     curves: dict[str, Points] = {}
     try:
         curves, numbers = read_numbered_curves(path, bandwidths=True)
@@ -151,14 +156,16 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
                 str(path), 0, 0, "", "a bandwidth is below zero; write half the width of the band"
             )
         )
-    if "straightedge" in stated and stated["straightedge"][1] != "table":
-        mark, text = stated["straightedge"]
-        messages.append(
-            mark.message("", f'unknown place "{shorten(text)}"; write table, or leave the line out')
-        )
     if messages:
         raise ExperimentError(sorted(messages))
-    return ErrorTable(curves[name], bandwidth, line_of, probe, criterion, "straightedge" in stated)
+    return ErrorTable(
+        curves[name],
+        bandwidth,
+        line_of,
+        values.get("probe", (0.0, 0.0, 0.0)),
+        values.get("straightness"),
+        "straightedge" in stated,
+    )
 
 
 def _meant(comment: str) -> str | None:
@@ -201,22 +208,6 @@ def _range(
     return [Message(file, number, 1, "", f"{text}, {told}; {right}") for number, text in found]
 
 
-def _line(
-    stated: dict[str, tuple[Mark, str]], name: str, messages: list[Message]
-) -> dict[str, float]:
-    if "line" not in stated:
-        return {}
-    mark, text = stated["line"]
-    try:
-        found = parse_line(text)
-    except LineError as error:
-        messages.append(mark.message("", str(error)))
-        return {}
-    if name[2].lower() in found:
-        messages.append(mark.message("", f"the line runs along {name[2].lower()}; leave it out"))
-    return found
-
-
 def parse_point(text: str) -> Three:
     """Read three co-ordinates.
 
@@ -236,25 +227,23 @@ def parse_point(text: str) -> Three:
     return x, y, z
 
 
-def _probe(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> Three:
-    if "probe" not in stated:
-        return 0.0, 0.0, 0.0
-    mark, text = stated["probe"]
-    try:
-        return parse_point(text)
-    except LineError as error:
-        messages.append(mark.message("", str(error)))
-        return 0.0, 0.0, 0.0
+def _criterion(text: str) -> str:
+    if text not in get_args(Criterion):
+        known = hint(text, get_args(Criterion))
+        raise LineError(f'unknown criterion "{shorten(text)}"; {known}')
+    return text
 
 
-def _criterion(stated: dict[str, tuple[Mark, str]], messages: list[Message]) -> Criterion | None:
-    if "straightness" not in stated:
-        return None
-    mark, text = stated["straightness"]
-    for known in get_args(Criterion):
-        if text == known:
-            return known
-    messages.append(
-        mark.message("", f'unknown criterion "{shorten(text)}"; {hint(text, get_args(Criterion))}')
-    )
-    return None
+def _table(text: str) -> bool:
+    if text != "table":
+        raise LineError(f'unknown place "{shorten(text)}"; write table, or leave the line out')
+    return True
+
+
+# What comments may state, and how it is read.
+KEYS: Mapping[str, Callable[[str], object]] = {
+    "line": parse_line,
+    "straightness": _criterion,
+    "straightedge": _table,
+    "probe": parse_point,
+}

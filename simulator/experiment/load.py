@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..inputs.messages import ExperimentError, Message
-from ..inputs.problems import Problems, written_count
+from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
 from ..machines.settings import with_defaults
 from .calibrations import resolve_calibration
@@ -244,10 +244,5 @@ def _without_variants(root: Node) -> Node:
 
 
 def _raise_if_any(messages: list[Message], refused: list[Message], source: Path) -> None:
-    """Raise the messages by line, the experiment file before its tables."""
-    # What stands at a refused place was made up, and nobody should be told about it.
-    made_up = {(one.file, one.line, one.column) for one in refused}
-    found = [one for one in messages if (one.file, one.line, one.column) not in made_up]
-    every = sorted({*found, *refused}, key=lambda message: (message.file != str(source), message))
-    if every:
+    if every := in_order(messages, refused, source):
         raise ExperimentError(every)

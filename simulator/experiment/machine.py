@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.artefacts import frozen
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems
 from ..inputs.quantities import LengthFunction, Target, format_length
@@ -16,7 +17,7 @@ from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
 from .model import Evaluation, Floats, Machine, Task, Volume
-from .references import References, frozen
+from .references import References
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 
@@ -32,8 +33,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     if isinstance(settings.volume, tuple):
         ends = {axis: (0.0, edge) for axis, edge in zip(AXES, settings.volume, strict=False)}
     else:
-        volume = settings.volume
-        ends = {axis: getattr(volume, axis) for axis in AXES if getattr(volume, axis) is not None}
+        ends = settings.volume.stated
     is_right = True
     for axis, (lower, upper) in ends.items():
         if upper <= lower:
@@ -50,10 +50,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     elif isinstance(settings.repeatability, tuple):
         by_axis = dict(zip(AXES, settings.repeatability, strict=False))
     else:
-        listed = settings.repeatability
-        by_axis = {
-            axis: getattr(listed, axis) for axis in AXES if getattr(listed, axis) is not None
-        }
+        by_axis = settings.repeatability.stated
     if by_axis.keys() != ends.keys():
         text = (
             f"has {len(by_axis)} axes, but machine.volume has {len(ends)}; give one length for all,"
@@ -144,11 +141,7 @@ def _task(
                 name in references.probes, (*steps, *where), _unknown(name, references)
             )
     for key, point in (("from", settings.start), ("to", settings.to)):
-        text = (
-            f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give"
-            f" {dimension}"
-        )
-        is_right = references.require(dimension in (None, len(point)), (*steps, key), text)
+        is_right = references.has_dimension(point, (*steps, key))
         if is_right and machine is not None and machine.dimension == len(point):
             check_points(np.array([point]), (*steps, key), machine.volume, problems, of_one=True)
     if len(problems.messages) > before or dimension is None or not set(probes) <= set(offsets):
@@ -193,14 +186,7 @@ def _points(settings: Any, machine: Machine | None, references: References) -> F
         volume, seed = machine.volume, 1 if settings.seed is None else settings.seed
         size = (settings.random, dimension)
         return np.random.default_rng(seed).uniform(volume.lower, volume.upper, size)
-    is_right = True
-    for i, point in enumerate(settings):
-        text = (
-            f"has {len(point)} co-ordinates, but the experiment has {dimension} dimensions; give"
-            f" {dimension}"
-        )
-        is_right &= references.require(len(point) == dimension, (*steps, i), text)
-    if not is_right:
+    if not all([references.has_dimension(one, (*steps, i)) for i, one in enumerate(settings)]):
         return None
     points = np.array(settings)
     if machine is not None and machine.dimension == dimension:

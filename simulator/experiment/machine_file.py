@@ -14,12 +14,12 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..inputs.messages import ExperimentError, Message, Steps
-from ..inputs.problems import Problems
+from ..inputs.problems import Problems, in_order
 from ..inputs.quantities import format_angle, format_length
 from ..inputs.settings import describe, listing
 from ..inputs.wording import explain
-from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python, walk
-from ..machines.arrangement import ARRANGEMENTS, AXES, Arrangement
+from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
+from ..machines.arrangement import AXES
 from ..machines.curves import NAMES, Points
 from ..machines.description import (
     AxisTemperature,
@@ -29,6 +29,7 @@ from ..machines.description import (
     Squareness,
     Three,
 )
+from ..machines.settings import arrangement_of
 from ..machines.volumetric import DROOP, SQUARENESS
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings
@@ -63,18 +64,14 @@ def load_machine(
         )
         problems.add((), text)
     else:
-        for steps, node in walk(root):
-            if isinstance(node, Scalar) and node.value is None:
-                problems.add(steps, "empty; give a value, or leave it out")
+        problems.add_empty()
         found = _machine(root, source, problems)
         if found is not None and not refused:
             if doubts is not None:
                 _doubt_what_is_taken_off(found, problems)
                 doubts += problems.doubts
             return found
-    made_up = {(one.file, one.line, one.column) for one in refused}
-    told = [one for one in problems.messages if (one.file, one.line, one.column) not in made_up]
-    raise ExperimentError(sorted({*told, *refused}, key=lambda one: (one.file != str(source), one)))
+    raise ExperimentError(in_order(problems.messages, refused, source))
 
 
 def _machine(root: Mapping, source: Path, problems: Problems) -> MachineDescription | None:
@@ -123,16 +120,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         (min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends
     ]
     name = settings.arrangement if isinstance(settings.arrangement, str) else ""
-    stated = settings.arrangement
-    if isinstance(stated, str):
-        arrangement = ARRANGEMENTS[stated]
-    else:
-        arrangement = Arrangement(stated.probe_side, stated.workpiece_side)
-    droop = {
-        which: value
-        for which in ("phi1", "phi2")
-        if (value := getattr(settings.droop, which, None)) is not None
-    }
+    droop = {} if settings.droop is None else settings.droop.stated
     if droop and name not in DROOP:
         text = (
             f"only the arm of {listing(DROOP)} droops; leave it out, or name one of them as"
@@ -142,13 +130,14 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
     bottom, top = (_three(end) for end in zip(*ends, strict=True))
     temperature = {
         axis: AxisTemperature(one.expansion, one.deviation, one.standard_uncertainty or 0.0)
-        for axis in AXES
-        if (one := getattr(settings.temperature, axis, None)) is not None
+        for axis, one in (
+            {} if settings.temperature is None else settings.temperature.stated
+        ).items()
     }
     machine = MachineDescription(
         title=settings.title,
         arrangement_name=name,
-        arrangement=arrangement,
+        arrangement=arrangement_of(settings.arrangement),
         lower=bottom,
         upper=top,
         reference=bottom if settings.reference_point is None else settings.reference_point,
@@ -292,7 +281,7 @@ def _line(
 ) -> Three | None:
     if settings is None:
         return None
-    stated = {key: value for key in AXES if (value := getattr(settings, key)) is not None}
+    stated = settings.stated
     if AXES[axis] in stated:
         problems.add(
             (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, Tag, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from ..inputs.quantities import (
     Angle,
@@ -16,7 +16,7 @@ from ..inputs.quantities import (
     PositiveTemperatureDifference,
     TemperatureDifference,
 )
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import Forms, Settings
 from ..machines.curves import NAMES, Interpolation
 from ..machines.kinematic import ROTATIONS, describe
 from ..machines.settings import ARRANGEMENT, ArrangementName, ArrangementSettings
@@ -146,12 +146,7 @@ class SquarenessValue(Settings):
     sigmas: Sigmas = Field(2, description=SIGMAS)
 
 
-_Squareness = Annotated[
-    Annotated[Angle, Tag("<one>")]
-    | Annotated[SquarenessValue, Tag("<mapping>")]
-    | Annotated[Angle, Tag("<list>")],
-    FORM,
-]
+_Squareness = Forms[Angle, Angle, SquarenessValue]
 SquarenessSettings = create_model(
     "SquarenessSettings",
     __base__=Settings,
@@ -201,12 +196,9 @@ class DescribedMachineSettings(Settings):
     title: Line = Field(description="what the machine is, in a line")
     description: Text | None = Field(None, description="what else is worth knowing")
     arrangement: ArrangementName | ArrangementSettings = Field(description=ARRANGEMENT)
-    volume: Annotated[
-        Annotated[VolumeSettings, Tag("<mapping>")]
-        | Annotated[Annotated[Edges, Field(min_length=3)], Tag("<list>")]
-        | Annotated[VolumeSettings, Tag("<one>")],
-        FORM,
-    ] = Field(description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]")
+    volume: Forms[VolumeSettings, Annotated[Edges, Field(min_length=3)], VolumeSettings] = Field(
+        description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]"
+    )
     reference_point: Point | None = Field(
         None,
         description=(

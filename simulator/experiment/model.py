@@ -85,6 +85,11 @@ class ReadingGroup:
     repeats: int
     standard_uncertainty: Floats | None = None
 
+    @property
+    def count(self) -> int:
+        """Number of readings, every repeat counted."""
+        return len(self.probes) * len(self.balls) * self.repeats
+
 
 @dataclass(frozen=True, eq=False)
 class Position:
@@ -94,6 +99,21 @@ class Position:
     artefact: str
     pose: Pose
     readings: tuple[ReadingGroup, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of readings, every repeat counted."""
+        return sum(group.count for group in self.readings)
+
+    @property
+    def probes(self) -> tuple[str, ...]:
+        """The probes that it is read with, each once, in the order of the file."""
+        return tuple(dict.fromkeys(probe for group in self.readings for probe in group.probes))
+
+    @property
+    def balls(self) -> Indices:
+        """Indices (k,) of the balls that are read, in order."""
+        return np.unique(np.concatenate([group.ball_indices for group in self.readings]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,11 +245,7 @@ class Candidate:
     @property
     def readings(self) -> int:
         """Readings that it takes, every repeat counted."""
-        if not isinstance(self.item, Position):
-            return 0
-        return sum(
-            len(group.probes) * len(group.balls) * group.repeats for group in self.item.readings
-        )
+        return self.item.count if isinstance(self.item, Position) else 0
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-import numpy as np
-
 from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     IN_PLANE_AXES,
     Axis,
     FreePlacement,
     PlanePlacement,
-    Pose,
     nominal_pose,
 )
 from ..inputs.messages import Steps
@@ -41,9 +38,7 @@ def resolve_position(
     ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
-    for array in (pose.rotation, pose.origin):
-        array.setflags(write=False)
-    return Position(settings.name, artefact, Pose(pose.rotation, pose.origin), readings)
+    return Position(settings.name, artefact, pose, readings)
 
 
 def _readings(
@@ -89,14 +84,9 @@ def _group(
     names = layout.names if balls == "all" else balls
     if not references.count_readings(len(probe_names or ()) * len(names) * settings.repeats, steps):
         return None
-    indices = (
-        np.arange(len(layout.names))
-        if balls == "all"
-        else references.ball_indices(names, layout, (*steps, "balls"))
-    )
+    indices = references.balls(balls, layout, (*steps, "balls"))
     if probe_names is None or indices is None or not is_right:
         return None
-    indices.setflags(write=False)
     return ReadingGroup(probe_names, tuple(names), indices, settings.repeats, uncertainty)
 
 
@@ -121,7 +111,7 @@ def _placement(
     is_right = True
     if dimension == 2:
         for key in {"plane", "level"} & set(plane_keys):
-            problems.add((*steps, key), "has no meaning in two dimensions; remove it", of_key=True)
+            references.refuse_in_plane(*steps, key)
             is_right = False
     else:
         is_right &= references.require(
@@ -167,7 +157,7 @@ def _in_plane(
     first, second = sorted(axes)
     is_right = True
     for axis in ("x", "y", "z"):
-        is_written = getattr(point, axis) is not None
+        is_written = axis in point.stated
         if axis in axes:
             is_right &= references.require(is_written, (*steps, axis), f'missing; add "{axis}"')
         elif is_written:
@@ -181,12 +171,7 @@ def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlac
     dimension = references.dimension
     if dimension is None:
         return None
-    is_right = references.require(
-        len(pose.origin) == dimension,
-        (*steps, "origin"),
-        f"has {len(pose.origin)} co-ordinates, but the experiment has {dimension} dimensions; give"
-        f" {dimension}",
-    )
+    is_right = references.has_dimension(pose.origin, (*steps, "origin"))
     is_right &= references.require(
         pose.rotation is None or isinstance(pose.rotation, float) == (dimension == 2),
         (*steps, "rotation"),

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..geometry.artefacts import BallLayout, corners
+from ..geometry.artefacts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
@@ -237,7 +237,7 @@ def _candidates(
                     if reason:
                         yield Generated(full, None, plane, {}, reason)
                         continue
-                    pose = pose or _pose(
+                    pose = pose or nominal_pose(
                         PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d
                     )
                     position = Position(full, group.artefact, pose, readings[probes, k])
@@ -249,13 +249,6 @@ def _candidates(
                     stated |= {"balls": balls.written} if balls.written != "all" else {}
                     stated |= group.written
                     yield Generated(full, position, "" if d == 2 else plane, stated, "")
-
-
-def _pose(placement: PlanePlacement, layout: BallLayout, dimension: int) -> Pose:
-    pose = nominal_pose(placement, layout, dimension)
-    for array in (pose.rotation, pose.origin):
-        array.setflags(write=False)
-    return pose
 
 
 def _both(first: float, second: float) -> str:
@@ -326,9 +319,7 @@ def _planes(
     if references.dimension == 2:
         for key in ("planes", "levels"):
             if getattr(settings, key) is not None:
-                references.problems.add(
-                    (*steps, key), "has no meaning in two dimensions; remove it", of_key=True
-                )
+                references.refuse_in_plane(*steps, key)
         return ("z",)
     text = 'missing; add "planes", such as [x, y, z]'
     if not references.require(settings.planes is not None, (*steps, "planes"), text):
@@ -443,20 +434,9 @@ def _balls(
     found = []
     for k, one in enumerate(stated if is_several else (stated,)):
         where = (*steps, k) if is_several else steps
-        indices: Indices | None
-        if one == "all":
-            indices = np.arange(len(layout.names))
-        elif one == "corners":
-            try:
-                indices = corners(layout)
-            except ValueError as error:
-                references.problems.add(where, str(error))
-                continue
-        else:
-            indices = references.ball_indices(one, layout, where)
-            if indices is None:
-                continue
-        indices.setflags(write=False)
+        indices = references.balls(one, layout, where)
+        if indices is None:
+            continue
         names = tuple(layout.names[i] for i in indices)
         word = "all balls" if one == "all" else "corners" if one == "corners" else f"set {k + 1}"
         found.append(_Balls(word, names, indices, "all" if one == "all" else list(names)))

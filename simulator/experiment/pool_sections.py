@@ -4,16 +4,17 @@ on the choice.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..geometry.artefacts import Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Duration, Length
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import Forms, NonEmpty, Settings, Several
 from .position_sections import (
     BallNames,
+    CalibratedBalls,
     CoordinatesSettings,
     Count,
     DistancesSettings,
@@ -61,13 +62,7 @@ class RangeSettings(Settings):
     count: Annotated[int, Field(ge=2, le=1000)] = Field(description="how many")
 
 
-LengthList = Annotated[tuple[Length, ...], Field(min_length=1, max_length=1000)]
-Lengths = Annotated[
-    Annotated[Length, Tag("<one>")]
-    | Annotated[LengthList, Tag("<list>")]
-    | Annotated[RangeSettings, Tag("<mapping>")],
-    FORM,
-]
+Lengths = Forms[Length, Several[Length], RangeSettings]
 
 
 class LengthsByAxisSettings(Settings):
@@ -86,7 +81,7 @@ def _form_of_levels(value: Any) -> str:
 
 Levels = Annotated[
     Annotated[Length, Tag("<one>")]
-    | Annotated[LengthList, Tag("<list>")]
+    | Annotated[Several[Length], Tag("<list>")]
     | Annotated[RangeSettings, Tag("<range>")]
     | Annotated[LengthsByAxisSettings, Tag("<planes>")],
     Discriminator(_form_of_levels),
@@ -103,39 +98,22 @@ def _form_of_sets(value: Any) -> str:
     )
 
 
+ByPlane = TypeVar("ByPlane")
 ProbeSets = Annotated[
     Annotated[ProbeNames, Tag("<list>")]
-    | Annotated[
-        Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")
-    ]
-    | Annotated[ProbeNames, Tag("<planes>")],
+    | Annotated[Several[ProbeNames], Tag("<sets>")]
+    | Annotated[ByPlane, Tag("<planes>")],
     Discriminator(_form_of_sets),
 ]
+ProbesOfPlane = ProbeSets[ProbeNames]
 
 
 class ProbesByPlaneSettings(Settings):
     """Probes, or sets of them to choose from, in each plane."""
 
-    x: ProbeSets | None = Field(None, description="in planes across x")
-    y: ProbeSets | None = Field(None, description="in planes across y")
-    z: ProbeSets | None = Field(None, description="in planes across z")
-
-
-GroupProbes = Annotated[
-    Annotated[ProbeNames, Tag("<list>")]
-    | Annotated[
-        Annotated[tuple[ProbeNames, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")
-    ]
-    | Annotated[ProbesByPlaneSettings, Tag("<planes>")],
-    Discriminator(_form_of_sets),
-]
-
-SomeBalls = Annotated[
-    Annotated[Literal["all", "corners"], Tag("<one>")]
-    | Annotated[BallNames, Tag("<list>")]
-    | Annotated[BallNames, Tag("<mapping>")],
-    FORM,
-]
+    x: ProbesOfPlane | None = Field(None, description="in planes across x")
+    y: ProbesOfPlane | None = Field(None, description="in planes across y")
+    z: ProbesOfPlane | None = Field(None, description="in planes across z")
 
 
 def form_of_balls(value: Any) -> str:
@@ -152,18 +130,8 @@ def form_of_balls(value: Any) -> str:
 GroupBalls = Annotated[
     Annotated[Literal["all", "corners"], Tag("<one>")]
     | Annotated[BallNames, Tag("<list>")]
-    | Annotated[
-        Annotated[tuple[SomeBalls, ...], Field(min_length=1, max_length=1000)], Tag("<sets>")
-    ],
+    | Annotated[Several[CalibratedBalls], Tag("<sets>")],
     Discriminator(form_of_balls),
-]
-Turns = Annotated[
-    Annotated[QuarterTurns, Tag("<one>")]
-    | Annotated[
-        Annotated[tuple[QuarterTurns, ...], Field(min_length=1, max_length=1000)], Tag("<list>")
-    ]
-    | Annotated[QuarterTurns, Tag("<mapping>")],
-    FORM,
 ]
 
 
@@ -176,7 +144,7 @@ class GroupSettings(Settings):
     artefact: Name | None = Field(
         None, description="name of the artefact; optional if there is exactly one"
     )
-    planes: Annotated[tuple[Axis, ...], Field(min_length=1)] | None = Field(
+    planes: NonEmpty[Axis] | None = Field(
         None,
         description=(
             "axes that the artefact's plane is normal to, such as [x, y, z]; omitted in 2-D"
@@ -198,10 +166,10 @@ class GroupSettings(Settings):
     centres: LengthsByAxisSettings | None = Field(
         None, description="centres of the bounding rectangle along each axis, instead of corners"
     )
-    quarter_turns: Turns = Field(
+    quarter_turns: Forms[QuarterTurns, Several[QuarterTurns], QuarterTurns] = Field(
         0, description="one number of turns by 90 degrees, 0 to 3, or a list; default 0"
     )
-    probes: GroupProbes | None = Field(
+    probes: ProbeSets[ProbesByPlaneSettings] | None = Field(
         None,
         description=(
             "names of probes, or a list of such sets to choose from, [[right, left], [right]];"
@@ -325,12 +293,7 @@ Together = Annotated[tuple[Name, ...], Field(min_length=2)]
 class LimitsSettings(Settings):
     """What a choice has to comply with."""
 
-    keep: Annotated[
-        Annotated[Literal["all"], Tag("<one>")]
-        | Annotated[tuple[Name, ...], Tag("<list>")]
-        | Annotated[tuple[Name, ...], Tag("<mapping>")],
-        FORM,
-    ] = Field(
+    keep: Forms[Literal["all"], tuple[Name, ...], tuple[Name, ...]] = Field(
         (), description="candidates that must be chosen, by name; all: every position of the file"
     )
     never_together: tuple[Together, ...] = Field(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.artefacts import frozen
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
 from ..inputs.messages import Steps, format_path
 from ..inputs.problems import written_count, written_text
@@ -43,7 +44,7 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .references import ReadingCount, References, frozen
+from .references import ReadingCount, References
 from .structure import Sections
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
@@ -267,11 +268,8 @@ def _candidate(
         _or(getattr(own, key, None), _or(getattr(times, key), default))
         for key, default in (("set_up", SET_UP), ("reading", READING))
     )
-    readings = sum(len(one.probes) * len(one.balls) * one.repeats for one in position.readings)
-    probes = {probe for one in position.readings for probe in one.probes}
-    seconds = (
-        set_up + readings * reading + (len(probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
-    )
+    changes = (len(position.probes) - 1) * _or(times.probe_change, PROBE_CHANGE)
+    seconds = set_up + position.count * reading + changes
     across = "" if plane is None or references.dimension == 2 else plane
     stated = {key: value for key, value in stated.items() if key != "times"}
     return Candidate(position.name, position, seconds, across, group, drawn, stated, reading)
@@ -335,16 +333,12 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
             )
             continue
         ends = np.array([[-np.inf] * 3, [np.inf] * 3])
-        for k, axis in enumerate(AXIS_INDEX):
-            stated = getattr(region, axis)
-            if stated is None:
-                continue
+        for axis, stated in region.stated.items():
+            k = AXIS_INDEX[axis]
             if stated[0] >= stated[1]:
                 problems.add((*steps, axis), "the lower end must be below the upper; correct them")
             if k >= (references.dimension or 3):
-                problems.add(
-                    (*steps, axis), "has no meaning in two dimensions; remove it", of_key=True
-                )
+                references.refuse_in_plane(*steps, axis)
             ends[:, k] = stated
         found[name] = frozen(ends[:, : references.dimension or 3])
     return found
@@ -474,7 +468,7 @@ def _selected(
     if of.artefact is not None:
         tests.append(lambda one: one.item.artefact == of.artefact)
     if of.probe is not None:
-        tests.append(lambda one: of.probe in _probes_of(one))
+        tests.append(lambda one: isinstance(one.item, Position) and of.probe in one.item.probes)
     return [i for i, one in enumerate(candidates) if all(test(one) for test in tests)]
 
 
@@ -487,9 +481,3 @@ def _group_names(root: Any) -> list[str]:
             name = f"candidates[{i}]"
         names += [name] if name is not None else []
     return names
-
-
-def _probes_of(candidate: Candidate) -> set[str]:
-    if not isinstance(candidate.item, Position):
-        return set()
-    return {probe for group in candidate.item.readings for probe in group.probes}

@@ -6,37 +6,21 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints, Tag
+from pydantic import Field, StringConstraints
 
 from ..geometry.artefacts import Coordinates, Name, PairSet
 from ..geometry.positions import Axis
 from ..inputs.quantities import Angle, Length, LengthFunction, PositiveLength
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import Forms, NonEmpty, Settings
 
 Text = Annotated[str, StringConstraints(min_length=1)]
 Count = Annotated[int, Field(ge=1, le=10_000)]
-BallNames = Annotated[tuple[Name, ...], Field(min_length=1)]
-ProbeNames = Annotated[tuple[Name, ...], Field(min_length=1)]
-BallSelection = Annotated[
-    Annotated[Literal["all"], Tag("<one>")]
-    | Annotated[BallNames, Tag("<list>")]
-    # Nothing is a mapping here; the list's message says what is expected.
-    | Annotated[BallNames, Tag("<mapping>")],
-    FORM,
-]
-CalibratedBalls = Annotated[
-    Annotated[Literal["all", "corners"], Tag("<one>")]
-    | Annotated[BallNames, Tag("<list>")]
-    | Annotated[BallNames, Tag("<mapping>")],
-    FORM,
-]
-ListedPairs = Annotated[tuple[tuple[Name, Name], ...], Field(min_length=1)]
-PairSelection = Annotated[
-    Annotated[PairSet, Tag("<one>")]
-    | Annotated[ListedPairs, Tag("<list>")]
-    | Annotated[ListedPairs, Tag("<mapping>")],
-    FORM,
-]
+BallNames = NonEmpty[Name]
+ProbeNames = NonEmpty[Name]
+BallSelection = Forms[Literal["all"], BallNames, BallNames]
+CalibratedBalls = Forms[Literal["all", "corners"], BallNames, BallNames]
+ListedPairs = NonEmpty[tuple[Name, Name]]
+PairSelection = Forms[PairSet, ListedPairs, ListedPairs]
 
 
 # Those beyond are refused when the position is placed, with what is meant.
@@ -62,12 +46,7 @@ class SomeAxisLengthsSettings(Settings):
 Edges = Annotated[tuple[PositiveLength, ...], Field(min_length=2, max_length=3)]
 
 
-LengthPerAxis = Annotated[
-    Annotated[PositiveLength, Tag("<one>")]
-    | Annotated[Edges, Tag("<list>")]
-    | Annotated[AxisLengthsSettings, Tag("<mapping>")],
-    FORM,
-]
+LengthPerAxis = Forms[PositiveLength, Edges, AxisLengthsSettings]
 
 
 class InPlaneSettings(Settings):
@@ -82,15 +61,7 @@ class PoseSettings(Settings):
     """A free pose x = R y + origin of an artefact."""
 
     origin: Coordinates = Field(description="where the origin of the artefact's frame is")
-    rotation: (
-        Annotated[
-            Annotated[Angle, Tag("<one>")]
-            | Annotated[tuple[Angle, Angle, Angle], Tag("<list>")]
-            | Annotated[tuple[Angle, Angle, Angle], Tag("<mapping>")],
-            FORM,
-        ]
-        | None
-    ) = Field(
+    rotation: Forms[Angle, tuple[Angle, Angle, Angle], tuple[Angle, Angle, Angle]] | None = Field(
         None,
         description=(
             "angles about the fixed axes x, then y, then z; a single angle in 2-D; default 0"
@@ -154,7 +125,7 @@ class PositionSettings(Settings):
         None,
         description="of each reading there, one length or per axis; default: machine.repeatability",
     )
-    readings: Annotated[tuple[ReadingSettings, ...], Field(min_length=1)] | None = Field(
+    readings: NonEmpty[ReadingSettings] | None = Field(
         None,
         description=(
             "groups of readings, instead of probes, balls, repeats and standard_uncertainty"
@@ -169,7 +140,7 @@ class CertifiedDistance(Settings):
     distance: PositiveLength = Field(description="distance of their centres")
 
 
-CertifiedDistances = Annotated[tuple[CertifiedDistance, ...], Field(min_length=1)]
+CertifiedDistances = NonEmpty[CertifiedDistance]
 
 
 class DistancesSettings(Settings):
@@ -189,15 +160,7 @@ class DistancesSettings(Settings):
         None, description="3 (default): distances in space; 2: in the artefact's plane"
     )
     standard_uncertainty: LengthFunction = Field(description="of each distance; may grow with it")
-    values: (
-        Annotated[
-            Annotated[Text, Tag("<one>")]
-            | Annotated[CertifiedDistances, Tag("<list>")]
-            | Annotated[CertifiedDistances, Tag("<mapping>")],
-            FORM,
-        ]
-        | None
-    ) = Field(
+    values: Forms[Text, CertifiedDistances, CertifiedDistances] | None = Field(
         None,
         description=(
             "CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
@@ -224,12 +187,9 @@ class CoordinatesSettings(Settings):
         None, description="name of the artefact; optional if there is exactly one"
     )
     balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
-    standard_uncertainty: Annotated[
-        Annotated[PositiveLength, Tag("<one>")]
-        | Annotated[SomeAxisLengthsSettings, Tag("<mapping>")]
-        | Annotated[PositiveLength, Tag("<list>")],
-        FORM,
-    ] = Field(description="of every co-ordinate, or per axis of the artefact: {x: …, y: …}")
+    standard_uncertainty: Forms[PositiveLength, PositiveLength, SomeAxisLengthsSettings] = Field(
+        description="of every co-ordinate, or per axis of the artefact: {x: …, y: …}"
+    )
     values: Text | None = Field(
         None,
         description="CSV file with columns ball, x_mm, y_mm, z_mm; default: nominal co-ordinates",

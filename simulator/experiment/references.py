@@ -16,8 +16,10 @@ from ..geometry.artefacts import (
     BallsSettings,
     BryanGaugeSettings,
     coincident_balls,
+    corners,
+    frozen,
 )
-from ..inputs.messages import ExperimentError, Steps
+from ..inputs.messages import ExperimentError, Step, Steps
 from ..inputs.problems import Problems, written_keys, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, listing, shorten
@@ -122,14 +124,40 @@ class References:
         """
         return self._known_once("probe", self.probes, names, steps)
 
-    def ball_indices(
-        self, names: Sequence[str], layout: BallLayout, steps: Steps
-    ) -> Indices | None:
-        """Return the indices of listed balls, or None after saying what is wrong."""
+    def balls(self, chosen: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
+        """Return the indices of balls, all, the corners or listed ones, or None after saying what
+        is wrong.
+        """
         index = {name: i for i, name in enumerate(layout.names)}
-        if not self._known_once("ball", index, names, steps):
+        if chosen == "all":
+            found = np.arange(len(index))
+        elif chosen == "corners":
+            try:
+                found = corners(layout)
+            except ValueError as error:
+                self.problems.add(steps, str(error))
+                return None
+        elif self._known_once("ball", index, chosen, steps):
+            found = np.array([index[name] for name in chosen], dtype=np.intp)
+        else:
             return None
-        return np.array([index[name] for name in names], dtype=np.intp)
+        found.setflags(write=False)
+        return found
+
+    def has_dimension(self, point: Sequence[float], steps: Steps) -> bool:
+        """Tell whether a point has as many co-ordinates as the experiment, after saying where
+        not.
+        """
+        return self.require(
+            self.dimension in (None, len(point)),
+            steps,
+            f"has {len(point)} co-ordinates, but the experiment has {self.dimension} dimensions;"
+            f" give {self.dimension}",
+        )
+
+    def refuse_in_plane(self, *steps: Step) -> None:
+        """Say that a key is one of three dimensions."""
+        self.problems.add(steps, "has no meaning in two dimensions; remove it", of_key=True)
 
     def _known_once(
         self, what: str, known: Collection[str], names: Sequence[str], steps: Steps
@@ -245,12 +273,7 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Floa
     offsets = {}
     for name, settings in sections.entries("probes").items():
         offset = settings.offset if isinstance(settings, ProbeSettings) else settings
-        if references.require(
-            dimension in (None, len(offset)),
-            ("probes", name),
-            f"has {len(offset)} co-ordinates, but the experiment has {dimension} dimensions; give"
-            f" {dimension}",
-        ):
+        if references.has_dimension(offset, ("probes", name)):
             offsets[str(name)] = frozen(offset)
     return offsets
 
@@ -321,13 +344,6 @@ def lengths_per_axis(
         f" {dimension}"
     )
     return frozen(given), references.require(len(given) == dimension, steps, text)
-
-
-def frozen(values: Any) -> Floats:
-    """Return values as an array that cannot be changed."""
-    array = np.array(values, dtype=float)
-    array.setflags(write=False)
-    return array
 
 
 def _with_coordinates(

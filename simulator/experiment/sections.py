@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StringConstraints, Tag
+from pydantic import Field, StringConstraints
 
 from ..geometry.artefacts import AnyArtefactSettings, Coordinates, Name
 from ..inputs.quantities import Length, LengthFunction
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import Forms, NonEmpty, Settings, Several
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from .pool_sections import PoolSettings
@@ -20,8 +20,6 @@ from .position_sections import CalibrationSettings, Edges, LengthPerAxis, Positi
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 # U6 follows every pair of points.
 MOST_POINTS = 40_000
-# Measuring tasks, each a row over the shared parameters.
-MOST_TASKS = 1000
 Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
@@ -38,12 +36,7 @@ class VolumeSettings(Settings):
 class MachineSettings(Settings):
     """The machine: where it can measure and how well it repeats."""
 
-    volume: Annotated[
-        Annotated[VolumeSettings, Tag("<mapping>")]
-        | Annotated[Edges, Tag("<list>")]
-        | Annotated[VolumeSettings, Tag("<one>")],
-        FORM,
-    ] = Field(
+    volume: Forms[VolumeSettings, Edges, VolumeSettings] = Field(
         description=(
             "ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]; two axes: 2-D"
         )
@@ -91,12 +84,7 @@ class ProbeSettings(Settings):
     )
 
 
-AnyProbe = Annotated[
-    Annotated[Coordinates, Tag("<list>")]
-    | Annotated[ProbeSettings, Tag("<mapping>")]
-    | Annotated[Coordinates, Tag("<one>")],
-    FORM,
-]
+AnyProbe = Forms[Coordinates, Coordinates, ProbeSettings]
 
 
 class PointsSettings(Settings):
@@ -135,14 +123,10 @@ class EvaluationSettings(Settings):
     """Where the uncertainty of the machine is evaluated."""
 
     points: (
-        Annotated[
-            Annotated[PointsSettings, Tag("<mapping>")]
-            | Annotated[
-                Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)],
-                Tag("<list>"),
-            ]
-            | Annotated[PointsSettings, Tag("<one>")],
-            FORM,
+        Forms[
+            PointsSettings,
+            Annotated[tuple[Coordinates, ...], Field(min_length=1, max_length=MOST_POINTS)],
+            PointsSettings,
         ]
         | None
     ) = Field(
@@ -155,9 +139,7 @@ class EvaluationSettings(Settings):
     probe: Name | None = Field(
         None, description="probe that the points are measured with; default: the first"
     )
-    tasks: (
-        Annotated[tuple[TaskSettings, ...], Field(min_length=1, max_length=MOST_TASKS)] | None
-    ) = Field(
+    tasks: Several[TaskSettings] | None = Field(
         None,
         description="list of lengths that the machine is to measure, {name: …, from: …, to: …}",
     )
@@ -186,7 +168,7 @@ class ExperimentSettings(Settings):
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
         description="name → artefact: grid, square, balls, two_spheres, sphere or bryan_gauge"
     )
-    positions: Annotated[tuple[PositionSettings, ...], Field(min_length=1)] = Field(
+    positions: NonEmpty[PositionSettings] = Field(
         description="where the artefacts are put and what is read there"
     )
     calibration: tuple[CalibrationSettings, ...] = Field(
@@ -196,7 +178,7 @@ class ExperimentSettings(Settings):
     pool: PoolSettings | None = Field(
         None, description="what ballplate plan chooses positions and calibration from"
     )
-    priors: Annotated[tuple[PriorSettings, ...], Field(min_length=1)] | None = Field(
+    priors: NonEmpty[PriorSettings] | None = Field(
         None, description="what is known beforehand of machine errors and poses"
     )
     evaluation: EvaluationSettings | None = Field(

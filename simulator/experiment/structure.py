@@ -16,7 +16,7 @@ from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.settings import describe, hint, nearest
 from ..inputs.wording import explain
-from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
+from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import CalibrationSettings, PositionSettings
 from .sections import AnyProbe, ExperimentSettings, PriorSettings
@@ -72,9 +72,7 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         )
         problems.add((), text)
         return Sections(values)
-    for steps, node in walk(root):
-        if isinstance(node, Scalar) and node.value is None:
-            problems.add(steps, "empty; give a value, or leave it out")
+    problems.add_empty()
     absent = [name for name in fields if name not in root.items]
     misspelt = set()
     for key in root.items:

@@ -245,7 +245,7 @@ class BallsSettings(ArtefactSettings):
                 tuple(str(i + 1) for i in range(len(self.coordinates))),
                 self.coordinates,
             )
-        return BallLayout(names, _frozen([(*xyz, 0.0)[:3] for xyz in listed]))
+        return BallLayout(names, frozen([(*xyz, 0.0)[:3] for xyz in listed]))
 
 
 class TwoSpheresSettings(ArtefactSettings):
@@ -259,7 +259,7 @@ class TwoSpheresSettings(ArtefactSettings):
         only: Pairs = ((0, 1),)
         return BallLayout(
             ("1", "2"),
-            _frozen([(0.0, 0.0, 0.0), (self.length, 0.0, 0.0)]),
+            frozen([(0.0, 0.0, 0.0), (self.length, 0.0, 0.0)]),
             {"corner sides": only, "neighbours": only},
             (0, 1),
         )
@@ -272,7 +272,7 @@ class SphereSettings(ArtefactSettings):
 
     def layout(self) -> BallLayout:
         """Return one ball at the origin of its own frame."""
-        return BallLayout(("1",), _frozen([(0.0, 0.0, 0.0)]))
+        return BallLayout(("1",), frozen([(0.0, 0.0, 0.0)]))
 
 
 class BryanGaugeSettings(ArtefactSettings):
@@ -300,7 +300,7 @@ class BryanGaugeSettings(ArtefactSettings):
     def layout(self) -> BallLayout:
         """Return the places where the ball is read, about the pivot."""
         places = self.radius * directions(self.directions)
-        return BallLayout(tuple(str(i + 1) for i in range(len(places))), _frozen(places))
+        return BallLayout(tuple(str(i + 1) for i in range(len(places))), frozen(places))
 
 
 ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
@@ -361,13 +361,14 @@ def _rectangle(
         sets["braced"] = tuple(dict.fromkeys((min(pair), max(pair)) for pair in every))
     return BallLayout(
         tuple(f"r{row + 1}c{column + 1}" for row, column in places),
-        _frozen(coordinates),
+        frozen(coordinates),
         sets,
         (lower_left, lower_right, upper_left, upper_right),
     )
 
 
-def _frozen(values: Any) -> NDArray[np.float64]:
+def frozen(values: Any) -> NDArray[np.float64]:
+    """Return values as an array that cannot be changed."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array

@@ -64,7 +64,7 @@ def _farthest(places: NDArray[np.float64]) -> tuple[int, int]:
     """The ball that fixes an axis best, and which one, from places (n, 2) relative to the
     origin.
     """
-    distance = np.sqrt((places**2).sum(axis=1))
+    distance = np.linalg.norm(places, axis=1)
     for axis in (0, 1):
         on_axis = np.abs(places[:, 1 - axis]) <= ON_AXIS * distance
         reach = np.where(on_axis, np.abs(places[:, axis]), 0.0)

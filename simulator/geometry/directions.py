@@ -8,10 +8,10 @@ from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from ..inputs.quantities import Angle
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import Forms, Settings
 
 MOST_DIRECTIONS = 5000
 UPRIGHT = 0.5 * np.pi
@@ -79,12 +79,7 @@ Listed = Annotated[
     tuple[Annotated[tuple[Angle, Angle], Field()], ...],
     Field(min_length=1, max_length=MOST_DIRECTIONS),
 ]
-DirectionsSettings = Annotated[
-    Annotated[GeneratedDirectionsSettings, Tag("<mapping>")]
-    | Annotated[Listed, Tag("<list>")]
-    | Annotated[GeneratedDirectionsSettings, Tag("<one>")],
-    FORM,
-]
+DirectionsSettings = Forms[GeneratedDirectionsSettings, Listed, GeneratedDirectionsSettings]
 DIRECTIONS = (
     "azimuth about z from x and elevation above the xy plane: a list of [azimuth, elevation],"
     " {azimuths: 8, elevations: [0 deg, 30 deg, 60 deg]}, or {random: 60, lowest: 20 deg, highest:"

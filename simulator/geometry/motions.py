@@ -12,6 +12,19 @@ Array = NDArray[np.float64]
 AXIS_NAMES = ("x", "y", "z")
 
 
+def cross_matrices(v: Array) -> Array:
+    """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
+
+    >>> cross_matrices(np.array([[1.0, 2.0, 3.0]]))[0].tolist()
+    [[0.0, 3.0, -2.0], [-3.0, 0.0, 1.0], [2.0, -1.0, 0.0]]
+    """
+    matrix = np.zeros((len(v), 3, 3), v.dtype)
+    matrix[:, 0, 1], matrix[:, 0, 2] = v[:, 2], -v[:, 1]
+    matrix[:, 1, 0], matrix[:, 1, 2] = -v[:, 2], v[:, 0]
+    matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 1], -v[:, 0]
+    return matrix
+
+
 def rotation_from_vector(vector: Array) -> Array:
     """Rotation matrices (m, d, d) that turn by `vector`: (m, 3) about an axis in space, (m, 1) in
     the plane.
@@ -22,14 +35,11 @@ def rotation_from_vector(vector: Array) -> Array:
     if vector.shape[1] == 1:
         c, s = np.cos(vector[:, 0]), np.sin(vector[:, 0])
         return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
-    angle = np.sqrt((vector**2).sum(axis=1))
+    angle = np.linalg.norm(vector, axis=1)
     # sin(t)/t and (1 - cos t)/t^2, both smooth at 0, where np.sinc is exact.
     first = np.sinc(angle / np.pi)[:, None, None]
     second = (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None]
-    cross = np.zeros((len(vector), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2] = -vector[:, 2], vector[:, 1]
-    cross[:, 1, 0], cross[:, 1, 2] = vector[:, 2], -vector[:, 0]
-    cross[:, 2, 0], cross[:, 2, 1] = -vector[:, 1], vector[:, 0]
+    cross = cross_matrices(-vector)
     return np.eye(3) + first * cross + second * (cross @ cross)
 
 
@@ -49,9 +59,9 @@ def vector_from_rotation(rotation: Array) -> Array:
         ],
         axis=1,
     )
-    sine = 0.5 * np.sqrt((double_sine**2).sum(axis=1))
+    sine = 0.5 * np.linalg.norm(double_sine, axis=1)
     angle = np.arctan2(sine, 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0))
-    return np.asarray(0.5 * double_sine / np.sinc(angle / np.pi)[:, None])
+    return 0.5 * double_sine / np.sinc(angle / np.pi)[:, None]
 
 
 def vector_rate(vector: Array) -> Array:
@@ -61,15 +71,12 @@ def vector_rate(vector: Array) -> Array:
     m, q = vector.shape
     if q == 1:
         return np.ones((m, 1, 1))
-    angle = np.sqrt((vector**2).sum(axis=1))
+    angle = np.linalg.norm(vector, axis=1)
     half = 0.5 * np.where(angle > 1e-4, angle, 1e-4)
     # (1 - (t/2) cot(t/2)) / t^2, which is 1/12 for small t.
     second = np.where(angle > 1e-4, (1.0 - half / np.tan(half)) / (4.0 * half**2), 1.0 / 12.0)
-    cross = np.zeros((m, 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2] = -vector[:, 2], vector[:, 1]
-    cross[:, 1, 0], cross[:, 1, 2] = vector[:, 2], -vector[:, 0]
-    cross[:, 2, 0], cross[:, 2, 1] = -vector[:, 1], vector[:, 0]
-    return np.asarray(np.eye(3) - 0.5 * cross + second[:, None, None] * (cross @ cross))
+    cross = cross_matrices(-vector)
+    return np.eye(3) - 0.5 * cross + second[:, None, None] * (cross @ cross)
 
 
 def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:

@@ -40,6 +40,10 @@ class Pose:
     rotation: NDArray[np.float64]
     origin: NDArray[np.float64]
 
+    def __post_init__(self) -> None:
+        for array in (self.rotation, self.origin):
+            array.setflags(write=False)
+
 
 @dataclass(frozen=True)
 class PlanePlacement:
@@ -89,15 +93,24 @@ def nominal_pose(
     lower, upper = rectangle.min(axis=0), rectangle.max(axis=0)
     anchor = lower if placement.anchor == "corner" else (lower + upper) / 2
     in_plane_origin = np.array(placement.at) - anchor
+    rotation = plane_rotation(placement.plane, placement.quarter_turns, dimension)
     if dimension == 2:
-        return Pose(turn, in_plane_origin)
-    normal = AXIS_INDEX[placement.plane]
+        return Pose(rotation, in_plane_origin)
+    origin = np.zeros(3)
     first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[placement.plane])
-    rotation, origin = np.zeros((3, 3)), np.zeros(3)
-    rotation[np.ix_([first, second], [0, 1])] = turn
-    rotation[normal, 2] = 1.0
-    origin[[first, second, normal]] = *in_plane_origin, placement.level
+    origin[[first, second, AXIS_INDEX[placement.plane]]] = *in_plane_origin, placement.level
     return Pose(rotation, origin)
+
+
+def plane_rotation(plane: str, turns: int, dimension: int = 3) -> NDArray[np.float64]:
+    """The rotation (d, d) of an artefact in a plane after quarter-turns."""
+    turn = QUARTER_TURNS[turns % 4]
+    if dimension == 2:
+        return turn.copy()
+    rotation = np.zeros((3, 3))
+    rotation[np.ix_([AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane]], [0, 1])] = turn
+    rotation[AXIS_INDEX[plane], 2] = 1.0
+    return rotation
 
 
 def bounding_rectangle(layout: BallLayout) -> NDArray[np.float64]:

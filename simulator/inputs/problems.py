@@ -4,10 +4,12 @@ once.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
-from .yamltree import Mapping, Mark, Node, Sequence, mark_of, to_python, written
+from .yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python, walk, written
 
 
 @dataclass(eq=False)
@@ -50,6 +52,12 @@ class Problems:
             else:
                 self.add(steps, f"{message.file}: {message.text}")
 
+    def add_empty(self) -> None:
+        """Add a message about everything that is empty."""
+        for steps, node in walk(self.root):
+            if isinstance(node, Scalar) and node.value is None:
+                self.add(steps, "empty; give a value, or leave it out")
+
     def has_below(self, steps: Steps) -> bool:
         """Tell whether there is a message about a path or something below it."""
         path = format_path(steps)
@@ -59,9 +67,21 @@ class Problems:
         )
 
 
-def written_keys(root: Node, section: str) -> tuple[str, ...]:
-    """Return the keys of a section as written, whether or not their values are right."""
-    node = written(root, section)
+def in_order(
+    messages: Iterable[Message], made_up: Iterable[Message], source: Path
+) -> list[Message]:
+    """Messages by line, those about the source before those about its tables.
+
+    What stands where one of `made_up` is was made up for it, and nobody should be told about it.
+    """
+    refused = {(one.file, one.line, one.column) for one in made_up}
+    found = [one for one in messages if (one.file, one.line, one.column) not in refused]
+    return sorted({*found, *made_up}, key=lambda one: (one.file != str(source), one))
+
+
+def written_keys(root: Node, *steps: Step) -> tuple[str, ...]:
+    """Return the keys of the mapping at a path as written, none where there is no mapping."""
+    node = written(root, *steps)
     return tuple(node.items) if isinstance(node, Mapping) else ()
 
 

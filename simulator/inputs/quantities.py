@@ -431,7 +431,7 @@ def parse_length_function(value: object) -> LengthFunction:
         # Read for the messages about units.
         parse_length(f"1 {unit}")
         parse_length(f"1 {of_length}")
-        per = LENGTH_UNITS[_plain(unit)] / LENGTH_UNITS[_plain(of_length)]
+        per = LENGTH_UNITS[plain_unit(unit)] / LENGTH_UNITS[plain_unit(of_length)]
         return _growing(value, f"{number} {unit}", _inverse(value, divisor) * per)
     match = CONSTANT_AND_DIVISOR.fullmatch(value)
     if match is None:
@@ -454,7 +454,7 @@ def exact_ratio(value: str) -> Fraction:
     parse_ratio(value)
     match = QUANTITY.fullmatch(value.strip())
     assert match is not None
-    return exact_number(match[1]) * RATIO_UNITS[_plain(match[2])]
+    return exact_number(match[1]) * RATIO_UNITS[plain_unit(match[2])]
 
 
 def _constant(value: object) -> LengthFunction:
@@ -548,7 +548,7 @@ def _parse(value: object, kind: str) -> float:
     number, unit = match.groups()
     if unit is None:
         raise QuantityError(f'"{text}" has no unit; {_with_unit(text, kind)}')
-    plain = _plain(unit)
+    plain = plain_unit(unit)
     if plain not in units:
         for other, other_units in UNITS.items():
             if plain in other_units:
@@ -562,7 +562,7 @@ def _parse(value: object, kind: str) -> float:
     return metres_or_radians(number, units[plain], kind)
 
 
-def _plain(unit: str) -> str:
+def plain_unit(unit: str) -> str:
     """A unit in the letters of the tables: both the micro sign and the Greek letter are in use on
     keyboards.
     """

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Discriminator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 
 def _form(value: Any) -> str:
@@ -22,8 +22,25 @@ def _form(value: Any) -> str:
     )
 
 
-FORM = Discriminator(_form)
-"""Chooses among the forms of a value by the tags <mapping>, <list> and <one>."""
+One = TypeVar("One")
+Listed = TypeVar("Listed")
+Mapped = TypeVar("Mapped")
+
+NonEmpty = Annotated[tuple[One, ...], Field(min_length=1)]
+"""A list of one entry at least."""
+
+Several = Annotated[tuple[One, ...], Field(min_length=1, max_length=1000)]
+"""A list of up to a thousand entries."""
+
+Forms = Annotated[
+    Annotated[One, Tag("<one>")]
+    | Annotated[Listed, Tag("<list>")]
+    | Annotated[Mapped, Tag("<mapping>")],
+    Discriminator(_form),
+]
+"""A value that is one thing, a list or a mapping; of a form that is none, it stands for the form
+whose message says what is expected.
+"""
 
 
 class Settings(BaseModel):
@@ -33,6 +50,11 @@ class Settings(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """Values that are not None, by the names of their fields."""
+        return {key: value for key, value in self if value is not None}
 
 
 def listing(words: Iterable[str], limit: int = 8) -> str:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
 
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
-from .quantities import LENGTH_UNITS, QuantityError, metres_or_radians, plain_number, power_of_ten
+from .quantities import (
+    LENGTH_UNITS,
+    QuantityError,
+    metres_or_radians,
+    plain_number,
+    plain_unit,
+    power_of_ten,
+)
 from .settings import hint, listing, shorten
 from .spreadsheets import text_of_cell
 from .yamltree import GivenText, Mark, read_text
@@ -85,7 +93,7 @@ def read_table(
         if row is not None:
             rows.append(row)
             continue
-        cells = _cells(line)
+        cells = split_cells(line)
         if cells is None or len(cells) != len(places):
             messages.append(mark.message("", wrong_count(line, cells, len(places))))
             continue
@@ -93,13 +101,8 @@ def read_table(
         row_lengths = []
         for name in (*lengths, *optional):
             column, cell = by_name.get(name, (1, "0"))
-            try:
-                row_lengths.append(metres_or_radians(cell, factors.get(name, Fraction(1))))
-            except QuantityError as error:
-                messages.append(
-                    Mark(file, number, column).message("", wrong_number(cell, name) or str(error))
-                )
-                row_lengths.append(float("nan"))
+            factor, place = factors.get(name, Fraction(1)), Mark(file, number, column)
+            row_lengths.append(read_number(cell, name, factor, place, messages))
         for name in texts:
             if not by_name[name][1]:
                 messages.append(
@@ -178,26 +181,38 @@ class _PlainRows:
         return FileRow(mark, texts, tuple(lengths))
 
 
-def refuse_columns(mark: Mark, header: str, example: str) -> None:
-    """Refuse a first line of so many columns that saying what is wrong with each would take long.
+def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, str, str, str]]:
+    """The cells of a first line: where each stands, what it says, its name and its unit.
 
-    :raises ExperimentError: there are more than a thousand.
+    :raises ExperimentError: there are more than a thousand, so that saying what is wrong with each
+        would take long, or they are separated by semicolons or tabs.
     """
     count = header.count(",") + 1
     if count > MOST_COLUMNS:
         text = f"{count} columns are too many; the first line should be {example}"
         raise ExperimentError([mark.message("", text)])
-
-
-def refuse_separators(mark: Mark, header: str, example: str) -> None:
-    """Refuse a first line whose columns are separated by semicolons or tabs.
-
-    :raises ExperimentError: they are.
-    """
     if "," not in header and re.search("[;\t]", header):
-        raise ExperimentError(
-            [mark.message("", f"the columns are not separated by commas; write {example}")]
-        )
+        text = f"the columns are not separated by commas; write {example}"
+        raise ExperimentError([mark.message("", text)])
+    for column, cell in split_cells(header) or []:
+        name, _, unit = cell.rpartition("_")
+        yield Mark(mark.file, mark.line, column), cell, name, plain_unit(unit)
+
+
+def read_number(
+    cell: str,
+    name: str,
+    factor: Fraction,
+    mark: Mark,
+    messages: list[Message],
+    kind: str = "length",
+) -> float:
+    """The number in a cell, times its column's factor; NaN after saying what is wrong."""
+    try:
+        return metres_or_radians(cell, factor, kind)
+    except QuantityError as error:
+        messages.append(mark.message("", wrong_number(cell, name) or str(error)))
+        return math.nan
 
 
 def column_names(path: Path | GivenText) -> tuple[str, ...]:
@@ -207,7 +222,7 @@ def column_names(path: Path | GivenText) -> tuple[str, ...]:
     """
     lines = table_lines(path)
     header = lines[0][1] if lines else ""
-    cells = _cells(header) or [] if header.count(",") < MOST_COLUMNS else []
+    cells = split_cells(header) or [] if header.count(",") < MOST_COLUMNS else []
     return tuple(cell if "_" not in cell else cell.rpartition("_")[0] for _, cell in cells)
 
 
@@ -256,12 +271,7 @@ def _columns(
     messages: list[Message] = []
     names: list[str] = []
     factors: dict[str, Fraction] = {}
-    refuse_columns(mark, header, example)
-    refuse_separators(mark, header, example)
-    for column, cell in _cells(header) or []:
-        place = Mark(mark.file, mark.line, column)
-        name, _, unit = cell.rpartition("_")
-        unit = unit.replace("µ", "u").replace("μ", "u")
+    for place, cell, name, unit in header_cells(mark, header, example):
         if cell in texts:
             name = cell
         elif name in (*lengths, *optional) and unit in LENGTH_UNITS:
@@ -299,7 +309,7 @@ def _columns(
     return names, factors
 
 
-def _cells(line: str) -> list[tuple[int, str]] | None:
+def split_cells(line: str) -> list[tuple[int, str]] | None:
     """Split a line into cells with their columns, from 1; None if its quotation marks do not
     match.
     """

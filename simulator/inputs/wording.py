@@ -10,8 +10,9 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from .messages import MOST_MESSAGES, Steps
+from .problems import written_keys
 from .settings import describe, hint, listing, shorten
-from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python
+from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python, written
 
 Schema = AnyMapping[str, Any]
 
@@ -147,8 +148,8 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
             for one in _schemas_at(schema, root, steps[:-1])
             for key in one.get("properties", {})
         ]
-        written = to_python_keys(root, steps[:-1])
-        free = [key for key in dict.fromkeys(known) if key not in written]
+        taken = written_keys(root, *steps[:-1])
+        free = [key for key in dict.fromkeys(known) if key not in taken]
         # A misspelt key may stand beside the right one.
         meant = hint(str(steps[-1]), known)
         meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
@@ -191,14 +192,6 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
     return Explanation(steps, error["msg"][:1].lower() + error["msg"][1:])
 
 
-def to_python_keys(root: Node, steps: Steps) -> tuple[str, ...]:
-    """Return the keys of the mapping at a path, none where there is no mapping."""
-    node: Node | None = root
-    for step in steps:
-        node = child(node, step)
-    return tuple(node.items) if isinstance(node, Mapping) else ()
-
-
 def _wrong_literal(value: Any, allowed: list[str]) -> str:
     if isinstance(value, str):
         meant = hint(value, allowed)
@@ -210,9 +203,7 @@ def _wrong_literal(value: Any, allowed: list[str]) -> str:
 
 
 def _wrong_length(root: Node, steps: Steps, schema: Schema) -> str:
-    node: Node | None = root
-    for step in steps:
-        node = child(node, step)
+    node = written(root, *steps)
     if isinstance(node, Scalar):
         return "empty; give a text"
     items = getattr(node, "items", ())

@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps
+from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, refused
 from .settings import listing, shorten
 
 DEEPEST = 50
@@ -104,14 +104,14 @@ class Mapping:
 Node = Scalar | Sequence | Mapping
 
 
-def read_tree(path: Path, refused: list[Message] | None = None) -> Node:
+def read_tree(path: Path, minor: list[Message] | None = None) -> Node:
     """Read a YAML file; see ``parse_tree``.
 
     :raises ExperimentError: the file cannot be read, is not YAML, is empty, holds several
         documents, repeats a key or uses what experiment files do not: merge keys, tags, recursive
         aliases.
     """
-    return parse_tree(read_text(path), str(path), refused)
+    return parse_tree(read_text(path), str(path), minor)
 
 
 @dataclass(frozen=True)
@@ -136,21 +136,21 @@ def read_text(path: Path | GivenText) -> str:
     try:
         kind = path.stat().st_mode
         if stat.S_ISDIR(kind):
-            raise _refusal(file, "this is a folder; name a file in it")
+            raise refused(file, "this is a folder; name a file in it")
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
-            raise _refusal(file, "this is a device; name a file")
+            raise refused(file, "this is a device; name a file")
         # A pipe of the shell's has a writer; any other may wait for one for ever.
         if stat.S_ISFIFO(kind) and not file.startswith(("/dev/", "/proc/")):
-            raise _refusal(file, "this is a pipe, to which nobody may write; name a file")
+            raise refused(file, "this is a pipe, to which nobody may write; name a file")
         with path.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
     except FileNotFoundError:
-        raise _refusal(file, "there is no such file; check the name and the folder") from None
+        raise refused(file, "there is no such file; check the name and the folder") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise _refusal(file, f"cannot be read ({reason}); check its name and permissions") from None
+        raise refused(file, f"cannot be read ({reason}); check its name and permissions") from None
     if len(content) > MOST_BYTES:
-        raise _refusal(file, f"has more than {MOST_BYTES // 10**6} MB; leave some of it out")
+        raise refused(file, f"has more than {MOST_BYTES // 10**6} MB; leave some of it out")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -162,10 +162,10 @@ def read_text(path: Path | GivenText) -> str:
         raise ExperimentError([Message(file, line, column, "", text)]) from None
 
 
-def parse_tree(text: str, file: str, refused: list[Message] | None = None) -> Node:
+def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node:
     """Read YAML text; ``file`` is named in messages.
 
-    Errors that leave a usable tree, such as a repeated key, are added to ``refused`` if it is
+    Errors that leave a usable tree, such as a repeated key, are added to ``minor`` if it is
     given.
 
     :raises ExperimentError: as ``read_tree``.
@@ -187,12 +187,12 @@ def parse_tree(text: str, file: str, refused: list[Message] | None = None) -> No
     except yaml.MarkedYAMLError as error:
         builder.messages.append(_syntax_message(error, text, file))
         builder.root = None
-    if builder.messages and (refused is None or builder.root is None):
+    if builder.messages and (minor is None or builder.root is None):
         raise ExperimentError(sorted(builder.messages))
-    if refused is not None:
-        refused += builder.messages
+    if minor is not None:
+        minor += builder.messages
     if builder.root is None:
-        raise _refusal(
+        raise refused(
             file,
             "the file is empty; write at least title, machine, error_model, artefacts and"
             " positions",
@@ -452,10 +452,6 @@ class _Builder:
         else:
             self.refuse(node.mark, "a key must be a single word or text; write key: value")
             parent.key_is_refused = True
-
-
-def _refusal(file: str, text: str) -> ExperimentError:
-    return ExperimentError([Message(file, 0, 0, "", text)])
 
 
 def _syntax_message(error: yaml.MarkedYAMLError, text: str, file: str) -> Message:

@@ -130,7 +130,7 @@ class Polynomial(_Polynomials):
         envelope = t * (1.0 - t) if self.zero_at_one else t
         if self.size == 0:
             return np.zeros((len(t), 0))
-        return np.asarray(chebyshev.chebvander(2.0 * t - 1.0, self.size - 1) * envelope[:, None])
+        return chebyshev.chebvander(2.0 * t - 1.0, self.size - 1) * envelope[:, None]
 
     @cached_property
     def monomials(self) -> Array:
@@ -165,7 +165,7 @@ class Monomial(_Polynomials):
     def values(self, t: Array) -> Array:
         """Basis functions at t (m,), as (m, size)."""
         envelope = 1.0 - t if self.zero_at_one else np.ones_like(t)
-        return np.asarray(t[:, None] ** np.arange(1, self.size + 1) * envelope[:, None])
+        return t[:, None] ** np.arange(1, self.size + 1) * envelope[:, None]
 
     @cached_property
     def monomials(self) -> Array:
@@ -272,7 +272,7 @@ class Spline:
         # Products with the unit matrix would cost free ends nothing but time.
         inner = splines[:, 1:-1] if self.ends == "free" else splines @ self._inner
         if self.zero_at_one:
-            return np.asarray(inner)
+            return inner
         return np.column_stack([t if self.contains_t else splines @ self._first, inner])
 
     def interior(self) -> Spline:
@@ -312,7 +312,7 @@ class Spline:
         jumps /= np.abs(jumps).max(axis=1, keepdims=True)
         # Orthonormal combinations that have no jumps.
         null = np.linalg.qr(jumps.T, mode="complete")[0][:, len(jumps) :]
-        return np.asarray(whole @ null)
+        return whole @ null
 
     def quoted(self, variable: str = "t") -> Quoted:
         """Coefficients of the B-splines that are not zero by the end conditions."""

@@ -70,7 +70,7 @@ def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
     p = USUAL_OFFSET * float((upper - lower).max()) * generator.standard_normal(x.shape)
     known = outer.jacobian(x, np.zeros(count), p).reshape(-1, count)
     wanted = inner.jacobian(x, np.zeros(len(inner.parameters)), p).reshape(len(known), -1)
-    scale = np.sqrt((known**2).sum(axis=0))
+    scale = np.linalg.norm(known, axis=0)
     matrix = np.linalg.lstsq(known / scale, wanted, rcond=1e-13)[0] / scale[:, None]
     left = np.abs(known @ matrix - wanted).max(axis=0) / np.abs(wanted).max(axis=0)
     missing = tuple(
@@ -78,7 +78,7 @@ def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
     )
     if missing:
         raise NotContainedError(missing)
-    return np.asarray(matrix)
+    return matrix
 
 
 def along_axes(model: ErrorModel, a: Array, kinematic: KinematicModel) -> tuple[Array, float]:

@@ -54,7 +54,7 @@ class Lever:
 
     def values(self, t: Array) -> Array:
         """The product at t (m,), as (m, 1)."""
-        return np.asarray(self.length * (t - self.t0)[:, None] * self.rotation.values(t))
+        return self.length * (t - self.t0)[:, None] * self.rotation.values(t)
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Combination(SingleFunction):
         found = -self.intercept - self.slope * t[:, None]
         for factor, part in self.parts:
             found = found + factor * part.values(t)
-        return np.asarray(found)
+        return found
 
     def less(self, intercept: float, slope: float = 0.0) -> Combination:
         """The function less another straight line."""
@@ -209,7 +209,7 @@ def coupling(machine: MachineDescription, error: ParametricError) -> Array:
         offset[0, error.axis] = 0.0
     sign, vector = carried_vectors(machine.arrangement, offset, np.array([error.probe]))[error.axis]
     component = TRANSLATIONS.index(error.name[1])
-    return np.asarray(sign * np.cross(np.eye(3), vector)[:, component])
+    return sign * np.cross(np.eye(3), vector)[:, component]
 
 
 def stated_function(

@@ -15,7 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .kinematic import cross_matrices, rotation_and_derivatives
+from ..geometry.motions import cross_matrices
+from .kinematic import rotation_and_derivatives
 from .protocol import Array, Line, Parameter, Reported, Unit
 from .terms import Terms
 
@@ -106,7 +107,7 @@ class EmpiricalModel:
     def scaled(self, x: Array) -> Array:
         """Places x (m, 3) scaled to [0, 1] over the volume."""
         lower = np.asarray(self.lower)
-        return np.asarray((x - lower) / (np.asarray(self.upper) - lower))
+        return (x - lower) / (np.asarray(self.upper) - lower)
 
     def functions(self, x: Array, a: Array) -> Array:
         """The six functions at x (m, 3), as (m, 6)."""
@@ -119,10 +120,10 @@ class EmpiricalModel:
     def error(self, x: Array, a: Array, p: Array) -> Array:
         found = self.functions(x, a)
         if self.full_rotations:
-            return np.asarray(
-                found[:, :3] + np.einsum("mij,mj->mi", rotation_and_derivatives(found[:, 3:])[0], p)
+            return found[:, :3] + np.einsum(
+                "mij,mj->mi", rotation_and_derivatives(found[:, 3:])[0], p
             )
-        return np.asarray(found[:, :3] + p + np.cross(found[:, 3:], p))
+        return found[:, :3] + p + np.cross(found[:, 3:], p)
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         values = self.terms.values(self.scaled(x))

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .kinematic import cross_matrices
+from ..geometry.motions import cross_matrices
 from .protocol import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
 
 # Points at which the two are compared, at random in the volume, and largest probe offset there, in
@@ -58,7 +58,7 @@ class FramedModel:
     def error(self, x: Array, a: Array, p: Array) -> Array:
         own, shift, turn = a[:-6], a[-6:-3], a[-3:]
         found = self.model.error(x, own, p) - self.model.error(self._at_corner(x), own, p) + p
-        return np.asarray(found + shift + np.cross(turn, x - self._at_corner(x)))
+        return found + shift + np.cross(turn, x - self._at_corner(x))
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         own, corner = a[:-6], self._at_corner(x)
@@ -68,12 +68,7 @@ class FramedModel:
 
     def reported(self) -> Reported:
         """As the model reports itself, with the frame's shift and turn."""
-        own = self.model.reported()
-        rows, n = own.matrix.shape
-        matrix = np.zeros((rows + 6, n + 6))
-        matrix[:rows, :n], matrix[rows:, n:] = own.matrix, np.eye(6)
-        names, units = zip(*_MOTIONS, strict=True)
-        return Reported((*own.names, *names), (*own.units, *units), matrix)
+        return self.model.reported().beside(Reported.as_is(self.parameters[-6:]))
 
 
 def in_frame_of(

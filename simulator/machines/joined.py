@@ -32,7 +32,7 @@ class JoinedModel:
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.first.parameters)
-        return np.asarray(self.first.error(x, a[:n], p) + self.second.error(x, a[n:], p) - p)
+        return self.first.error(x, a[:n], p) + self.second.error(x, a[n:], p) - p
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.first.parameters)
@@ -41,11 +41,6 @@ class JoinedModel:
         )
 
     def reported(self) -> Reported:
-        one, other = self.first.reported(), self.second.reported()
-        matrix = np.zeros(
-            (len(one.matrix) + len(other.matrix), one.matrix.shape[1] + other.matrix.shape[1])
-        )
-        matrix[: len(one.matrix), : one.matrix.shape[1]] = one.matrix
-        matrix[len(one.matrix) :, one.matrix.shape[1] :] = other.matrix
-        names = one.names + tuple(f"second {name}" for name in other.names)
-        return Reported(names, one.units + other.units, matrix)
+        second = self.second.reported()
+        names = tuple(f"second {name}" for name in second.names)
+        return self.first.reported().beside(replace(second, names=names))

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..geometry.motions import cross_matrices
 from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial
 from .protocol import Array, Line, Parameter, Reported, Unit
@@ -111,7 +112,7 @@ class KinematicModel:
     def scaled(self, x: Array) -> Array:
         """Positions x (m, 3) scaled to [0, 1] over the volume."""
         lower = np.asarray(self.lower)
-        return np.asarray((x - lower) / (np.asarray(self.upper) - lower))
+        return (x - lower) / (np.asarray(self.upper) - lower)
 
     def _bases(self, x: Array) -> dict[tuple[int, Basis], Array]:
         t = self.scaled(x)
@@ -136,7 +137,7 @@ class KinematicModel:
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
             moved = moved + sign * np.cross(rotation[:, axis], vector)
-        return np.asarray(moved)
+        return moved
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         bases = self._bases(x)
@@ -147,10 +148,9 @@ class KinematicModel:
                 self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
-            by_translation, by_rotation = (
-                None,
-                _cross_matrices(carried_vectors(self.arrangement, from_origin, p)),
-            )
+            carried = carried_vectors(self.arrangement, from_origin, p)
+            by_translation = None
+            by_rotation = [cross_matrices(sign * vector) for sign, vector in carried]
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
         for f in self.functions:
             values, columns = bases[f.axis, f.basis], self.slices[f.name]
@@ -256,26 +256,6 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
     return [found[axis] for axis in AXES]
 
 
-def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector,
-    signed.
-    """
-    return [cross_matrices(sign * vector) for sign, vector in carried]
-
-
-def cross_matrices(v: Array) -> Array:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
-
-    >>> cross_matrices(np.array([[1.0, 2.0, 3.0]]))[0].tolist()
-    [[0.0, 3.0, -2.0], [-3.0, 0.0, 1.0], [2.0, -1.0, 0.0]]
-    """
-    matrix = np.zeros((len(v), 3, 3), v.dtype)
-    matrix[:, 0, 1], matrix[:, 0, 2] = v[:, 2], -v[:, 1]
-    matrix[:, 1, 0], matrix[:, 1, 2] = -v[:, 2], v[:, 0]
-    matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 1], -v[:, 0]
-    return matrix
-
-
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     matrix = np.zeros((len(angle), 3, 3), angle.dtype)
@@ -323,7 +303,7 @@ class _Chain:
             return displaced
 
         def turned(matrix: Array, vector: Array) -> Array:
-            return np.asarray(np.einsum("mij,mj->mi", matrix, vector))
+            return np.einsum("mij,mj->mi", matrix, vector)
 
         tip = self.p.astype(dtype, copy=True)
         on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]

@@ -69,5 +69,4 @@ class MetricModel:
         return result
 
     def reported(self) -> Reported:
-        names = tuple(p.name for p in self.parameters)
-        return Reported(names, tuple(p.unit for p in self.parameters), np.eye(len(names)))
+        return Reported.as_is(self.parameters)

@@ -38,6 +38,22 @@ class Reported:
     units: tuple[Unit, ...]
     matrix: Array
 
+    @classmethod
+    def as_is(cls, parameters: tuple[Parameter, ...]) -> Reported:
+        """The parameters themselves."""
+        names, units = (
+            tuple(one.name for one in parameters),
+            tuple(one.unit for one in parameters),
+        )
+        return cls(names, units, np.eye(len(parameters)))
+
+    def beside(self, other: Reported) -> Reported:
+        """What is reported of two models, the parameters of one after those of the other."""
+        (rows, columns), size = self.matrix.shape, np.add(self.matrix.shape, other.matrix.shape)
+        matrix = np.zeros(size)
+        matrix[:rows, :columns], matrix[rows:, columns:] = self.matrix, other.matrix
+        return Reported(self.names + other.names, self.units + other.units, matrix)
+
     def known_names(self) -> dict[str, int]:
         """Rows by all names under which they may be stated: `EXX t` is the coefficient `EXX t^1`,
         too.

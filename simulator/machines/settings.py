@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, Union
 
-from pydantic import Field, PrivateAttr, StringConstraints, Tag, model_validator
+from pydantic import Field, PrivateAttr, StringConstraints, model_validator
 
-from ..inputs.settings import FORM, Settings
+from ..inputs.settings import Forms, Settings
 from ..splines.knots import with_boundaries
 from .arrangement import ARRANGEMENTS, AXES, Arrangement
 from .bases import Basis, Ends, Monomial, Polynomial, Spline
@@ -169,12 +169,7 @@ class SplineSettings(Settings):
         return Spline(self.order, with_boundaries(self.knots, self.features, self.order), ends=ends)
 
 
-BasisSettings = Annotated[
-    Annotated[Literal["chebyshev", "monomial"], Tag("<one>")]
-    | Annotated[SplineSettings, Tag("<mapping>")]
-    | Annotated[SplineSettings, Tag("<list>")],
-    FORM,
-]
+BasisSettings = Forms[Literal["chebyshev", "monomial"], SplineSettings, SplineSettings]
 BASIS = (
     "Univariate functions: chebyshev or monomial polynomials, or B-splines as {order: 4, knots:"
     " [0.5]}, also with features: [0.3], slopes: {start: 0, end: 0} or periodic: true."
@@ -262,12 +257,7 @@ class EmpiricalSettings(Settings):
     """Six functions of three variables: displacement and rotation of the probe."""
 
     kind: Literal["empirical"] = Field(description="six functions of x, y and z")
-    terms: Annotated[
-        Annotated[Literal["sums", "quadratic", "tensor"], Tag("<one>")]
-        | Annotated[RadialSettings, Tag("<mapping>")]
-        | Annotated[RadialSettings, Tag("<list>")],
-        FORM,
-    ] = Field(
+    terms: Forms[Literal["sums", "quadratic", "tensor"], RadialSettings, RadialSettings] = Field(
         default="sums",
         description=(
             "Functions of x, y and z: sums of tensor products with linear factors, quadratic"

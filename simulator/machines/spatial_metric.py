@@ -91,17 +91,10 @@ class SpatialMetricModel:
         return from_lower @ (self.axes(a) - np.eye(3)).T + p
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        return np.asarray(
-            np.einsum("nij,mj->min", self._derivatives(a)[1], x - np.array(self.lower))
-        )
+        return np.einsum("nij,mj->min", self._derivatives(a)[1], x - np.array(self.lower))
 
     def reported(self) -> Reported:
-        parameters = self.parameters
-        return Reported(
-            tuple(p.name for p in parameters),
-            tuple(p.unit for p in parameters),
-            np.eye(len(parameters)),
-        )
+        return Reported.as_is(self.parameters)
 
 
 def parameters_of_metric(metric: Array) -> Array:

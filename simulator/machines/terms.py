@@ -70,7 +70,7 @@ class Products:
         result = whole_values(self.axes[0], t[:, 0])[:, self._by_axis[0]]
         for axis in (1, 2):
             result *= whole_values(self.axes[axis], t[:, axis])[:, self._by_axis[axis]]
-        return np.asarray(result)
+        return result
 
     def quoted(self) -> Quoted:
         """Coefficients of monomials; splines are quoted as they are, with t and 1 among them."""
@@ -186,7 +186,7 @@ class Radial:
     def values(self, t: Array) -> Array:
         kernel, linear = self._functions(t)
         radial, polynomial = self._weights
-        return np.asarray(kernel @ radial + linear @ polynomial)
+        return kernel @ radial + linear @ polynomial
 
     def quoted(self) -> Quoted:
         """The values at the centres, as they are."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr
 
 from ..inputs.quantities import Angle, PositiveLength
-from ..inputs.settings import Settings
+from ..inputs.settings import NonEmpty, Settings
 from .curves import Interpolation, Points, curves_model
 from .description import MachineDescription, true_volumetric
 from .protocol import ErrorModel, TrueMachine
@@ -68,7 +68,7 @@ class CurvesSettings(Settings):
     """A machine with measured error curves."""
 
     kind: Literal["curves"] = Field(description="measured error curves")
-    files: Annotated[tuple[str, ...], Field(min_length=1)] = Field(
+    files: NonEmpty[str] = Field(
         description=(
             "CSV files, each with the columns position_mm and errors of one axis such as EXX_um and"
             " EAX_urad; errors that no file has are zero."

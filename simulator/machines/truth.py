@@ -143,7 +143,7 @@ def _random(settings: RandomSettings, model: ErrorModel) -> Array:
     generator = np.random.default_rng(np.random.SeedSequence(settings.seed))
     drawn = generator.standard_normal(len(model.parameters))
     if not isinstance(model, HasLines):
-        return np.asarray(drawn * [sizes[p.unit] for p in model.parameters])
+        return drawn * [sizes[p.unit] for p in model.parameters]
     # Gauss's rule integrates squared polynomials exactly.
     nodes, weights = np.polynomial.legendre.leggauss(64)
     t = 0.5 * (nodes + 1.0)

@@ -75,12 +75,8 @@ def thermal_field(axis: int) -> Field:
     temperature.
     """
     exponents = int(axis == 0), int(axis == 1), int(axis == 2)
-    return Field(
-        f"thermal {AXES[axis]}",
-        "1",
-        f"thermal expansion along {AXES[axis]}",
-        ((axis, 1.0, exponents),),
-    )
+    meaning = f"thermal expansion along {AXES[axis]}"
+    return Field(f"thermal {AXES[axis]}", "1", meaning, ((axis, 1.0, exponents),))
 
 
 def droop_field(arrangement: str, which: str, length: float) -> Field:
@@ -128,16 +124,14 @@ class VolumetricModel:
         return (*self.chain.parameters, *found)
 
     def _from_origin(self, x: Array) -> Array:
-        return np.asarray(
-            x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin)
-        )
+        return x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)
         found = self.chain.error(x, a[:n], p)
         for field, value in zip(self.fields, a[n:], strict=True):
             found = found + value * field.values(self._from_origin(x))
-        return np.asarray(found)
+        return found
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)
@@ -153,13 +147,8 @@ class VolumetricModel:
 
     def reported(self) -> Reported:
         """Functions as the kinematic model reports them, and the fields' numbers as they are."""
-        chain = self.chain.reported()
-        rows, n = chain.matrix.shape
-        matrix = np.zeros((rows + len(self.fields), n + len(self.fields)))
-        matrix[:rows, :n] = chain.matrix
-        matrix[rows:, n:] = np.eye(len(self.fields))
-        names = (*chain.names, *(field.name for field in self.fields))
-        return Reported(names, (*chain.units, *(field.unit for field in self.fields)), matrix)
+        of_fields = self.parameters[len(self.chain.parameters) :]
+        return self.chain.reported().beside(Reported.as_is(of_fields))
 
 
 def symbol(name: str) -> str:

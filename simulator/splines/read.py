@@ -14,23 +14,21 @@ from typing import Literal
 
 import numpy as np
 
-from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message
+from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import (
     ANGLE_UNITS,
     LENGTH_UNITS,
     QuantityError,
     exact_number,
-    metres_or_radians,
 )
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.tables import (
     MOST_ROWS,
-    _cells,
-    refuse_columns,
-    refuse_separators,
+    header_cells,
+    read_number,
+    split_cells,
     table_lines,
     wrong_count,
-    wrong_number,
 )
 from ..inputs.yamltree import Mark
 from .space import Array
@@ -112,12 +110,10 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
             f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV"
             " file that begins"
         )
-        raise ExperimentError([Message(file, 0, 0, "", f"{text} with a line such as {EXAMPLE}")])
+        raise refused(file, f"{text} with a line such as {EXAMPLE}")
     lines = table_lines(path)
     if not lines:
-        raise ExperimentError(
-            [Message(file, 0, 0, "", f"the file is empty; its first line should be {EXAMPLE}")]
-        )
+        raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
     header = _Header(Mark(file, lines[0][0], 1), lines[0][1])
     x_column, y_column, profile = header.choose(x, y)
     wanted = [*([] if x_column is None else [x_column]), y_column, *profile]
@@ -139,20 +135,18 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
         if len(messages) >= MOST_MESSAGES or len(values) > MOST_POINTS:
             break
         mark = Mark(file, number, 1)
-        cells = _cells(line)
+        cells = split_cells(line)
         if cells is None or len(cells) != len(header.order):
             messages.append(mark.message("", wrong_count(line, cells, len(header.order))))
             continue
         row = []
         for column in wanted:
-            place, cell = cells[header.index(column)]
-            try:
-                row.append(metres_or_radians(cell, header.factors[column.name], column.kind))
-                if column.name == UNCERTAINTY and row[-1] <= 0:
-                    raise QuantityError(f'"{cell}" is no standard uncertainty; give one above zero')
-            except QuantityError as error:
-                text = wrong_number(cell, column.name) or str(error)
-                messages.append(Mark(file, number, place).message("", text))
+            start, cell = cells[header.index(column)]
+            place, factor = Mark(file, number, start), header.factors[column.name]
+            row.append(read_number(cell, column.name, factor, place, messages, column.kind))
+            if column.name == UNCERTAINTY and row[-1] <= 0:
+                text = f'"{cell}" is no standard uncertainty; give one above zero'
+                messages.append(place.message("", text))
         values.append(row)
         if header.has_normals:
             try:
@@ -250,22 +244,17 @@ class _Header:
 
     def __init__(self, mark: Mark, line: str) -> None:
         self.mark = mark
-        refuse_columns(mark, line, EXAMPLE)
-        cells = _cells(line) or []
-        refuse_separators(mark, line, EXAMPLE)
-        self.order = [cell for _, cell in cells]
+        cells = list(header_cells(mark, line, EXAMPLE))
+        self.order = [cell for _, cell, _, _ in cells]
         self.columns: dict[str, Column] = {}
         self.factors: dict[str, Fraction] = {}
         self.texts: dict[str, int] = {}
         self._index: dict[str, int] = {}
         messages = []
-        for k, (column, cell) in enumerate(cells):
-            name, _, unit = cell.rpartition("_")
-            unit = unit.replace("µ", "u").replace("μ", "u")
+        for k, (place, cell, name, unit) in enumerate(cells):
             kind: Literal["length", "angle"] = "length" if unit in LENGTH_UNITS else "angle"
             units: Mapping[str, Fraction] = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
             if name in self.columns or cell in self.texts:
-                place = Mark(mark.file, mark.line, column)
                 messages.append(
                     place.message("", f'a second column "{shorten(cell)}"; remove one of them')
                 )

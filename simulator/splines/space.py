@@ -132,4 +132,4 @@ class SplineSpace:
         for k in range(self.order - 1, derivative - 1, -1):
             factor = float(np.prod(np.arange(k - derivative + 1, k + 1)))
             found = found * u + factor * self.pieces[piece, k]
-        return np.asarray(found / self.length**derivative)
+        return found / self.length**derivative

@@ -57,21 +57,19 @@ class SplineFit:
 
         :raises SplineError: an x beyond the ends.
         """
-        return np.asarray(self.space.rows(x, derivative, side) @ self.coefficients)
+        return self.space.rows(x, derivative, side) @ self.coefficients
 
     def spread(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
         """Standard uncertainty of the curve or a derivative at x (m,) for sigma 1.
 
         :raises SplineError: an x beyond the ends.
         """
-        return np.asarray(
-            np.sqrt(((self.space.rows(x, derivative, side) @ self.root) ** 2).sum(axis=1))
-        )
+        return np.linalg.norm(self.space.rows(x, derivative, side) @ self.root, axis=1)
 
     @cached_property
     def residuals(self) -> Array:
         """Points less curve (m,)."""
-        return np.asarray(self.y - self.values(self.x))
+        return self.y - self.values(self.x)
 
     @cached_property
     def sum_of_squares(self) -> float:
@@ -158,7 +156,12 @@ def _contradiction(
     others = [
         constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING
     ]
-    if len(others) == 1 and _is_same(constraints[k], others[0]):
+    # One that prescribes the same thing.
+    if (
+        len(others) == 1
+        and (one := others[0]).words == constraints[k].words
+        and np.allclose(one.places, constraints[k].places, rtol=1e-12, atol=0.0)
+    ):
         return SplineProblem(
             f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
             constraints[k].places,
@@ -174,13 +177,6 @@ def _contradiction(
         " knot"
     )
     return SplineProblem(text, tuple(places))
-
-
-def _is_same(one: Constraint, other: Constraint) -> bool:
-    """Whether two constraints prescribe the same thing."""
-    return one.words == other.words and bool(
-        np.allclose(one.places, other.places, rtol=1e-12, atol=0.0)
-    )
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:

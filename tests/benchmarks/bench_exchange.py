@@ -13,13 +13,7 @@ import pytest
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import criterion
 from ballplate.planning.information import Information, pool_information
-from ballplate.planning.search import (
-    Losses,
-    SelectionProblem,
-    best_addition,
-    counted_root,
-    full_root,
-)
+from ballplate.planning.search import Losses, SelectionProblem, best_addition, full_root
 from ballplate.results.study import predict
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.load import load
@@ -93,9 +87,7 @@ def test_one_exchange(tmp_path: Path, balls: int) -> None:
         found = []
         for k in some:
             root = full_root(information.of({*left, int(k)}))
-            found.append(
-                np.inf if root is None else problem.criterion.value(counted_root(problem, root))
-            )
+            found.append(np.inf if root is None else problem.value(root))
         return found
 
     rows = {int(k): rank_rows(information, int(k)) for k in some}

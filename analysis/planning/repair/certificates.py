@@ -143,7 +143,8 @@ def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
         singles = [(int(i), int(j)) for i, j in np.column_stack(np.triu_indices(n, 1))[order]]
     singles += row_pairs(layout)
     for pair in dict.fromkeys(singles):
-        yield f"distance {distance_words(layout, pair)} of {{}}", np.array([pair], np.intp)
+        one, other = (layout.names[k] for k in pair)
+        yield f"distance {one}-{other} of {{}}", np.array([pair], np.intp)
     for name, words in (
         ("corner sides", "four sides of {}"),
         ("corner diagonals", "two diagonals of {}"),
@@ -168,11 +169,6 @@ def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
     if len(found) <= MOST_DISTANCES:
         return found
     return [found[k] for k in np.linspace(0, len(found) - 1, MOST_DISTANCES).astype(int)]
-
-
-def distance_words(layout: BallLayout, pair: tuple[int, int]) -> str:
-    """Names of two balls as those of their distance."""
-    return f"{layout.names[pair[0]]}-{layout.names[pair[1]]}"
 
 
 def length_words(value: LengthFunction) -> str:

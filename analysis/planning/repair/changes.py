@@ -120,8 +120,6 @@ def with_calibration(experiment: Experiment, item: Calibration) -> Experiment:
 
 def moved(position: Position, rotation: Array, origin: Array) -> Position:
     """The position in another pose."""
-    for array in (rotation, origin):
-        array.setflags(write=False)
     return replace(position, pose=Pose(rotation, origin))
 
 
@@ -176,20 +174,6 @@ def with_repeats(experiment: Experiment, name: str, times: int) -> Experiment:
 
 def _named(experiment: Experiment, name: str) -> Position:
     return next(one for one in experiment.positions if one.name == name)
-
-
-def probes_of(position: Position) -> tuple[str, ...]:
-    """Names of all probes that are used in a position."""
-    return tuple(dict.fromkeys(name for group in position.readings for name in group.probes))
-
-
-def count_readings(positions: Sequence[Position]) -> int:
-    """Readings of balls, every repeat counted."""
-    return sum(
-        len(group.probes) * len(group.balls) * group.repeats
-        for place in positions
-        for group in place.readings
-    )
 
 
 def pair_set(layout: BallLayout, chosen: Indices) -> str | None:

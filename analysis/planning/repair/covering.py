@@ -82,7 +82,7 @@ def covering_set(
 def open_of(rows: Array) -> Array:
     """Orthonormal columns (k, open) that rows (m, k) say nothing of."""
     _, values, directions = np.linalg.svd(rows)
-    return np.asarray(directions[int((values > SEEN).sum()) :].T)
+    return directions[int((values > SEEN).sum()) :].T
 
 
 def _may_cover(one: Array, other: Array) -> bool:

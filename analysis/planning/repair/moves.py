@@ -21,11 +21,9 @@ from ballplate.simulator.machines.protocol import Array
 from .changes import (
     Change,
     ChangeKind,
-    count_readings,
     further,
     is_inside,
     moved,
-    probes_of,
     with_further,
     with_pose,
     with_repeats,
@@ -115,7 +113,7 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
     for name, offset in {**experiment.probes, **tips}.items():
         for place in experiment.positions:
             if (
-                name in probes_of(place)
+                name in place.probes
                 or not is_plate(experiment, place.artefact)
                 or experiment.dimension == 2
             ):
@@ -123,7 +121,7 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
             more, layout = further(place, name), experiment.layouts[place.artefact]
             if not is_inside(more, layout, experiment.machine.volume, {name: offset}):
                 continue
-            cost = float(count_readings([more]))
+            cost = float(more.count)
             words = f'read position "{place.name}" with probe {name} too'
             if name in tips:
                 # A stylus has to be made.
@@ -142,7 +140,7 @@ def repeats(experiment: Experiment) -> Iterator[Change]:
     for times in TIMES:
         for place in experiment.positions:
             words = f'read position "{place.name}" {times} times'
-            cost = float((times - 1) * count_readings([place]))
+            cost = float((times - 1) * place.count)
             touched = frozenset(f"position {place.name} with {name}" for name in experiment.probes)
             apply = partial(with_repeats, name=place.name, times=times)
             yield Change(ChangeKind.READ_MORE, words, cost, touched, apply)

@@ -51,7 +51,7 @@ def middle_of(layout: BallLayout) -> Array:
 
 def clean(origin: Array) -> Array:
     """Without what rounding leaves."""
-    return np.asarray(np.round(origin, 13) + 0.0)
+    return np.round(origin, 13) + 0.0
 
 
 def is_plate(experiment: Experiment, artefact: str) -> bool:

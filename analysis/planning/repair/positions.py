@@ -16,20 +16,18 @@ from ballplate.simulator.experiment.model import (
 from ballplate.simulator.geometry.artefacts import (
     TwoSpheresSettings,
 )
-from ballplate.simulator.geometry.positions import AXIS_INDEX, Axis, Pose
+from ballplate.simulator.geometry.positions import AXIS_INDEX, Axis, Pose, plane_rotation
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.machines.protocol import Array
 
 from .changes import (
     Change,
     ChangeKind,
-    count_readings,
     is_inside,
-    probes_of,
     with_position,
 )
 from .placing import along_rotation, bars, clean, is_plate, middle_of, pitch
-from .written import plane_of, plane_rotation
+from .written import plane_of
 
 PLANES: tuple[Axis, ...] = ("x", "y", "z")
 # Where they may be along the normal of their plane, in fractions of the volume.
@@ -61,7 +59,7 @@ def positions(experiment: Experiment) -> Iterator[Change]:
                 yield Change(
                     ChangeKind.ADD_POSITION,
                     told,
-                    float(count_readings([new])),
+                    float(new.count),
                     frozenset({f"more {words}"}),
                     add,
                     new,
@@ -141,7 +139,7 @@ def _probes_across(experiment: Experiment, artefact: str, plane: Axis | None) ->
     for place in own:
         found = plane_of(place.pose.rotation)
         if plane is None or (found is not None and found[0] == plane):
-            return probes_of(place)
+            return place.probes
     normal = AXIS_INDEX[plane or "z"]
     across = [
         name

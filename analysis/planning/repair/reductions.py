@@ -16,7 +16,7 @@ from ballplate.simulator.machines.settings import (
     SplineSettings,
 )
 
-from .changes import Change, ChangeKind, count_readings, with_artefact
+from .changes import Change, ChangeKind, with_artefact
 
 # More balls a side, and fewer coefficients, than this are not tried.
 MOST_BALLS_MORE, MOST_COEFFICIENTS_LESS = 6, 6
@@ -44,7 +44,8 @@ def more_balls(experiment: Experiment) -> Iterator[Change]:
             changed = with_artefact(experiment, name, new)
             if changed is not None:
                 cost = float(
-                    count_readings(changed.positions) - count_readings(experiment.positions)
+                    sum(one.count for one in changed.positions)
+                    - sum(one.count for one in experiment.positions)
                 )
                 apply = partial(_with_artefact, name=name, settings=new)
                 yield Change(
@@ -86,7 +87,7 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
         now = getattr(model, key)
         for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
             new = model.model_copy(update={key: value})
-            apply = partial(_with_model, settings=new)
+            apply = partial(replace, error_model=new)
             what = (
                 words
                 if value != 1
@@ -94,7 +95,3 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
             )
             told = f"ask for {value} {what} instead of {now}"
             yield Change(ChangeKind.MODEL, told, float(now - value), frozenset({"model"}), apply)
-
-
-def _with_model(experiment: Experiment, settings: Any) -> Experiment:
-    return replace(experiment, error_model=settings)

@@ -361,7 +361,7 @@ class _Search:
 
     def open_errors(self) -> Array:
         """What the null directions do to the machine, in the form in which they are told."""
-        return np.asarray(self.before.open_errors @ independent_mixture(self.base.at))
+        return self.before.open_errors @ independent_mixture(self.base.at)
 
     def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
         """A repair with the plan of the changed design."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,14 +17,15 @@ from ballplate.simulator.experiment.model import (
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
-    QUARTER_TURNS,
     ball_coordinates,
+    plane_rotation,
 )
 from ballplate.simulator.inputs.messages import Step, format_path
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.inputs.yamltext import flow
 from ballplate.simulator.machines.protocol import Array
 
+from ..experiment_file import to_list
 from .changes import ball_set, pair_set
 
 AXES = "xyz"
@@ -89,13 +89,7 @@ def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
     if before == after:
         return []
     old, new = before.model_dump(), after.model_dump()
-    return [Edit((*steps, key), _plain(value)) for key, value in new.items() if value != old[key]]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
+    return [Edit((*steps, key), to_list(value)) for key, value in new.items() if value != old[key]]
 
 
 def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:
@@ -141,18 +135,6 @@ def plane_of(rotation: Array) -> tuple[Any, int] | None:
             if np.abs(rotation - plane_rotation(plane, turns, len(rotation))).max() < 1e-12:
                 return plane, turns
     return None
-
-
-def plane_rotation(plane: str, turns: int, dimension: int = 3) -> Array:
-    """The rotation (d, d) of an artefact in a plane after quarter-turns."""
-    turn = QUARTER_TURNS[turns % 4]
-    if dimension == 2:
-        return turn.copy()
-    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
-    rotation = np.zeros((3, 3))
-    rotation[np.ix_([first, second], [0, 1])] = turn
-    rotation[AXIS_INDEX[plane], 2] = 1.0
-    return rotation
 
 
 def _angles(rotation: Array) -> Any:

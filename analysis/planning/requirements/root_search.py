@@ -15,7 +15,7 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.load import build
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import override
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar
 
@@ -80,7 +80,7 @@ def reach(
             f"it tries, some dozens, which takes too long; give at most {MOST_POINTS}, better some"
             " hundred"
         )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "evaluation.points", text)])
+        raise refused(experiment.source, text, "evaluation.points")
     root = experiment.tree
     # Planning is at zero machine error, and true machines take time to check.
     zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
@@ -154,17 +154,15 @@ class _Trials:
             return Tried(words, None, 0, f"{first.path}: {first.text}")
         return Tried(words, judge(self.searched.goal, found), found.deficiency, "")
 
-    def distance(self, step: int) -> float:
-        """How far from the goal a value is with which the file is right."""
+    def judgement(self, step: int) -> Judgement:
+        """How the goal is met with a value with which the file is right."""
         found = self.at(step).judgement
         assert found is not None
-        return found.distance
+        return found
 
-    def undetermined(self, step: int) -> int:
-        """How much a value with which the file is right leaves open of what the goal asks about."""
-        found = self.at(step).judgement
-        assert found is not None
-        return found.undetermined
+    def nearest(self, steps: list[int]) -> int:
+        """Which of some values with which the file is right comes nearest to the goal."""
+        return steps[int(comparable([self.judgement(step).distance for step in steps]).argmin())]
 
     def verified(self, step: int) -> Judgement:
         """A value judged by a prediction of its own."""
@@ -186,16 +184,13 @@ def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficienc
             f"rank deficiency {deficiency} leaves {present.undetermined} undetermined whatever"
             " it is"
         )
-        return Answer(
-            unknown.name,
-            unknown.title,
-            "undetermined",
-            unknown.present,
-            unknown.grows,
-            remarks=(reason,),
-        )
+        return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
     return _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
+
+
+def _without_value(one: Unknown, status: Literal["undetermined", "varied"], remark: str) -> Answer:
+    return Answer(one.name, one.title, status, one.present, one.grows, remarks=(remark,))
 
 
 def _told(
@@ -203,19 +198,8 @@ def _told(
 ) -> Answer:
     one, found = trials.one, trials.verified(step)
     assert found.is_met is (status != "none")
-    words, value = one.words(step), one.value(step)
-    return Answer(
-        one.name,
-        one.title,
-        status,
-        one.present,
-        one.grows,
-        words,
-        value,
-        found.words,
-        "",
-        tuple(remarks),
-    )
+    needed = one.words(step), one.value(step), found.words, "", tuple(remarks)
+    return Answer(one.name, one.title, status, one.present, one.grows, *needed)
 
 
 def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:
@@ -288,7 +272,7 @@ def _scanned(trials: _Trials) -> Answer:
     usable = [step for step in probes if not trials.at(step).refusal]
     if not usable:
         refusal = trials.at(one.drawn).refusal or trials.at(probes[0]).refusal
-        return Answer(one.name, one.title, "varied", one.present, one.grows, remarks=(refusal,))
+        return _without_value(one, "varied", refusal)
     remarks = []
     if one.name == "size" and probes[-1] < one.last:
         beyond = trials.at(probes[-1] + 1)
@@ -301,9 +285,7 @@ def _scanned(trials: _Trials) -> Answer:
         )
     if one.name == "size" and not any(trials.at(step).is_met for step in usable):
         # What just does may lie beside the best of them.
-        best = probes.index(
-            usable[int(comparable([trials.distance(step) for step in usable]).argmin())]
-        )
+        best = probes.index(trials.nearest(usable))
         ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
         probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
         usable = [step for step in probes if not trials.at(step).refusal]
@@ -311,15 +293,13 @@ def _scanned(trials: _Trials) -> Answer:
     if good < 0:
         if one.name == "balls":
             remarks.append(f"more than {one.words(one.last)} were not looked at")
-        best = usable[int(comparable([trials.distance(step) for step in usable]).argmin())]
-        if trials.undetermined(best):
+        best = trials.nearest(usable)
+        if trials.judgement(best).undetermined:
             told = (
                 f"something stays undetermined with every value from {one.words(usable[0])} to"
                 f" {one.words(usable[-1])}"
             )
-            return Answer(
-                one.name, one.title, "undetermined", one.present, one.grows, remarks=(told,)
-            )
+            return _without_value(one, "undetermined", told)
         return _told(trials, "none", best, remarks)
     if one.name == "size":
         again = next(
