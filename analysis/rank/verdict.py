@@ -227,11 +227,12 @@ def _principal(at: Linearisation) -> tuple[Array, Array]:
     design, layout, found = at.design, at.layout, at.spectrum
     if not len(design.points) or found.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
-    change = _changes(design, layout, at.shared)
+    root = found.principal_root
+    change = _changes(design, layout, root)
     # Two points whose errors are independent differ by the root of two times the error of one, per
     # co-ordinate.
     effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
-    return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
+    return principal_directions(found.values[: found.rank], root, effect, found.scale)
 
 
 def _changes(design: Design, layout: SharedLayout, roots: Array) -> Array:

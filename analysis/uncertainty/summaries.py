@@ -21,7 +21,7 @@ from ballplate.simulator.estimation.functions import (
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.numerics.rounding import first_largest
 from ballplate.simulator.numerics.threads import single_threaded
 
 from .pairs import PairSummary, PairTile, all_pairs, pairs_of
@@ -213,7 +213,7 @@ def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Qu
     open_ = np.isnan(values)
     if open_.all():
         return Quantity(symbol, np.nan, np.nan, unit, len(values), len(values))
-    top = int(np.nanargmax(comparable(values)))
+    top = first_largest(values)
     return Quantity(
         symbol,
         float(np.nanmax(values)),

@@ -130,7 +130,11 @@ class Polynomial(_Polynomials):
         envelope = t * (1.0 - t) if self.zero_at_one else t
         if self.size == 0:
             return np.zeros((len(t), 0))
-        return np.asarray(chebyshev.chebvander(2.0 * t - 1.0, self.size - 1) * envelope[:, None])
+        s = 2.0 * t - 1.0
+        columns = [np.ones_like(s), s][: self.size]
+        while len(columns) < self.size:
+            columns.append(2.0 * s * columns[-1] - columns[-2])
+        return np.stack(columns, axis=1) * envelope[:, None]
 
     @cached_property
     def monomials(self) -> Array:

@@ -115,7 +115,8 @@ class KinematicModel:
 
     def _bases(self, x: Array) -> dict[tuple[int, Basis], Array]:
         t = self.scaled(x)
-        return {(f.axis, f.basis): f.basis.values(t[:, f.axis]) for f in self.functions}
+        different = {(f.axis, f.basis) for f in self.functions}
+        return {(axis, basis): basis.values(t[:, axis]) for axis, basis in different}
 
     def _motions(
         self, bases: dict[tuple[int, Basis], Array], a: Array, m: int
@@ -147,20 +148,22 @@ class KinematicModel:
                 self.arrangement, from_origin, translation, rotation, p
             ).sensitivities()
         else:
-            by_translation, by_rotation = (
-                None,
-                _cross_matrices(carried_vectors(self.arrangement, from_origin, p)),
-            )
+            carried = carried_vectors(self.arrangement, from_origin, p)
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
         for f in self.functions:
             values, columns = bases[f.axis, f.basis], self.slices[f.name]
-            if f.rotation or by_translation is not None:
+            if self.full_rotations:
                 source = by_rotation if f.rotation else by_translation
-                assert source is not None
                 for row in range(3):
                     direction = source[f.axis][:, row, f.component]
                     if direction.any():
                         np.multiply(values, direction[:, None], out=result[:, row, columns])
+            elif f.rotation:
+                # The unit vector of the component times the carried one, crosswise.
+                sign, vector = carried[f.axis]
+                one, other = (f.component + 1) % 3, (f.component + 2) % 3
+                result[:, one, columns] = values * (-sign * vector[:, other, None])
+                result[:, other, columns] = values * (sign * vector[:, one, None])
             else:
                 result[:, f.component, columns] = values
         return result
@@ -173,6 +176,10 @@ class KinematicModel:
         """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or
         coefficients of B-splines.
         """
+        return self._reported
+
+    @cached_property
+    def _reported(self) -> Reported:
         quoted = [f.basis.quoted() for f in self.functions]
         names: list[str] = []
         units: list[Unit] = []
@@ -254,13 +261,6 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
             vector = x * beyond + p if sign > 0 else x * ~beyond + p
             found[axis] = (sign, vector)
     return [found[axis] for axis in AXES]
-
-
-def _cross_matrices(carried: list[tuple[float, Array]]) -> list[Array]:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x carried vector,
-    signed.
-    """
-    return [cross_matrices(sign * vector) for sign, vector in carried]
 
 
 def cross_matrices(v: Array) -> Array:
