@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
@@ -49,6 +50,14 @@ class Target:
     units: tuple[str, ...]
     change: Callable[[Deviations], Array]
     sampled: bool = False
+
+    @cached_property
+    def typical(self) -> Array:
+        """Mean square uncertainty (q,) of those in the same unit."""
+        found, units = np.empty_like(self.uncertainty), np.array(self.units)
+        for unit in np.unique(units):
+            found[units == unit] = (self.uncertainty[units == unit] ** 2).mean()
+        return found
 
 
 @single_threaded
@@ -112,8 +121,15 @@ def _change(shared: Reference, places: Points) -> Callable[[Deviations], Array]:
     model = shared.local_model(places.points, places.probes)
     n, d = places.points.shape
     are_free = bool((shared.factor.layout.offset_columns[places.probes] >= 0).any())
+    # Co-ordinates and distances of the same points are asked for one after the other.
+    last: list[tuple[Deviations, Array]] = []
 
     def change(replicates: Deviations) -> Array:
+        if not (last and last[0][0] is replicates):
+            last[:] = [(replicates, changed(replicates))]
+        return last[0][1]
+
+    def changed(replicates: Deviations) -> Array:
         none = np.zeros((len(replicates.a), d, n))
         offsets = replicates.offsets[:, places.probes].swapaxes(1, 2) if are_free else None
         return model.change(none, replicates.a, offsets)
@@ -194,18 +210,24 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> Target:
     true_length = np.sqrt(((of.truly[first] - of.truly[second]) ** 2).sum(axis=1))
     uncertainty = pairs_of(of.moved, np.stack(ends, axis=1)).uncertainties
 
+    squared, double = length**2, 2.0 * between
+
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
         # The square of the new length less that of the old, without the loss of digits that
         # subtracting would bring.
         gained = np.zeros((len(displaced), len(first)))
+        difference, other = np.empty((2, *gained.shape))
         for axis in range(displaced.shape[1]):
-            difference = displaced[:, axis, first]
-            difference -= displaced[:, axis, second]
-            part = difference + 2.0 * between[:, axis]
-            part *= difference
-            gained += part
-        return np.asarray(gained / (np.sqrt(length**2 + gained) + length))
+            np.take(displaced[:, axis], first, axis=1, out=difference, mode="clip")
+            difference -= np.take(displaced[:, axis], second, axis=1, out=other, mode="clip")
+            np.add(difference, double[:, axis], out=other)
+            other *= difference
+            gained += other
+        root = np.sqrt(np.add(squared, gained, out=other), out=other)
+        root += length
+        gained /= root
+        return gained
 
     return Target(symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled)
 

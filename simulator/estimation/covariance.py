@@ -206,7 +206,7 @@ def ball_covariance(design: Design, factor: Factor, found: Spectrum) -> BallCova
     own = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
     carried = -solve_balls(factor, factor.ball_shared)
-    rows = carried.reshape(d * len(carried), -1)
+    rows = carried.reshape(d * len(carried), carried.shape[2])
     ball[factor.eliminated, :, :rank] = (rows @ shared).reshape(len(carried), d, rank)
     ball_null[factor.eliminated] = (rows @ null).reshape(len(carried), d, nulls)
     own[factor.eliminated] = solve_balls(factor, np.broadcast_to(np.eye(d), factor.ball_root.shape))

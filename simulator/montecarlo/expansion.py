@@ -72,6 +72,7 @@ class Expansion:
         if step is not None and offsets is None and len(self.by_place[0]) > moved.shape[1]:
             offsets = np.zeros(moved.shape)
         places = _places(moved, offsets)
+        is_moved = offsets is not None or bool(moved.any())
         for i in range(len(self.columns)):
             if step is None:
                 np.einsum(
@@ -83,7 +84,8 @@ class Expansion:
                 )
                 continue
             np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=found[:, i])
-            found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
+            if is_moved:
+                found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
         if offsets is not None:
             found += offsets
         return found
