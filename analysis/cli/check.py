@@ -92,7 +92,6 @@ def run(options: Namespace) -> int:
     from ..checking.check_files import Wanted, check_files
     from ..checking.file_patterns import matching_files
     from ..checking.github import advice_lines, annotation_lines
-    from ..checking.junit import junit_report
     from ..requirements.goals import GoalError, parse_goal
     from .common import print_json, print_lines
     from .excerpts import print_errors
@@ -122,6 +121,8 @@ def run(options: Namespace) -> int:
         if options.format in ("text", "json"):
             print_errors(checked.messages, options)
     if options.format == "junit":
+        from ..checking.junit import junit_report
+
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
