@@ -190,9 +190,7 @@ def _tile(
         size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
         open_ = size[chosen] > _open_above(null)
     first, second = np.nonzero(chosen)
-    return PairTile(
-        rows.start + first, columns.start + second, np.sqrt(lengths), values, open_
-    )
+    return PairTile(rows.start + first, columns.start + second, np.sqrt(lengths), values, open_)
 
 
 def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> PairSummary:

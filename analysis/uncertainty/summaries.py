@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from ballplate.simulator.estimation.functions import (
     Parameters,
     Places,
     Points,
-    coordinate_names,
+    coordinate_name,
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
@@ -115,12 +115,13 @@ def _of_parameters(
 ) -> dict[str, Quantity]:
     values, kind = sigma * at.of_shared(given.rows), QUANTITIES[symbol]
     unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in given.units)
-    found = {symbol: summarise(symbol, values, unit, given.names)}
+    found = {symbol: summarise(symbol, values, unit, given.names.__getitem__)}
     for part, (word, _) in kind.parts.items():
         chosen = [i for i, unit in enumerate(given.units) if unit == part]
         if chosen:
             name = f"{symbol} {word}"
-            found[name] = summarise(name, values[chosen], part, [given.names[i] for i in chosen])
+            names = [given.names[i] for i in chosen]
+            found[name] = summarise(name, values[chosen], part, names.__getitem__)
     return found
 
 
@@ -131,26 +132,19 @@ def _of_coordinates(
     displaced: Callable[[Places], Displacements],
     sigma: float,
 ) -> Quantity:
-    if isinstance(places, Balls):
-        return summarise(
-            symbol,
-            sigma * at.of_balls()[places.index].ravel(),
-            "m",
-            coordinate_names(at.design, places),
-        )
-    names = coordinate_names(at.design, places)
-    found = summarise(symbol, sigma * displaced(places).uncertainties.ravel(), "m", names)
-    if not found.largest:
+    are_balls = isinstance(places, Balls)
+    values = at.of_balls()[places.index] if are_balls else displaced(places).uncertainties
+    values = sigma * values.ravel()
+    found = summarise(symbol, values, "m", lambda index: coordinate_name(at.design, places, index))
+    if are_balls or not found.largest:
         return found
-    return replace(
-        found, places=(_point(places, names.index(found.largest) // at.design.dimension),)
-    )
+    return replace(found, places=(_point(places, first_largest(values) // at.design.dimension),))
 
 
 def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Quantity:
     """Distances that have names, each compared with its own target."""
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
-    found = summarise(symbol, values, "m", given.names)
+    found = summarise(symbol, values, "m", given.names.__getitem__)
     judged = [
         target.coverage_factor * value <= float(target.stated.at(length))
         for target, length, value in zip(given.targets, tile.lengths, values, strict=False)
@@ -208,7 +202,7 @@ def point_pairs(
     return moved.uncertainties, all_pairs(moved, places.labels, limit)
 
 
-def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Quantity:
+def summarise(symbol: str, values: Array, unit: str, name_of: Callable[[int], str]) -> Quantity:
     """Maximum and average of the standard uncertainties `values` (m,) that are not NaN."""
     open_ = np.isnan(values)
     if open_.all():
@@ -221,5 +215,5 @@ def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Qu
         unit,
         len(values),
         int(open_.sum()),
-        names[top],
+        name_of(top),
     )

@@ -108,6 +108,12 @@ def coordinate_names(design: Design, places: Places) -> list[str]:
     return [f"{name} {axis}" for name in names for axis in axes]
 
 
+def coordinate_name(design: Design, places: Places, index: int) -> str:
+    """Name of one of these co-ordinates by its index."""
+    place, axis = divmod(index, design.dimension)
+    return f"{places.name(design, int(places.labels[place]))} {AXIS_NAMES[axis]}"
+
+
 def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
     """Name of a co-ordinate by the label of its place and its axis, or of a distance by the labels
     of both places.
