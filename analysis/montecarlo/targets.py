@@ -34,6 +34,9 @@ from ..uncertainty.quantities import QUANTITIES
 # Distances that are followed through all replicates; a sample of the pairs where there are more.
 MOST_PAIRS = 1000
 
+# Changes of distances that are computed at once.
+ENTRIES_AT_ONCE = 16_384
+
 
 @dataclass(frozen=True)
 class Target:
@@ -217,16 +220,21 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> Target:
         # The square of the new length less that of the old, without the loss of digits that
         # subtracting would bring.
         gained = np.zeros((len(displaced), len(first)))
-        difference, other = np.empty((2, *gained.shape))
-        for axis in range(displaced.shape[1]):
-            np.take(displaced[:, axis], first, axis=1, out=difference, mode="clip")
-            difference -= np.take(displaced[:, axis], second, axis=1, out=other, mode="clip")
-            np.add(difference, double[:, axis], out=other)
-            other *= difference
-            gained += other
-        root = np.sqrt(np.add(squared, gained, out=other), out=other)
-        root += length
-        gained /= root
+        # So many replicates at a time that all stays in cache.
+        rows = max(ENTRIES_AT_ONCE // len(first), 1)
+        work = np.empty((2, rows, len(first)))
+        for start in range(0, len(gained), rows):
+            part, of_axis = gained[start : start + rows], displaced[start : start + rows]
+            difference, other = work[:, : len(part)]
+            for axis in range(displaced.shape[1]):
+                np.take(of_axis[:, axis], first, axis=1, out=difference, mode="clip")
+                difference -= np.take(of_axis[:, axis], second, axis=1, out=other, mode="clip")
+                np.add(difference, double[:, axis], out=other)
+                other *= difference
+                part += other
+            root = np.sqrt(np.add(squared, part, out=other), out=other)
+            root += length
+            part /= root
         return gained
 
     return Target(symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled)

@@ -100,15 +100,16 @@ class Expansion:
     def gather(
         self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
     ) -> Array:
-        found = np.zeros((len(pull), self.size))
+        # Some rows are added to in a fifth of the time that it takes with some columns.
+        found = np.zeros((self.size, len(pull)))
         for i, columns in enumerate(self.columns):
-            found[:, columns] += pull[:, i] @ self.by_parameters[i].T
+            found[columns] += (pull[:, i] @ self.by_parameters[i].T).T
         if step is not None:
             places, single = _places(moved, offsets), pull.astype(np.float32)
             for i, columns in enumerate(self.mixed_columns):
                 both = (places * single[:, i, None]).reshape(len(pull), -1)
-                found[:, columns] += both @ self.mixed[i].T
-        return found
+                found[columns] += (both @ self.mixed[i].T).T
+        return found.T
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
         found, d = pull.copy(), pull.shape[1]
