@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 
+from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity
@@ -26,7 +27,6 @@ from .parts import (
     verdict_data,
     verdict_lines,
 )
-from .result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +104,7 @@ class Prediction(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else.
         """
-        from ..report.pictures import draw_design
+        from ..presentation.pictures import draw_design
 
         names = ", ".join(self.design.position_names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)

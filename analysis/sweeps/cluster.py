@@ -22,7 +22,7 @@ from .execute import Runner
 from .load import load_sweep
 from .local import told
 from .model import Sweep
-from .task import Row, Task, compute, lost
+from .task import CellResult, CellTask, compute, lost
 
 # Tasks that a thread of a worker has waiting, so that it never waits itself.
 WAITING = 4
@@ -64,21 +64,27 @@ def cluster_runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runne
 def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
     except ImportError:
         raise ClusterError(
             "dask is not installed; install it with: python -m pip install 'ballplate[dask]'"
         ) from None
     try:
+        get_address_host_port(address)
+    except ValueError:
+        text = f"{address}: is no address of a scheduler; give one such as tcp://127.0.0.1:8786"
+        raise ClusterError(text) from None
+    try:
         client = Client(address, timeout=10, set_as_default=False)
     except Exception as error:
         # Of an address that makes no sense there may come anything.
         text = (
-            f"there is no scheduler at {address} ({type(error).__name__}); start one with: dask"
+            f"{address}: there is no scheduler ({type(error).__name__}); start one with: dask"
             " scheduler"
         )
         raise ClusterError(text) from None
 
-    def run(tasks: Sequence[Task]) -> Iterator[Row]:
+    def run(tasks: Sequence[CellTask]) -> Iterator[CellResult]:
         try:
             yield from _rows(client, sweep, bundle, tasks)
         except (OSError, CancelledError, TimeoutError) as error:
@@ -179,7 +185,9 @@ def code_digest() -> str:
     return found.hexdigest()
 
 
-def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> Iterator[Row]:
+def _rows(
+    client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[CellTask]
+) -> Iterator[CellResult]:
     from distributed import KilledWorker, as_completed
 
     code = code_digest()
@@ -187,7 +195,7 @@ def _rows(client: Any, sweep: Sweep, bundle: Bundle, tasks: Sequence[Task]) -> I
     room = WAITING * max(sum(client.nthreads().values()), 1)
     left, under_way, tries = iter(tasks), {}, Counter[tuple[int, int]]()
 
-    def submit(task: Task) -> object:
+    def submit(task: CellTask) -> object:
         future = client.submit(_on_worker, sent[0], code, task, pure=False, retries=0)
         under_way[future.key] = task
         return future
@@ -248,7 +256,7 @@ def _wait(client: Any) -> None:
         ) from None
 
 
-def _on_worker(bundle: Bundle, code: str, task: Task) -> Row:
+def _on_worker(bundle: Bundle, code: str, task: CellTask) -> CellResult:
     if code != code_digest():
         raise OtherVersionError
     folder, source = _unpacked(bundle)

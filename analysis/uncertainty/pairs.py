@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable, first_largest
 from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable, first_largest
 from numpy.typing import NDArray
 
 # Places on a side of the tiles in which pairs are worked through: their products stay in cache.

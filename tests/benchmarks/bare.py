@@ -8,9 +8,9 @@ are prepared once for all replicates.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.montecarlo.expansion import Expansion
-from ballplate.simulator.montecarlo.reference import Reference
-from ballplate.simulator.montecarlo.replicates import BATCH
+from ballplate.montecarlo.expansion import Expansion
+from ballplate.montecarlo.reference import Reference
+from ballplate.montecarlo.replicates import BATCH
 from scipy.linalg import solve_triangular
 
 from .linear_problem import Real
