@@ -132,11 +132,12 @@ def _of_coordinates(
     displaced: Callable[[Places], Displacements],
     sigma: float,
 ) -> Quantity:
-    are_balls = isinstance(places, Balls)
-    values = at.of_balls()[places.index] if are_balls else displaced(places).uncertainties
-    values = sigma * values.ravel()
+    if isinstance(places, Balls):
+        values = sigma * at.of_balls()[places.index].ravel()
+    else:
+        values = sigma * displaced(places).uncertainties.ravel()
     found = summarise(symbol, values, "m", lambda index: coordinate_name(at.design, places, index))
-    if are_balls or not found.largest:
+    if isinstance(places, Balls) or not found.largest:
         return found
     return replace(found, places=(_point(places, first_largest(values) // at.design.dimension),))
 

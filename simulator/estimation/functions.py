@@ -102,15 +102,8 @@ class Distances:
 Functions = Parameters | Coordinates | Distances
 
 
-def coordinate_names(design: Design, places: Places) -> list[str]:
-    """Names of all co-ordinates of places."""
-    axes = AXIS_NAMES[: design.dimension]
-    names = [places.name(design, label) for label in places.labels.tolist()]
-    return [f"{name} {axis}" for name in names for axis in axes]
-
-
 def coordinate_name(design: Design, places: Places, index: int) -> str:
-    """Name of one of these co-ordinates by its index."""
+    """Name of a co-ordinate of places by its index among all of them."""
     place, axis = divmod(index, design.dimension)
     return f"{places.name(design, int(places.labels[place]))} {AXIS_NAMES[axis]}"
 

@@ -35,6 +35,8 @@ class Quoted:
 class Basis(Protocol):
     """Functions that vanish at 0, with `zero_at_one` those of them that vanish at 1 too."""
 
+    def __hash__(self) -> int: ...
+
     @property
     def zero_at_one(self) -> bool: ...
 
