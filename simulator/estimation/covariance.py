@@ -103,7 +103,7 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     if drawn is None:
         judged = factor if factor.alike is None else factor.alike
         scaled = judged.root * scale
-        values: Array = np.linalg.svd(scaled, compute_uv=False)
+        values = np.asarray(np.linalg.svd(scaled, compute_uv=False), float)
         # Where nothing shared is determined, all values are rounding, of what the balls' rows have
         # carried away.
         largest = max(
