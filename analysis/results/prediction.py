@@ -106,7 +106,7 @@ class Prediction(Result):
         """
         from ..presentation.pictures import draw_design
 
-        names = ", ".join(self.design.position_names)
+        names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def rows(self) -> list[dict[str, Any]]:

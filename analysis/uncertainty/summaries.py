@@ -10,7 +10,7 @@ from ballplate.simulator.computing.rounding import first_largest
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import (
-    Balls,
+    BallPlaces,
     Coordinates,
     Displacements,
     Distances,
@@ -74,7 +74,7 @@ def uncertainties(
     made: dict[bytes, Displacements] = {}
 
     def displaced(places: Places) -> Displacements:
-        if isinstance(places, Balls):
+        if isinstance(places, BallPlaces):
             return displacements(at, places)
         # Co-ordinates and distances are of the same points.
         key = places.points.tobytes() + places.probes.tobytes()
@@ -132,12 +132,12 @@ def _of_coordinates(
     displaced: Callable[[Places], Displacements],
     sigma: float,
 ) -> Quantity:
-    if isinstance(places, Balls):
+    if isinstance(places, BallPlaces):
         values = sigma * at.of_balls()[places.index].ravel()
     else:
         values = sigma * displaced(places).uncertainties.ravel()
     found = summarise(symbol, values, "m", lambda index: coordinate_name(at.design, places, index))
-    if isinstance(places, Balls) or not found.largest:
+    if isinstance(places, BallPlaces) or not found.largest:
         return found
     return replace(found, places=(_point(places, first_largest(values) // at.design.dimension),))
 

@@ -21,7 +21,7 @@ PASSES = 2
 def bare_batch(shared: Reference, seed: int, batch: int) -> tuple[Real, Real]:
     """Deviations of the balls (b, 3, n) and of the shared parameters (b, s) of one batch."""
     design, factor, start = shared.design, shared.factor, shared.start
-    layout, n = factor.layout, len(design.balls)
+    layout, n = factor.layout, len(design.balls.places)
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     noise = generator.standard_normal((BATCH, *shared.noise.shape), np.float32)
     noise *= shared.noise.astype(np.float32)
@@ -32,7 +32,7 @@ def bare_batch(shared: Reference, seed: int, batch: int) -> tuple[Real, Real]:
     base = (start.balls[given.first] - start.balls[given.second]).T
 
     balls, total = np.zeros((BATCH, 3, n)), np.zeros((BATCH, len(layout)))
-    turns = np.zeros((BATCH, len(design.origins), 3))
+    turns = np.zeros((BATCH, len(design.positions.origins), 3))
     for number in range(PASSES):
         by_ball, by_shared = np.zeros(balls.shape), np.zeros(total.shape)
         a = total[:, layout.model]

@@ -23,22 +23,22 @@ EXACT = 1e-10
 
 def structured(design: Design) -> tuple[Figures, int]:
     """Maximum and average of U1 to U6, and the rank deficiency, zero or nothing is computed."""
-    n, free = len(design.balls), 6 * (len(design.origins) - 1)
+    n, free = len(design.balls.places), 6 * (len(design.positions.origins) - 1)
     order = np.argsort(design.readings.ball, kind="stable")
     position, probe = design.readings.position[order], design.readings.probe[order]
-    rotation = design.rotations[position]
-    arm = np.einsum("mij,mj->mi", rotation, design.balls[design.readings.ball[order]])
-    offset = design.probes[probe]
-    by_model = derivatives(design, arm + design.origins[position] - offset, offset)
+    rotation = design.positions.rotations[position]
+    arm = np.einsum("mij,mj->mi", rotation, design.balls.places[design.readings.ball[order]])
+    offset = design.probes.offsets[probe]
+    by_model = derivatives(design, arm + design.positions.origins[position] - offset, offset)
     s = free + by_model.shape[2]
 
     # The first pose is held; the others follow one another.
     shared = np.zeros((len(order), 3, s))
     pose = np.concatenate([np.broadcast_to(-np.eye(3), rotation.shape), cross(arm)], axis=2)
-    for k in range(1, len(design.origins)):
+    for k in range(1, len(design.positions.origins)):
         shared[position == k, :, 6 * k - 6 : 6 * k] = pose[position == k]
     shared[:, :, free:] = by_model
-    weight = 1.0 / design.repeatability[0]
+    weight = 1.0 / design.machine.repeatability[0]
     own = -weight * rotation.reshape(n, -1, 3)
     shared = weight * shared.reshape(n, -1, s)
 
@@ -55,7 +55,7 @@ def structured(design: Design) -> tuple[Figures, int]:
     for i, ball in enumerate(kept):
         tied[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = root[ball]
         tied[3 * i : 3 * i + 3, 3 * k :] = top[ball]
-    between = design.balls[first] - design.balls[second]
+    between = design.balls.places[first] - design.balls.places[second]
     between /= np.sqrt((between**2).sum(axis=1))[:, None] * design.distances.uncertainty[:, None]
     for i in range(len(first)):
         tied[3 * k + i, 3 * place[first[i]] : 3 * place[first[i]] + 3] = between[i]
@@ -81,22 +81,28 @@ def structured(design: Design) -> tuple[Figures, int]:
     of_balls[single, :, single] += back @ back.transpose(0, 2, 1)
 
     of_model = inverse[free:, free:]
-    points = np.broadcast_to(design.probes[design.point_probe], design.points.shape)
-    moved = derivatives(design, design.points, points).reshape(-1, s - free) @ of_model
-    of_points, count = moved @ moved.T, len(design.points)
+    points = np.broadcast_to(
+        design.probes.offsets[design.evaluation.probe], design.evaluation.points.shape
+    )
+    moved = derivatives(design, design.evaluation.points, points).reshape(-1, s - free) @ of_model
+    of_points, count = moved @ moved.T, len(design.evaluation.points)
     return {
         "U1": summary(np.sqrt(np.diag(of_balls.reshape(3 * n, 3 * n)))),
         "U2": summary(np.sqrt((inverse[:free] ** 2).sum(axis=1))),
         "U3": summary(np.sqrt(((monomials() @ of_model) ** 2).sum(axis=1))),
         "U4": summary(np.sqrt(np.diag(of_points))),
-        "U5": summary(pair_uncertainties(design.balls, of_balls)),
-        "U6": summary(pair_uncertainties(design.points, of_points.reshape(count, 3, count, 3))),
+        "U5": summary(pair_uncertainties(design.balls.places, of_balls)),
+        "U6": summary(
+            pair_uncertainties(design.evaluation.points, of_points.reshape(count, 3, count, 3))
+        ),
     }, deficiency
 
 
 def derivatives(design: Design, x: Real, p: Real) -> Real:
     """Derivatives (m, 3, 69) of the corrected point by the coefficients of the 18 functions."""
-    t = (x - design.lower) / (design.upper - design.lower)
+    t = (x - design.machine.volume.lower) / (
+        design.machine.volume.upper - design.machine.volume.lower
+    )
     polynomials = chebyshev.chebvander(2.0 * t - 1.0, COEFFICIENTS - 2)
     whole = polynomials * t[:, :, None]
     inner = whole[:, :, : COEFFICIENTS - 2] * (1.0 - t)[:, :, None]
@@ -109,7 +115,7 @@ def derivatives(design: Design, x: Real, p: Real) -> Real:
             start += values.shape[1]
     for axis in range(3):
         # An axis carries those after it, and the probe.
-        turned = cross(p + (x - design.lower) * (np.arange(3) > axis))
+        turned = cross(p + (x - design.machine.volume.lower) * (np.arange(3) > axis))
         for component in range(3):
             for row in range(3):
                 if row != component:
@@ -158,14 +164,19 @@ def monomials() -> Real:
 
 def pose_scale(design: Design) -> Real:
     """What moves some ball by about a metre: origins, and rotations over the plate's extent."""
-    arm = np.ptp(design.balls, axis=0).max()
-    return np.tile(np.repeat([1.0, 1.0 / arm], 3), len(design.origins) - 1)
+    arm = np.ptp(design.balls.places, axis=0).max()
+    return np.tile(np.repeat([1.0, 1.0 / arm], 3), len(design.positions.origins) - 1)
 
 
 def model_scale(design: Design) -> Real:
     """The same of the coefficients."""
     shifts, turns = largest_values()
-    return np.asarray(1.0 / np.concatenate([shifts, turns * (design.upper - design.lower).max()]))
+    return np.asarray(
+        1.0
+        / np.concatenate(
+            [shifts, turns * (design.machine.volume.upper - design.machine.volume.lower).max()]
+        )
+    )
 
 
 @cache
