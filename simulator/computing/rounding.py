@@ -49,7 +49,8 @@ def first_largest(values: Array) -> int:
     """
     largest = np.nanmax(values)
     # Those that are near enough to be equal, and no others, are compared.
-    near = np.flatnonzero(values >= largest - 4.0 * 2.0**-DIGITS * abs(largest))
+    margin = 4.0 * 2.0**-DIGITS * abs(largest) if np.isfinite(largest) else 0.0
+    near = np.flatnonzero(values >= largest - margin)
     return int(near[comparable(values[near]).argmax()])
 
 

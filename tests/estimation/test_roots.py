@@ -61,6 +61,8 @@ NUMBERS = st.sampled_from(
         2.0,
         2.0 - 1e-12,
         np.nan,
+        np.inf,
+        -np.inf,
         -3.0,
     ]
 )
