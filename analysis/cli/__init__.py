@@ -224,9 +224,9 @@ class _Parser(argparse.ArgumentParser):
         return f"; did you mean {told}?" if told else ""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        from ballplate.simulator.inputs.settings import nearest
-
         if action.choices is not None and value not in action.choices:
+            from ballplate.simulator.inputs.settings import nearest
+
             meant = nearest(str(value), [str(one) for one in action.choices])
             if meant is not None:
                 raise argparse.ArgumentError(

@@ -114,7 +114,6 @@ def run(options: Namespace) -> int:
     from .check_files import Wanted, check_files
     from .common import print_json
     from .file_patterns import matching_files
-    from .junit import junit_report
     from .progress import progress
 
     goals = _goals(options)
@@ -139,6 +138,8 @@ def run(options: Namespace) -> int:
             files.append(checked)
             _print(checked, options)
     if options.format == "junit":
+        from .junit import junit_report
+
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:

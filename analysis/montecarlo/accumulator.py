@@ -92,19 +92,6 @@ class Accumulator:
         )
 
 
-def _against_typical(errors: Array, aim: MonteCarloQuantity) -> Array:
-    """Mean square of errors (b, q) over the mean square uncertainty of those in the same unit,
-    (b,).
-
-    Errors in units of their own uncertainties would be ruled by the few that have almost none.
-    """
-    typical = np.empty_like(aim.uncertainty)
-    units = np.array(aim.units)
-    for unit in np.unique(units):
-        typical[units == unit] = (aim.uncertainty[units == unit] ** 2).mean()
-    return (errors**2 / typical).mean(axis=1)
-
-
 def accumulate(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], estimates: Estimates, count: int
 ) -> Accumulator:
@@ -115,23 +102,34 @@ def accumulate(
     squares = estimates.sum_of_squares[used]
     sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
     quantities = []
+    # Memory of the largest vectors, once for all: they are far larger than what stays in cache.
+    work = np.empty((2, len(squares) * max((len(aim.base) for aim in aims), default=0)))
     for aim in aims:
-        change = aim.change(estimates.found)[used]
-        scatter = change * (1.0 / aim.uncertainty)
-        error = scatter + aim.base / aim.uncertainty
-        size = np.abs(error)
-        of_scatter = np.einsum("bq,bq->b", scatter, scatter) / scatter.shape[1]
-        of_error = np.einsum("bq,bq->b", error, error) / error.shape[1]
+        change = aim.change(estimates.found)
+        change = change if used.all() else change[used]
+        count_of = change.shape[1]
+        error, absolute = work[:, : change.size].reshape(2, *change.shape)
+        np.multiply(change, 1.0 / aim.uncertainty, out=error)
+        of_scatter = np.einsum("bq,bq->b", error, error) / count_of
+        error += aim.base / aim.uncertainty
+        of_error = np.einsum("bq,bq->b", error, error) / count_of
+        size = np.abs(error, out=error)
+        is_known = size <= limits.known
+        is_estimated = size <= limits.estimated * sigma[:, None]
+        # Over the mean square uncertainty of those in the same unit: in units of their own
+        # uncertainties they would be ruled by the few that have almost none.
+        np.add(change, aim.base, out=absolute)
+        against_typical = np.square(absolute, out=error)
+        against_typical /= aim.typical
         numbers = np.stack(
             [
                 of_scatter,
-                _against_typical(change + aim.base, aim),
+                against_typical.mean(axis=1),
                 of_error - of_scatter,
-                (size <= limits.known).mean(axis=1),
-                (size <= limits.estimated * sigma[:, None]).mean(axis=1),
+                np.count_nonzero(is_known, axis=1) / count_of,
+                np.count_nonzero(is_estimated, axis=1) / count_of,
             ]
         )
-        absolute = change + aim.base
         quantities.append(
             QuantityAccumulator(
                 absolute.sum(axis=0),

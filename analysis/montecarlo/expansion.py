@@ -71,6 +71,7 @@ class Expansion:
         if step is not None and offsets is None and len(self.by_place[0]) > moved.shape[1]:
             offsets = np.zeros(moved.shape)
         places = _places(moved, offsets)
+        is_moved = offsets is not None or bool(moved.any())
         for i in range(len(self.columns)):
             if step is None:
                 np.einsum(
@@ -82,7 +83,8 @@ class Expansion:
                 )
                 continue
             np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=found[:, i])
-            found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
+            if is_moved:
+                found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
         if offsets is not None:
             found += offsets
         return found
@@ -97,15 +99,16 @@ class Expansion:
     def gather(
         self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
     ) -> Array:
-        found = np.zeros((len(pull), self.size))
+        # Some rows are added to in a fifth of the time that it takes with some columns.
+        found = np.zeros((self.size, len(pull)))
         for i, columns in enumerate(self.columns):
-            found[:, columns] += pull[:, i] @ self.by_parameters[i].T
+            found[columns] += (pull[:, i] @ self.by_parameters[i].T).T
         if step is not None:
             places, single = _places(moved, offsets), pull.astype(np.float32)
             for i, columns in enumerate(self.mixed_columns):
                 both = (places * single[:, i, None]).reshape(len(pull), -1)
-                found[:, columns] += both @ self.mixed[i].T
-        return found
+                found[columns] += (both @ self.mixed[i].T).T
+        return found.T
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
         found, d = pull.copy(), pull.shape[1]

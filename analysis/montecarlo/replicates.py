@@ -186,15 +186,14 @@ def _gradient(
     by_pose = np.zeros((BATCH, *layout.pose_columns.shape))
     by_shared = np.zeros((BATCH, len(layout)))
     step = None if is_start else at.a
+    less = _turns_less_one(at.rotations)
     for group in shared.groups:
         k = group.position
         moved = drawn.moved[:, :, group.rows]
-        rotation = (
-            shared.start.rotations[k]
-            if is_start
-            else _turn(at.rotations[:, k]) @ shared.start.rotations[k]
-        )
-        pull, arm = _pull(shared, group, moved, at, is_start)
+        rotation = shared.start.rotations[k]
+        if not is_start:
+            rotation = (less[:, k] + np.eye(d)) @ rotation
+        pull, arm = _pull(shared, group, moved, at, None if is_start else less[:, k])
         squares += np.einsum("bim,bim->b", pull, pull)
         pull *= group.weight
         by_pose[:, k, :d] -= pull.sum(axis=2)
@@ -220,19 +219,24 @@ def _gradient(
 
 
 def _pull(
-    shared: Reference, group: PositionReadings, moved: Single, at: Deviations, is_start: bool
+    shared: Reference,
+    group: PositionReadings,
+    moved: Single,
+    at: Deviations,
+    less: Array | None,
 ) -> tuple[Array, Array]:
     """Weighted residuals (b, d, m) of a group, and its balls about their position's origin, (d, m)
     or (b, d, m).
+
+    `less` (b, d, d) are the turns of its position, less the unit matrix; None at the start.
     """
     residual = group.residual + moved
     arm = group.arm
-    if is_start:
+    if less is None:
         residual += group.model.change(moved, None)
     else:
         residual += group.model.change(moved, at.a, _offsets(at, group.probe))
         # Turned less straight, so that the small difference of two large vectors is never formed.
-        less = _turn_less_one(at.rotations[:, group.position])
         rotation = shared.start.rotations[group.position]
         displaced = (less.reshape(-1, less.shape[2]) @ group.arm).reshape(moved.shape)
         displaced += (rotation + less @ rotation) @ at.balls[:, :, group.ball]
@@ -265,10 +269,10 @@ def _turn_less_one(turn: Array) -> Array:
     return np.asarray(first * cross + second * (cross @ cross))
 
 
-def _turn(turn: Array) -> Array:
-    """Rotation matrices (b, d, d) of rotation vectors (b, r)."""
-    less = _turn_less_one(turn)
-    return np.asarray(less + np.eye(less.shape[1]))
+def _turns_less_one(turns: Array) -> Array:
+    """The same (b, k, d, d) of several rotation vectors (b, k, r) each, all at once."""
+    less = _turn_less_one(turns.reshape(-1, turns.shape[2]))
+    return less.reshape(*turns.shape[:2], *less.shape[1:])
 
 
 def _moment(arm: Array, pull: Array) -> Array:

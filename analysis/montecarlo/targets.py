@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from ballplate.montecarlo.reference import Reference
@@ -32,6 +33,9 @@ from ..uncertainty.quantities import QUANTITIES
 # Distances that are followed through all replicates; a sample of the pairs where there are more.
 MOST_PAIRS = 1000
 
+# Changes of distances that are computed at once.
+ENTRIES_AT_ONCE = 16_384
+
 
 @dataclass(frozen=True)
 class MonteCarloQuantity:
@@ -48,6 +52,14 @@ class MonteCarloQuantity:
     units: tuple[str, ...]
     change: Callable[[Deviations], Array]
     sampled: bool = False
+
+    @cached_property
+    def typical(self) -> Array:
+        """Mean square uncertainty (q,) of those in the same unit."""
+        found, units = np.empty_like(self.uncertainty), np.array(self.units)
+        for unit in np.unique(units):
+            found[units == unit] = (self.uncertainty[units == unit] ** 2).mean()
+        return found
 
 
 @single_threaded
@@ -111,8 +123,15 @@ def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations],
     model = shared.local_model(places.points, places.probes)
     n, d = places.points.shape
     are_free = bool((shared.factor.layout.offset_columns[places.probes] >= 0).any())
+    # Co-ordinates and distances of the same points are asked for one after the other.
+    last: list[tuple[Deviations, Array]] = []
 
     def change(replicates: Deviations) -> Array:
+        if not (last and last[0][0] is replicates):
+            last[:] = [(replicates, changed(replicates))]
+        return last[0][1]
+
+    def changed(replicates: Deviations) -> Array:
         none = np.zeros((len(replicates.a), d, n))
         offsets = replicates.offsets[:, places.probes].swapaxes(1, 2) if are_free else None
         return model.change(none, replicates.a, offsets)
@@ -199,18 +218,29 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
     true_length = np.linalg.norm(of.truly[first] - of.truly[second], axis=1)
     uncertainty = pairs_of(of.moved, np.stack(ends, axis=1)).uncertainties
 
+    squared, double = length**2, 2.0 * between
+
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
         # The square of the new length less that of the old, without the loss of digits that
         # subtracting would bring.
         gained = np.zeros((len(displaced), len(first)))
-        for axis in range(displaced.shape[1]):
-            difference = displaced[:, axis, first]
-            difference -= displaced[:, axis, second]
-            part = difference + 2.0 * between[:, axis]
-            part *= difference
-            gained += part
-        return gained / (np.sqrt(length**2 + gained) + length)
+        # So many replicates at a time that all stays in cache.
+        rows = max(ENTRIES_AT_ONCE // len(first), 1)
+        work = np.empty((2, rows, len(first)))
+        for start in range(0, len(gained), rows):
+            part, of_axis = gained[start : start + rows], displaced[start : start + rows]
+            difference, other = work[:, : len(part)]
+            for axis in range(displaced.shape[1]):
+                np.take(of_axis[:, axis], first, axis=1, out=difference, mode="clip")
+                difference -= np.take(of_axis[:, axis], second, axis=1, out=other, mode="clip")
+                np.add(difference, double[:, axis], out=other)
+                other *= difference
+                part += other
+            root = np.sqrt(np.add(squared, part, out=other), out=other)
+            root += length
+            part /= root
+        return gained
 
     return MonteCarloQuantity(
         symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled

@@ -226,11 +226,12 @@ def _principal(at: Linearisation) -> tuple[Array, Array]:
     design, layout, found = at.design, at.layout, at.spectrum
     if not len(design.evaluation.points) or found.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
-    change = relative_changes(design, layout, at.shared)
+    root = found.principal_root
+    change = relative_changes(design, layout, root)
     # Two points whose errors are independent differ by the root of two times the error of one, per
     # co-ordinate.
     effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
-    return principal_directions(found.values[: found.rank], at.shared, effect, found.scale)
+    return principal_directions(found.values[: found.rank], root, effect, found.scale)
 
 
 def weak_limit(design: Design, target: Target | None) -> float:

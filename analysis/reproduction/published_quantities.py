@@ -33,12 +33,14 @@ def tabulated_quantities(design: Design) -> dict[str, Quantity]:
     at = linearise(design)
     layout = at.layout
     names = [parameter.name for parameter in layout.parameters[layout.poses]]
-    found = {"U2": summarise("U2", at.of_shared(pose_rows(design, layout)), "m, rad", names)}
+    found = {
+        "U2": summarise("U2", at.of_shared(pose_rows(design, layout)), "m, rad", names.__getitem__)
+    }
     coefficients, rows = coefficient_rows(design, layout)
-    found["U3"] = summarise("U3", at.of_shared(rows), "m, rad", coefficients)
+    found["U3"] = summarise("U3", at.of_shared(rows), "m, rad", coefficients.__getitem__)
     lengths, balls = first_ball_lengths(at)
     if balls:
-        found["U5"] = summarise("U5", lengths, "m", balls)
+        found["U5"] = summarise("U5", lengths, "m", balls.__getitem__)
     return found
 
 

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 
-from ..montecarlo.comparison_tables import trials_data, trials_lines
-from ..presentation.pictures import draw_design
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
@@ -60,7 +58,11 @@ class Prediction(Result):
 
     def lines(self) -> list[str]:
         lines = self.table_lines()
-        return lines if self.monte_carlo is None else [*lines, "", *trials_lines(self.monte_carlo)]
+        if self.monte_carlo is None:
+            return lines
+        from ..montecarlo.comparison_tables import trials_lines
+
+        return [*lines, "", *trials_lines(self.monte_carlo)]
 
     def table_lines(self) -> list[str]:
         """The same without replicates: title, verdict and table."""
@@ -74,7 +76,7 @@ class Prediction(Result):
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines
 
     def to_dict(self) -> dict[str, Any]:
-        return {
+        found = {
             "experiment": self.label,
             "title": self.title,
             **verdict_data(self.verdict),
@@ -87,8 +89,12 @@ class Prediction(Result):
             ),
             **({"tasks": task_data(self.tasks)} if self.tasks else {}),
             "scale": scale_data(self.scale),
-            **({} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}),
         }
+        if self.monte_carlo is None:
+            return found
+        from ..montecarlo.comparison_tables import trials_data
+
+        return found | {"monte_carlo": trials_data(self.monte_carlo)}
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The positions in the volume, by their names or, where there are many, by their numbers.
@@ -98,6 +104,8 @@ class Prediction(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else.
         """
+        from ..presentation.pictures import draw_design
+
         names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 

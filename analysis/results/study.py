@@ -5,7 +5,7 @@ to it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -15,21 +15,18 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.readings.reading_files import ObservedReadings
 
-from ..gross_errors.cause_search import diagnosis
-from ..gross_errors.leftover import too_many_entries
-from ..gross_errors.suspects import Diagnosis
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, uncertainties
 from ..uncertainty.tasks import TaskUncertainty, task_uncertainties
 from .adjustments import Adjustment, adjustments
-from .estimates import estimated_functions, parameter_estimates
-from .fit import Fit
-from .plates import plate_coordinates
 from .prediction import Prediction
-from .residuals import largest_residuals
+
+if TYPE_CHECKING:
+    from ballplate.simulator.readings.reading_files import ObservedReadings
+
+    from .fit import Fit
 
 
 @dataclass(frozen=True)
@@ -95,6 +92,15 @@ def fit(
     `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as
     the coefficients of t, t^2, ... on [0, 1] instead of in the stable basis.
     """
+    # Loaded only now, so that what plans and checks need not load answers sooner.
+    from ..gross_errors.cause_search import diagnosis
+    from ..gross_errors.leftover import too_many_entries
+    from ..gross_errors.suspects import Diagnosis
+    from .estimates import estimated_functions, parameter_estimates
+    from .fit import Fit
+    from .plates import plate_coordinates
+    from .residuals import largest_residuals
+
     design = observed.design
     solution = estimate(design, observed.x)
     if solution.status != "converged":

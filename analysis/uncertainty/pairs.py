@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.rounding import comparable, first_largest
 from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import LengthFunction
@@ -81,8 +82,9 @@ def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
     """
     places, common, null, drawn = relative(moved)
     single = common @ common.transpose(0, 2, 1) + moved.own @ moved.own.transpose(0, 2, 1)
+    work = np.empty((5 + places.shape[1], min(TILE, len(places)) ** 2))
     for rows, columns in _tiles(len(places)):
-        yield _tile(places, common, single, null, drawn, rows, columns)
+        yield _tile(places, common, single, null, drawn, rows, columns, work)
 
 
 def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
@@ -125,7 +127,9 @@ def relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
 
 
 def _tiles(n: int) -> Iterator[tuple[slice, slice]]:
-    edges = [slice(start, min(start + TILE, n)) for start in range(0, n, TILE)]
+    # All about as large, so that the tiles of the diagonal, of which half is in vain, are small.
+    bounds = np.linspace(0, n, -(-n // TILE) + 1).astype(int).tolist()
+    edges = [slice(*ends) for ends in pairwise(bounds)]
     for i, rows in enumerate(edges):
         for columns in edges[i:]:
             yield rows, columns
@@ -139,27 +143,42 @@ def _tile(
     drawn: Array,
     rows: slice,
     columns: slice,
+    work: Array,
 ) -> PairTile:
     diagonal = rows.start == columns.start
     n, m, d = rows.stop - rows.start, columns.stop - columns.start, places.shape[1]
-    difference = [places[rows, None, axis] - places[None, columns, axis] for axis in range(d)]
+    # Arrays of a tile's size that are made once: asking the system for memory takes as long as
+    # using it.
+    views = [one[: n * m].reshape(n, m) for one in work]
+    product, term, along, weighted, squared, *difference = views
+    for axis in range(d):
+        np.subtract(places[rows, None, axis], places[None, columns, axis], out=difference[axis])
     # A plate lies in a plane of its own frame, so that one component of all its distances is zero.
     used = [axis for axis in range(d) if difference[axis].any()]
-    squared = sum((difference[axis] ** 2 for axis in used), np.zeros((n, m)))
+    squared[:] = weighted[:] = 0.0
+    for k, i in enumerate(used):
+        squared += np.multiply(difference[i], difference[i], out=term)
+        along[:] = 0.0
+        for j in used[k:]:
+            np.matmul(common[rows, i], common[columns, j].T, out=product)
+            if i == j:
+                other = product
+            elif diagonal:
+                other = product.T
+            else:
+                other = np.matmul(common[rows, j], common[columns, i].T, out=term)
+            np.add(product, other, out=term)
+            np.subtract(single[rows, None, i, j], term, out=term)
+            term += single[None, columns, i, j]
+            term *= difference[j]
+            along += term
+            if i != j:
+                along += term
+        along *= difference[i]
+        weighted += along
     chosen: NDArray[np.bool_] = np.triu(squared > 0, 1) if diagonal else squared > 0
-    weighted = np.zeros((n, m))
-    for i in used:
-        for j in used[used.index(i) :]:
-            product = common[rows, i] @ common[columns, j].T
-            product += product if i == j else common[rows, j] @ common[columns, i].T
-            np.subtract(
-                single[rows, None, i, j] + single[None, columns, i, j], product, out=product
-            )
-            product *= difference[i]
-            product *= difference[j]
-            weighted += product if i == j else 2.0 * product
-    squared[~chosen] = 1.0
-    values = np.sqrt(np.maximum(weighted / squared, 0.0))[chosen]
+    lengths = squared[chosen]
+    values = np.sqrt(np.maximum(weighted[chosen] / lengths, 0.0))
     open_ = np.zeros(len(values), bool)
     if null.shape[2]:
         apart = drawn[rows, None] - drawn[None, columns]
@@ -171,24 +190,23 @@ def _tile(
         size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
         open_ = size[chosen] > open_above(null)
     first, second = np.nonzero(chosen)
-    return PairTile(
-        rows.start + first, columns.start + second, np.sqrt(squared[chosen]), values, open_
-    )
+    return PairTile(rows.start + first, columns.start + second, np.sqrt(lengths), values, open_)
 
 
 def _summary(tile: PairTile, labels: Integers, limit: LengthFunction | None) -> PairSummary:
     values, open_ = tile.uncertainties, tile.is_open
-    if not (~open_).any():
-        return PairSummary(len(values), int(open_.sum()))
-    determined = np.where(open_, -1.0, values)
-    top = int(comparable(determined).argmax())
+    count = int(open_.sum())
+    if count == len(values):
+        return PairSummary(count, count)
+    determined = np.where(open_, np.nan, values) if count else values
+    top = first_largest(determined)
     where = (int(labels[tile.first[top]]), int(labels[tile.second[top]]))
     within = 0 if limit is None else int((~open_ & (values <= limit.at(tile.lengths))).sum())
     return PairSummary(
         len(values),
-        int(open_.sum()),
-        float(values[~open_].sum()),
-        float(determined.max()),
+        count,
+        float(np.nansum(determined)),
+        float(np.nanmax(determined)),
         where,
         within,
     )

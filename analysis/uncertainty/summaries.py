@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.rounding import first_largest
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import (
@@ -17,7 +17,7 @@ from ballplate.simulator.estimation.functions import (
     MeasuredPoints,
     Parameters,
     Places,
-    coordinate_names,
+    coordinate_name,
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
@@ -115,12 +115,13 @@ def _of_parameters(
 ) -> dict[str, Quantity]:
     values, kind = sigma * at.of_shared(given.rows), QUANTITIES[symbol]
     unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in given.units)
-    found = {symbol: summarise(symbol, values, unit, given.names)}
+    found = {symbol: summarise(symbol, values, unit, given.names.__getitem__)}
     for part, (word, _) in kind.parts.items():
         chosen = [i for i, unit in enumerate(given.units) if unit == part]
         if chosen:
             name = f"{symbol} {word}"
-            found[name] = summarise(name, values[chosen], part, [given.names[i] for i in chosen])
+            names = [given.names[i] for i in chosen]
+            found[name] = summarise(name, values[chosen], part, names.__getitem__)
     return found
 
 
@@ -132,25 +133,19 @@ def _of_coordinates(
     sigma: float,
 ) -> Quantity:
     if isinstance(places, BallPlaces):
-        return summarise(
-            symbol,
-            sigma * at.of_balls()[places.index].ravel(),
-            "m",
-            coordinate_names(at.design, places),
-        )
-    names = coordinate_names(at.design, places)
-    found = summarise(symbol, sigma * displaced(places).uncertainties.ravel(), "m", names)
-    if not found.largest:
+        values = sigma * at.of_balls()[places.index].ravel()
+    else:
+        values = sigma * displaced(places).uncertainties.ravel()
+    found = summarise(symbol, values, "m", lambda index: coordinate_name(at.design, places, index))
+    if isinstance(places, BallPlaces) or not found.largest:
         return found
-    return replace(
-        found, places=(_point(places, names.index(found.largest) // at.design.dimension),)
-    )
+    return replace(found, places=(_point(places, first_largest(values) // at.design.dimension),))
 
 
 def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Quantity:
     """Distances that have names, each compared with its own target."""
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
-    found = summarise(symbol, values, "m", given.names)
+    found = summarise(symbol, values, "m", given.names.__getitem__)
     judged = [
         target.coverage_factor * value <= float(target.stated.at(length))
         for target, length, value in zip(given.targets, tile.lengths, values, strict=False)
@@ -208,12 +203,12 @@ def point_pairs(
     return moved.uncertainties, all_pairs(moved, places.labels, limit)
 
 
-def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Quantity:
+def summarise(symbol: str, values: Array, unit: str, name_of: Callable[[int], str]) -> Quantity:
     """Maximum and average of the standard uncertainties `values` (m,) that are not NaN."""
     open_ = np.isnan(values)
     if open_.all():
         return Quantity(symbol, np.nan, np.nan, unit, len(values), len(values))
-    top = int(np.nanargmax(comparable(values)))
+    top = first_largest(values)
     return Quantity(
         symbol,
         float(np.nanmax(values)),
@@ -221,5 +216,5 @@ def summarise(symbol: str, values: Array, unit: str, names: Sequence[str]) -> Qu
         unit,
         len(values),
         int(open_.sum()),
-        names[top],
+        name_of(top),
     )

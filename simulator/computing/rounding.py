@@ -40,6 +40,20 @@ def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None)
     return np.asarray(np.where(known, found, values))
 
 
+def first_largest(values: Array) -> int:
+    """Index of the largest of values (m,), one at least of which is no NaN: of those that are equal
+    but for rounding the first.
+
+    >>> first_largest(np.array([np.nan, 0.3, 0.1 + 0.2, 0.2]))
+    1
+    """
+    largest = np.nanmax(values)
+    # Those that are near enough to be equal, and no others, are compared.
+    margin = 4.0 * 2.0**-DIGITS * abs(largest) if np.isfinite(largest) else 0.0
+    near = np.flatnonzero(values >= largest - margin)
+    return int(near[comparable(values[near]).argmax()])
+
+
 def above(values: ArrayLike, limit: float) -> NDArray[np.bool_]:
     """Which of `values` exceed a limit by more than rounding.
 

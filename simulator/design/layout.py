@@ -288,11 +288,10 @@ def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Ar
     m = len(axis)
     rows = np.zeros((m, pose_size(d)))
     rows[np.arange(m), axis] = 1.0
-    for turn in range(pose_size(d) - d):
-        omega = np.eye(3)[turn if d == 3 else 2]
-        padded = np.zeros((m, 3))
-        padded[:, :d] = places
-        rows[:, d + turn] = np.cross(omega, padded)[np.arange(m), axis]
+    padded = np.zeros((m, 3))
+    padded[:, :d] = places
+    turns = np.cross(np.eye(3), padded[:, None])[np.arange(m), :, axis]
+    rows[:, d:] = turns if d == 3 else turns[:, 2:]
     return rows
 
 

@@ -7,6 +7,7 @@ its own rows leave open, and what it shares with all others through poses and ma
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,17 +38,19 @@ class Spectrum:
 
     Columns are scaled so that a unit step moves some point in the volume by up to a micrometre; a
     singular value is then the number of standard deviations by which the observations show such a
-    change. `directions` (s, s) holds the right singular vectors as columns, in the parameters' own
-    units, in the order of `values` (s,), largest first; `deficiency` counts those that the
-    observations leave wholly open, and `gap` is the ratio of the smallest value counted as
-    determined to the largest counted as undetermined, where these were told apart.
+    change. `values` (s,) stand largest first; `deficiency` counts those that the observations leave
+    wholly open, and `gap` is the ratio of the smallest value counted as determined to the largest
+    counted as undetermined, where these were told apart. With the full rank the values are those of
+    the scaled `triangle` (s, s), whose singular vectors are found when they are asked for;
+    otherwise that is None and `known` (s, s) has the directions.
     """
 
     values: Array
-    directions: Array
     scale: Array
     deficiency: int
     gap: float
+    triangle: Array | None = None
+    known: Array | None = None
 
     @property
     def rank(self) -> int:
@@ -56,14 +59,35 @@ class Spectrum:
     @property
     def null(self) -> Array:
         """Undetermined directions (s, deficiency)."""
+        if self.deficiency == 0:
+            return np.zeros((len(self.values), 0))
         return self.directions[:, self.rank :]
 
+    @cached_property
+    def directions(self) -> Array:
+        """Right singular vectors as columns (s, s), in the parameters' own units, in the order of
+        `values`.
+        """
+        if self.triangle is None:
+            assert self.known is not None
+            return self.known
+        return np.asarray(self.scale[:, None] * np.linalg.svd(self.triangle)[2].T)
+
     @property
-    def root(self) -> Array:
-        """Square root (s, rank) of the shared parameters' covariance, what is undetermined left
-        out.
+    def principal_root(self) -> Array:
+        """Square root (s, rank) of the shared parameters' covariance, a column for each determined
+        direction.
         """
         return np.asarray(self.directions[:, : self.rank] / self.values[: self.rank])
+
+    @cached_property
+    def root(self) -> Array:
+        """Any square root (s, rank) of the shared parameters' covariance, what is undetermined left
+        out.
+        """
+        if self.triangle is None:
+            return self.principal_root
+        return np.asarray(self.scale[:, None] * np.linalg.inv(self.triangle))
 
 
 @single_threaded
@@ -78,7 +102,8 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     scale = factor.layout.scale * MICROMETRE
     if drawn is None:
         judged = factor if factor.alike is None else factor.alike
-        _, values, right = np.linalg.svd(judged.root * scale)
+        scaled = judged.root * scale
+        values = np.asarray(np.linalg.svd(scaled, compute_uv=False), float)
         # Where nothing shared is determined, all values are rounding, of what the balls' rows have
         # carried away.
         largest = max(
@@ -93,8 +118,11 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
         gap = float("inf")
         if 0 < deficiency < len(values):
             gap = float(values[rank - 1] / max(values[rank], np.finfo(float).tiny))
+        if judged is factor and deficiency == 0:
+            return Spectrum(values, scale, 0, gap, triangle=scaled)
+        right = np.linalg.svd(scaled)[2]
         if judged is factor:
-            return Spectrum(values, scale[:, None] * right.T, scale, deficiency, gap)
+            return Spectrum(values, scale, deficiency, gap, known=scale[:, None] * right.T)
         null = right[rank:].T
     else:
         null, deficiency, gap = drawn.null / scale[:, None], drawn.deficiency, drawn.gap
@@ -104,10 +132,10 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     below = values[-1] / gap if len(values) else 0.0
     return Spectrum(
         np.append(values, np.full(deficiency, below)),
-        scale[:, None] * np.concatenate([directions, null], axis=1),
         scale,
         deficiency,
         gap,
+        known=scale[:, None] * np.concatenate([directions, null], axis=1),
     )
 
 
@@ -135,10 +163,10 @@ def no_spectrum(layout: SharedLayout) -> Spectrum:
     size = len(layout)
     return Spectrum(
         np.full(size, np.nan),
-        np.full((size, size), np.nan),
         layout.scale * MICROMETRE,
         0,
         float("inf"),
+        known=np.full((size, size), np.nan),
     )
 
 
@@ -177,9 +205,10 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
     ball = np.zeros((n, d, rank + k))
     own = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
-    carried = solve_balls(factor, factor.ball_shared)
-    ball[factor.eliminated, :, :rank] = -(carried @ shared)
-    ball_null[factor.eliminated] = -(carried @ null)
+    carried = -solve_balls(factor, factor.ball_shared)
+    rows = carried.reshape(d * len(carried), carried.shape[2])
+    ball[factor.eliminated, :, :rank] = (rows @ shared).reshape(len(carried), d, rank)
+    ball_null[factor.eliminated] = (rows @ null).reshape(len(carried), d, nulls)
     own[factor.eliminated] = solve_balls(factor, np.broadcast_to(np.eye(d), factor.ball_root.shape))
     if k:
         sides = np.concatenate(

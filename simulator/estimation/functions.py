@@ -102,11 +102,10 @@ class Distances:
 Functions = Parameters | Coordinates | Distances
 
 
-def coordinate_names(design: Design, places: Places) -> list[str]:
-    """Names of all co-ordinates of places."""
-    axes = AXIS_NAMES[: design.dimension]
-    names = [places.name(design, label) for label in places.labels.tolist()]
-    return [f"{name} {axis}" for name in names for axis in axes]
+def coordinate_name(design: Design, places: Places, index: int) -> str:
+    """Name of a co-ordinate of places by its index among all of them."""
+    place, axis = divmod(index, design.dimension)
+    return f"{places.name(design, int(places.labels[place]))} {AXIS_NAMES[axis]}"
 
 
 def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
@@ -129,7 +128,7 @@ class Displacements:
     that all share, and `own` (n, d, d) times d of their own.
 
     `null` (n, d, k) moves them along undetermined directions from where they are `drawn` (n, d), by
-    what is no mere rounding of `size` (n, d).
+    what is no mere rounding of `size` (n, d), which is zero where there is no such direction.
     """
 
     places: Array
@@ -167,15 +166,20 @@ def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Dis
             where[0], at.balls.common[index], own, at.ball_null[index], where[1], size
         )
     n, d = places.points.shape
-    columns = moving_columns(at.layout, places)
+    columns, nulls = _as_slice(moving_columns(at.layout, places)), at.shared_null.shape[1]
     root = at.shared[columns]
-    if narrow and root.shape[0] < root.shape[1]:
-        # A root of the same covariance.
-        root = np.asarray(np.linalg.qr(root.T, mode="r")).T
+    if narrow:
+        # A root of the same covariance: a triangle's has columns of zeros, or another one is found.
+        root = root[:, root.any(axis=0)]
+        if root.shape[0] < root.shape[1]:
+            root = np.asarray(np.linalg.qr(root.T, mode="r")).T
     common = np.zeros((n, d, root.shape[1] if narrow else at.balls.common.shape[2]))
-    null, size = np.empty((n, d, at.shared_null.shape[1])), np.empty((n, d))
+    null, size = np.zeros((n, d, nulls)), np.zeros((n, d))
     for some, rows in point_rows(design, at.layout, at.state, places):
-        common[some, :, : root.shape[1]] = rows[:, :, columns] @ root
+        moving = rows[:, :, columns].reshape(-1, len(root))
+        common[some, :, : root.shape[1]] = (moving @ root).reshape(len(rows), d, root.shape[1])
+        if not nulls:
+            continue
         if at.drawn is not None:
             rows = correction_rows(
                 design, at.layout, drawn, places.points[some], places.probes[some]
@@ -191,6 +195,13 @@ def moving_columns(layout: SharedLayout, places: MeasuredPoints) -> Integers:
     """Columns of the shared parameters that move corrected points; poses, for instance, do not."""
     offsets = layout.offset_columns[np.unique(places.probes)].ravel()
     return np.concatenate([np.arange(len(layout))[layout.model], np.sort(offsets[offsets >= 0])])
+
+
+def _as_slice(columns: Integers) -> Integers | slice:
+    """Columns as a slice if they follow one another: a view of an array instead of a copy."""
+    if len(columns) and (np.diff(columns) == 1).all():
+        return slice(int(columns[0]), int(columns[-1]) + 1)
+    return columns
 
 
 def point_rows(

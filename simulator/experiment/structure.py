@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any
+from weakref import WeakKeyDictionary
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -30,6 +31,10 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
     "calibration": (Sequence, CalibrationSettings),
     "priors": (Sequence, PriorSettings),
 }
+
+# Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
+# a sweep's cells, share all others.
+_VALID: WeakKeyDictionary[Node, dict[TypeAdapter[Any], Any]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -171,8 +176,12 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 def _validate(
     adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems
 ) -> dict[Steps, Any]:
+    known = _VALID.setdefault(node, {})
+    if adapter in known:
+        return {steps: known[adapter]}
     try:
-        return {steps: adapter.validate_python(to_python(node))}
+        known[adapter] = adapter.validate_python(to_python(node))
+        return {steps: known[adapter]}
     except ValidationError as error:
         for explanation in explain(error.errors(include_url=False), node, _json_schema(adapter)):
             problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)

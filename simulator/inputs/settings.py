@@ -49,7 +49,9 @@ class Settings(BaseModel):
     Lists of a file arrive as tuples, so fields holding several values are declared as tuples.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, strict=True, defer_build=True
+    )
 
     @property
     def stated(self) -> dict[str, Any]:

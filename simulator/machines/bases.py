@@ -35,6 +35,8 @@ class Quoted:
 class Basis(Protocol):
     """Functions that vanish at 0, with `zero_at_one` those of them that vanish at 1 too."""
 
+    def __hash__(self) -> int: ...
+
     @property
     def zero_at_one(self) -> bool: ...
 
@@ -130,7 +132,11 @@ class Polynomial(_Polynomials):
         envelope = t * (1.0 - t) if self.zero_at_one else t
         if self.size == 0:
             return np.zeros((len(t), 0))
-        return chebyshev.chebvander(2.0 * t - 1.0, self.size - 1) * envelope[:, None]
+        s = 2.0 * t - 1.0
+        columns = [np.ones_like(s), s][: self.size]
+        while len(columns) < self.size:
+            columns.append(2.0 * s * columns[-1] - columns[-2])
+        return np.asarray((np.stack(columns) * envelope).T)
 
     @cached_property
     def monomials(self) -> Array:

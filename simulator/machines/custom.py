@@ -7,7 +7,6 @@ place in that code.
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import sys
 import traceback
 from collections.abc import Callable, Mapping
@@ -75,7 +74,9 @@ def custom_model(
 def _named(name: str, folder: Path | None) -> Callable[..., Any]:
     module_name, colon, path = name.partition(":")
     if not colon:
-        found = importlib.metadata.entry_points(group=GROUP)
+        from importlib.metadata import entry_points
+
+        found = entry_points(group=GROUP)
         if name not in found.names:
             known = sorted(found.names)
             text = f'no entry point "{name}" of the group {GROUP} is installed; {hint(name, known)}'

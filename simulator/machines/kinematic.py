@@ -8,11 +8,10 @@ of opposite sign to those of the NPL report.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ..geometry.motions import cross_matrices
 from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial
 from .protocol import Array, Line, Parameter, Reported, Unit
@@ -116,7 +115,8 @@ class KinematicModel:
 
     def _bases(self, x: Array) -> dict[tuple[int, Basis], Array]:
         t = self.scaled(x)
-        return {(f.axis, f.basis): f.basis.values(t[:, f.axis]) for f in self.functions}
+        different = {(f.axis, f.basis) for f in self.functions}
+        return {(axis, basis): basis.values(t[:, axis]) for axis, basis in different}
 
     def _motions(
         self, bases: dict[tuple[int, Basis], Array], a: Array, m: int
@@ -136,8 +136,8 @@ class KinematicModel:
         carried = carried_vectors(self.arrangement, from_origin, p)
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
-            moved = moved + sign * np.cross(rotation[:, axis], vector)
-        return moved
+            moved = moved + sign * _crossed(rotation[:, axis], vector)
+        return np.asarray(moved)
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         bases = self._bases(x)
@@ -149,18 +149,21 @@ class KinematicModel:
             ).sensitivities()
         else:
             carried = carried_vectors(self.arrangement, from_origin, p)
-            by_translation = None
-            by_rotation = [cross_matrices(sign * vector) for sign, vector in carried]
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))
         for f in self.functions:
             values, columns = bases[f.axis, f.basis], self.slices[f.name]
-            if f.rotation or by_translation is not None:
+            if self.full_rotations:
                 source = by_rotation if f.rotation else by_translation
-                assert source is not None
                 for row in range(3):
                     direction = source[f.axis][:, row, f.component]
                     if direction.any():
                         np.multiply(values, direction[:, None], out=result[:, row, columns])
+            elif f.rotation:
+                # The unit vector of the component times the carried one, crosswise.
+                sign, vector = carried[f.axis]
+                one, other = (f.component + 1) % 3, (f.component + 2) % 3
+                result[:, one, columns] = values * (-sign * vector[:, other, None])
+                result[:, other, columns] = values * (sign * vector[:, one, None])
             else:
                 result[:, f.component, columns] = values
         return result
@@ -173,6 +176,10 @@ class KinematicModel:
         """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or
         coefficients of B-splines.
         """
+        return self._reported
+
+    @cached_property
+    def _reported(self) -> Reported:
         quoted = [f.basis.quoted() for f in self.functions]
         names: list[str] = []
         units: list[Unit] = []
@@ -217,6 +224,7 @@ def kinematic_model(
     return kinematic_model_of(arrangement, position, rotation, lower, upper, full_rotations)
 
 
+@lru_cache(maxsize=16)
 def kinematic_model_of(
     arrangement: Arrangement,
     position: Basis,
@@ -254,6 +262,15 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
             vector = x * beyond + p if sign > 0 else x * ~beyond + p
             found[axis] = (sign, vector)
     return [found[axis] for axis in AXES]
+
+
+def _crossed(v: Array, w: Array) -> Array:
+    """v x w, both (m, 3): as np.cross has it, without its general ways, which take far longer."""
+    found = np.empty(v.shape, np.result_type(v, w))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        found[:, i] = v[:, j] * w[:, k] - v[:, k] * w[:, j]
+    return found
 
 
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:

@@ -60,7 +60,7 @@ def test_any_basis_of_what_is_open_gives_the_same_words(file: str, variant: str,
     directions = np.concatenate(
         [found.directions[:, : found.rank], shared * found.scale[:, None]], axis=1
     )
-    other = replace(at, spectrum=replace(found, directions=directions))
+    other = replace(at, spectrum=replace(found, known=directions, triangle=None))
     vars(other)["balls"] = replace(at.balls, null=balls)
     told = [str(one) for one in null_directions(at)]
     assert [str(one) for one in null_directions(other)] == told
@@ -86,7 +86,8 @@ def test_any_basis_of_equally_weak_directions_gives_the_same_words(
     other = replace(
         found,
         values=np.sort(values * (1.0 + NOISE * noise.standard_normal(len(values))))[::-1],
-        directions=mixed * found.scale[:, None],
+        known=mixed * found.scale[:, None],
+        triangle=None,
     )
     limit = Target(LengthFunction(target, 0.0))
     told, same = (

@@ -220,7 +220,7 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
     assert found.verdict.weak and found.lengths is not None
     design = lay_out(experiment)
     layout, state = shared_layout(design), nominal_state(design)
-    root = spectrum(eliminate(design, layout, state)).root
+    root = spectrum(eliminate(design, layout, state)).principal_root
     rows = correction_rows(
         design,
         layout,

@@ -27,7 +27,8 @@ import pytest
 from ballplate.montecarlo.expansion import Expansion
 from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
-from ballplate.montecarlo.trials import run_trials
+from ballplate.montecarlo.targets import targets
+from ballplate.montecarlo.trials import TASK, run_trials, sum_of_task
 from ballplate.simulator.design.arrays import State, nominal_state
 from ballplate.simulator.estimation.observations import distance_rows, reading_blocks
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -38,8 +39,11 @@ from threadpoolctl import threadpool_limits
 
 from tests.reference.designs import grid_experiment
 
+from .bare import bare_batch
+
 ROOT = Path(__file__).parents[2]
 LINES: list[str] = []
+BARE: list[str] = []
 
 
 @cache
@@ -91,6 +95,35 @@ def test_thousand_replicates(n: int, singles: int) -> None:
     LINES.append(
         f"| {n} | {len(shared.design.readings)} | {one:.3f} | {both:.3f} | {whole:.3f} |"
         f" {min(seconds):.2f} | {times:.0f} | {100 * rate:.0f} |"
+    )
+
+
+@pytest.mark.parametrize(("n", "rounds"), [(5, 15), (9, 9), (20, 5)])
+def test_against_bare_numpy(n: int, rounds: int) -> None:
+    """A thousand replicates on one process, without and with statistics, in turns with bare
+    NumPy: processor time.
+    """
+    shared = prepared(n)
+    aims = targets(shared)
+    found, (balls, _) = estimate_batch(shared, 1, 0).found, bare_batch(shared, 1, 0)
+    assert np.abs(found.balls - balls).max() < 1e-8 * found.balls.std()
+    batches, tasks = range(-(-1000 // BATCH)), range(-(-1000 // TASK))
+    work: tuple[Callable[[], Any], ...] = (
+        lambda: [estimate_batch(shared, 1, batch) for batch in batches],
+        lambda: [bare_batch(shared, 1, batch) for batch in batches],
+        lambda: [sum_of_task(shared, aims, 1, task, 1000) for task in tasks],
+    )
+    times = np.zeros((rounds, len(work)))
+    with threadpool_limits(1, user_api="blas"):
+        for row in times:
+            for place, one in enumerate(work):
+                start = time.process_time()
+                one()
+                row[place] = time.process_time() - start
+    own, bare, whole = times.T
+    BARE.append(
+        f"| {n} | {np.median(own):.3f} | {np.median(bare):.3f} | {np.median(own / bare):.2f} |"
+        f" {np.median(whole):.3f} | {np.median(whole / own):.2f} |"
     )
 
 
@@ -232,6 +265,8 @@ def test_table(capsys: pytest.CaptureFixture[str]) -> None:
             " ratio | of dgemm, % |"
         )
         print("\n".join(LINES))
+        print("\n| n | estimates, s | bare NumPy, s | ratio | and statistics, s | to estimates |")
+        print("\n".join(BARE))
 
 
 if __name__ == "__main__":

@@ -17,8 +17,10 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.csgraph
 import scipy.sparse.linalg
+from ballplate.simulator.design.arrays import Design
 
-from .linear_problem import Estimate, LinearProblem, Real
+from .linear_problem import Estimate, Figures, LinearProblem, Real
+from .structured import structured
 
 # Relative to the largest, on columns in engineering units, as the estimator counts.
 EXACT = 1e-10
@@ -26,12 +28,16 @@ EXACT = 1e-10
 
 @dataclass(frozen=True)
 class Rival:
-    """A way to the same result; `module` is the library that must be there."""
+    """A way to the same result; `module` is the library that must be there.
+
+    Either `construct` and `solve` take the rows ready made, or `whole` takes the design itself.
+    """
 
     name: str
     module: str
-    construct: Callable[[LinearProblem], Any]
-    solve: Callable[[LinearProblem, Any], Estimate]
+    construct: Callable[[LinearProblem], Any] = lambda problem: None
+    solve: Callable[[LinearProblem, Any], Estimate] = lambda problem, given: given
+    whole: Callable[[Design], tuple[Figures, int]] | None = None
 
     @property
     def is_installed(self) -> bool:
@@ -336,6 +342,7 @@ def gtsam_triangle(problem: LinearProblem, given: GtsamProblem) -> Estimate:
 
 
 RIVALS = (
+    Rival("NumPy, structured by hand", "numpy", whole=structured),
     Rival("NumPy, dense QR", "numpy", dense_construct, dense_solve),
     Rival("SciPy, sparse normal equations", "scipy", whole_construct, whole_solve),
     Rival("SciPy, partitioned normal equations", "scipy", partitioned_construct, partitioned_solve),
