@@ -9,19 +9,20 @@ import os
 import signal
 import sys
 
-ANSWERS = {signal.SIGINT: (130, b"interrupted"), signal.SIGTERM: (143, b"terminated")}
+from .running.signals import ANSWERS
 
 
 def _leave(number: int, _: object) -> None:
-    status, word = ANSWERS[signal.Signals(number)]
-    os.write(2, word + b"; no file was written\n")
+    status, word = ANSWERS[signal.Signals(number).name]
+    os.write(2, f"{word}; no file was written\n".encode())
     os._exit(status)
 
 
 def main() -> int:
     """Run the command and return its exit status."""
-    for number in ANSWERS:
-        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+    for name in ANSWERS:
+        number = getattr(signal, name, None)
+        if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _leave)
     from .cli import main as command
 

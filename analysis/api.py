@@ -8,7 +8,7 @@ that is wrong, and ValueError for an argument that is.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -24,22 +24,17 @@ if TYPE_CHECKING:
     import pandas
 
     from .gross_errors.reliability import Reliability
-    from .montecarlo.trials import Progress
     from .planning.criteria import CriterionName
     from .planning.selection import Campaign
     from .requirements.answers import Reach
     from .requirements.unknowns import UnknownName
     from .results.fit import Fit
     from .results.prediction import Prediction
-    from .sweeps.execute import Summary
     from .sweeps.running import SweepResult
 
 PathLike = str | os.PathLike[str]
 
 SIGMAS = ("estimated", "given")
-
-# Chances that `ballplate reliability` takes too; beyond them there is no test that could be told.
-LEAST_CHANCE, MOST_CHANCE = 1e-12, 0.999999
 
 
 def load(path: PathLike, variant: str | None = None) -> Experiment:
@@ -128,7 +123,7 @@ def run(
     until: float | None = None,
     seed: int | None = None,
     workers: int = 1,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Report = unreported,
 ) -> Prediction:
     """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials`
     are asked for.
@@ -171,19 +166,11 @@ def simulate(
     ['position', 'ball', 'probe', 'x_mm', 'y_mm', 'z_mm']
     """
     import pandas
-    from ballplate.simulator.readings.reading_files import AXES
+    from ballplate.simulator.readings.reading_files import reading_columns
     from ballplate.simulator.readings.simulated import simulated_readings
 
     found = simulated_readings(_experiment(experiment), seed, exact)
-    design, readings = found.design, found.readings
-    columns: dict[str, Any] = {
-        "position": [design.position_names[k] for k in readings.position],
-        "ball": [design.ball_names[k] for k in readings.ball],
-        "probe": [design.probe_names[k] for k in readings.probe],
-    }
-    for k, axis in enumerate(AXES[: design.dimension]):
-        columns[f"{axis}_mm"] = 1e3 * found.x[:, k]
-    return pandas.DataFrame(columns)
+    return pandas.DataFrame(reading_columns(found.design, found.readings, found.x))
 
 
 def fit(
@@ -266,6 +253,7 @@ def reliability(
     580
     """
     from .gross_errors import redundancy
+    from .gross_errors.power import LEAST_CHANCE, MOST_CHANCE
 
     _one_of("sigma", sigma, SIGMAS)
     if not LEAST_CHANCE <= false_alarm < power <= MOST_CHANCE:
@@ -308,7 +296,7 @@ def sweep(
     workers: int = 1,
     retry_failed: bool = False,
     beside: bool = False,
-    report: Callable[[Summary], None] = lambda summary: None,
+    report: Report = unreported,
 ) -> SweepResult:
     """A family of experiments, computed into a store, from which it goes on where it ended.
 

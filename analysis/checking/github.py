@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
 from ..planning.repair.repair_tables import certificate_lines, repair_lines
 from ..results.parts import scale_lines, target_lines, verdict_lines
@@ -98,8 +98,7 @@ def in_message(text: str) -> str:
     >>> in_message("5 %\nnext")
     '5 %25%0Anext'
     """
-    lines = (in_one_line(line) for line in text.split("\n"))
-    return "\n".join(lines).replace("%", "%25").replace("\n", "%0A")
+    return in_lines(text).replace("%", "%25").replace("\n", "%0A")
 
 
 def in_property(text: str) -> str:

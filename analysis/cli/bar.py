@@ -7,6 +7,8 @@ from threading import RLock
 
 from tqdm import tqdm
 
+from ..running.steps import Step
+
 # What is told beside the bar, and in lines without one.
 FORM = "{n_fmt}/{total_fmt} {desc}, {elapsed} so far, {remaining} left{postfix}"
 
@@ -39,12 +41,18 @@ def width() -> int:
     return shutil.get_terminal_size().columns - 1
 
 
-def line(what: str, done: int, wanted: int, before: int, elapsed: float, remark: str) -> str:
+def line(step: Step, elapsed: float) -> str:
     """How far a step has come, in words alone.
 
-    >>> line("data sets", 512, 2048, 0, 20.0, "accurate to 1.5 %")
+    >>> line(Step("data sets", 512, 2048, "accurate to 1.5 %"), 20.0)
     '512/2048 data sets, 00:20 so far, 01:00 left, accurate to 1.5 %'
     """
     return tqdm.format_meter(
-        done, wanted, elapsed, prefix=what, initial=before, bar_format=FORM, postfix=remark or None
+        step.done,
+        step.wanted,
+        elapsed,
+        prefix=step.what,
+        initial=step.before,
+        bar_format=FORM,
+        postfix=step.remark or None,
     )

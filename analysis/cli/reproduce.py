@@ -140,6 +140,7 @@ def _certified(options: Namespace) -> int:
     from ..certified.problems import certified_problems, read_results
     from ..certified.score import all_right, scores
     from ..certified.score_tables import score_data, score_lines
+    from ..running.steps import counted
     from .common import print_json, print_lines
     from .progress import progress
 
@@ -155,8 +156,7 @@ def _certified(options: Namespace) -> int:
     else:
         results = {}
         with progress(options) as shown:
-            for done, problem in enumerate(problems):
-                shown.show("problems", done, len(problems))
+            for problem in counted(problems, "problems", len(problems), shown.show):
                 results[problem.name] = answers(problem)
     found = [
         one

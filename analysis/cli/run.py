@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
     from ..montecarlo.experiments import Trials
+    from ..running.steps import Step
 
 WRONG_USAGE = 2
 
@@ -100,19 +101,18 @@ def run(options: Namespace) -> int:
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
     from ..montecarlo.experiments import trials
-    from ..montecarlo.trials import MOST_TRIALS, Progress
+    from ..montecarlo.trials import MOST_TRIALS
     from ..running.processes import processors
     from .progress import progress
 
     with progress(options) as shown:
 
-        def report(now: Progress) -> None:
+        def report(step: Step) -> None:
             options.interruption.answer()
             options.interruption.kept = lambda: (
-                f"the figures of the {now.done} data sets done are lost"
+                f"the figures of the {step.done} data sets done are lost"
             )
-            remark = f"accurate to {100 * now.accuracy:.2g} %" if now.accuracy < 1.0 else ""
-            shown.show("data sets", now.done, now.wanted, remark)
+            shown.show(step)
 
         return trials(
             experiment,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from .common import count
 
 if TYPE_CHECKING:
+    from ..running.steps import Step
     from ..sweeps.bundle import Bundle
     from ..sweeps.execute import Runner, Summary
     from ..sweeps.model import Sweep
@@ -124,15 +125,9 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     try:
         with progress(options) as shown:
 
-            def report(summary: Summary) -> None:
+            def report(step: Step) -> None:
                 options.interruption.answer()
-                remark = ", ".join(
-                    ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
-                    + ([f"{summary.failed} failed"] if summary.failed else [])
-                )
-                shown.show(
-                    "cells", summary.done + summary.failed, summary.cells, remark, summary.before
-                )
+                shown.show(step)
 
             runner = _runner(sweep, bundle, options)
             summary = compute_sweep(

@@ -32,7 +32,7 @@ from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
 from ..results.estimates import ParameterEstimate
 from ..results.formatting import SHOWN, aligned, number
-from ..running.steps import Report, unreported
+from ..running.steps import Report, Step, unreported
 from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -288,7 +288,7 @@ def compare_estimators(
             difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
-        report(f"data sets of {experiment.label}", trial + 1, trials)
+        report(Step(f"data sets of {experiment.label}", trial + 1, trials))
     return Comparison(
         experiment.label,
         experiment.title,

@@ -14,7 +14,6 @@ from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import (
     Reversal,
@@ -346,7 +345,7 @@ def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEsti
     """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the
     first, `k`.
     """
-    at = linearised_fit(design, full.solution)
+    at = full.functions.at
     layout, state = at.layout, at.state
     own = np.eye(len(layout))
     # Exact derivatives, as imaginary steps leave the real part alone.

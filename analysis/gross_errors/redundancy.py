@@ -19,7 +19,7 @@ from ballplate.simulator.machines.protocol import Integers
 from ballplate.simulator.numerics.rounding import comparable
 from ballplate.simulator.numerics.threads import single_threaded
 
-from ..running.steps import Report, unreported
+from ..running.steps import Report, Step, unreported
 from ..uncertainty.quantities import QUANTITIES
 from .effects import SYMBOLS, Changes, Largest, changes_of
 from .events import event_groups
@@ -88,7 +88,7 @@ def reliability_of(
     effects = {symbol: _nothing(len(given), groups) for symbol, groups in functions.items()}
     done = 0
     for one in responses(at, None, given):
-        report("observations", done, len(places))
+        report(Step("observations", done, len(places)))
         done += len(one.rows)
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information

@@ -18,7 +18,7 @@ from ballplate.simulator.numerics.rounding import above, comparable
 from ballplate.simulator.numerics.threads import single_threaded
 from numpy.typing import NDArray
 
-from ..running.steps import Report, unreported
+from ..running.steps import Report, Step, unreported
 from ..uncertainty.pairs import PairTile, pair_tiles
 
 # Points of a grid: twelve million lengths.
@@ -126,7 +126,7 @@ def length_map(
     worst, largest = None, -1.0
     named: list[tuple[int, int]] = []
     done, count = 0, comb(len(points), 2)
-    report("lengths", done, count)
+    report(Step("lengths", done, count))
     for tile in tiles:
         target = settings.target.at(tile.lengths)
         ratio = np.where(tile.is_open, np.nan, tile.uncertainties / target)
@@ -146,7 +146,7 @@ def length_map(
         for k in np.flatnonzero(tile.is_open)[: NAMED - len(named)]:
             named.append((int(tile.first[k]), int(tile.second[k])))
         done += len(tile.lengths)
-        report("lengths", done, count)
+        report(Step("lengths", done, count))
     return LengthMap(
         design,
         deficiency,

@@ -4,7 +4,6 @@ optimistic?
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -27,10 +26,11 @@ from ballplate.simulator.montecarlo.reference import (
 )
 from ballplate.simulator.readings.generate import NoReadingError, on_true_machine
 
+from ..running.steps import Report, unreported
 from .figures import Outcome, outcome, power_of_difference, power_of_misfit
 from .tally import Tally
 from .targets import targets
-from .trials import TASK, Progress, run_trials, sum_of_task
+from .trials import TASK, run_trials, sum_of_task
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def trials(
     seed: int | None = None,
     until: float | None = None,
     workers: int = 1,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Report = unreported,
 ) -> Trials:
     """Estimate replicates of an experiment's true machine; see `run_trials`.
 

@@ -4,8 +4,8 @@ order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from ballplate.simulator.montecarlo.reference import Reference
@@ -13,6 +13,7 @@ from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.simulator.numerics.threads import single_threaded
 
 from ..running.processes import in_processes
+from ..running.steps import Report, Step, unreported
 from .figures import Outcome, outcome
 from .tally import Tally, tally
 from .targets import Target, targets
@@ -25,24 +26,13 @@ TASK = BATCH * BATCHES
 MOST_TRIALS = 1_000_000
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How far a run has come: replicates done of those wanted, and how accurate it is, relative to
-    what is measured.
-    """
-
-    done: int
-    wanted: int
-    accuracy: float
-
-
 def run_trials(
     shared: Reference,
     seed: int,
     trials: int,
     until: float | None = None,
     workers: int = 1,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Report = unreported,
 ) -> Outcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
@@ -66,7 +56,8 @@ def run_trials(
                 if until is None
                 else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
             )
-            report(Progress(count, enough, accuracy))
+            remark = f"accurate to {100 * accuracy:.2g} %" if accuracy < 1.0 else ""
+            report(Step("data sets", count, enough, remark))
             if until is not None and accuracy <= until:
                 break
     except KeyboardInterrupt:

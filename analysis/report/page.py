@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
 
 from ..results.formatting import number, percent, uncertainty_words
@@ -25,7 +26,7 @@ from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .pictures import MOST_NAMES, probes_svg, scene_svg, slice_svg, slice_words
 from .plots import plot_svg
-from .results import Results, best_and_worst, cell_list, criterion, one_line
+from .results import Results, best_and_worst, cell_list, criterion
 from .scene import MOST_BALLS, Scene, scene
 from .series import Plot, plots
 from .svg import micro
@@ -86,7 +87,7 @@ def page(
     )
     drawn = plots(results)
     context: dict[str, Any] = {
-        "title": one_line(results.title),
+        "title": in_one_line(results.title),
         "summary": _summary(results),
         "style": Markup(package.joinpath("page.css").read_text(encoding="utf-8")),
         "facts": _facts(results),
@@ -131,8 +132,8 @@ def _facts(results: Results) -> list[tuple[str, str]]:
     stored = results.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     facts = [
-        ("Sweep file", one_line(stored["source"])),
-        ("Experiment", one_line(stored["base"]) + (f": {one_line(base)}" if base else "")),
+        ("Sweep file", in_one_line(stored["source"])),
+        ("Experiment", in_one_line(stored["base"]) + (f": {in_one_line(base)}" if base else "")),
     ]
     for axis in results.axes:
         labels = list(axis.labels)
@@ -166,7 +167,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
 def _unreadable(results: Results) -> str:
     """Which cells could not be read, and why the first of them."""
     cells = sorted(results.found.unreadable)
-    return f"{cell_list(cells)} ({one_line(results.found.unreadable[cells[0]])})"
+    return f"{cell_list(cells)} ({in_one_line(results.found.unreadable[cells[0]])})"
 
 
 def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawn]]]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
+from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import Mark
@@ -21,7 +20,7 @@ from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..rank.verdict import Verdict
 from ..report.vectors import Vectors, draw_vectors
-from ..uncertainty.summaries import Quantity
+from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
 from .estimates import (
@@ -29,7 +28,6 @@ from .estimates import (
     EstimatedFunctions,
     ParameterEstimate,
     correct,
-    estimated_functions,
     labels,
 )
 from .formatting import SHOWN, aligned, finite, number, to_uncertainty
@@ -70,8 +68,8 @@ class Fit(Result):
     estimated from the residuals as the root of S^2 over the degrees of freedom, or 1 where the file
     says that they are given. `adjustments` are those of a three-dimensional metric. `diagnosis` is
     what the residuals make suspect, which nothing else here heeds, or `untested` says why there is
-    none; `marks` tell where readings stand. With `monomials` the machine's parameters are the
-    coefficients of t, t^2, ... on [0, 1].
+    none; `marks` tell where readings stand. `estimated` is
+    everything that was estimated as functions of the parameters, without `sigma`.
     """
 
     label: str
@@ -88,11 +86,15 @@ class Fit(Result):
     largest: tuple[Residual, ...]
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
-    tasks: tuple[TaskUncertainty, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     marks: tuple[Mark, ...] = ()
-    monomials: bool = False
     untested: str = ""
+    estimated: EstimatedFunctions | None = None
+
+    @property
+    def tasks(self) -> tuple[TaskUncertainty, ...]:
+        """The measuring tasks one by one."""
+        return tasks_of(self.quantities)
 
     def headline(self) -> str:
         if not self.converged:
@@ -208,18 +210,18 @@ class Fit(Result):
     def converged(self) -> bool:
         return self.solution.status == "converged"
 
-    @cached_property
+    @property
     def functions(self) -> EstimatedFunctions:
         """Everything estimated and the measuring tasks, as functions of the parameters; without
         sigma.
 
         :raises ValueError: the estimate has not converged.
         """
-        if not self.converged:
+        if self.estimated is None:
             raise ValueError(
                 f"the estimate has {self.solution.status}; nothing is known of its uncertainty"
             )
-        return estimated_functions(linearised_fit(self.design, self.solution), self.monomials)
+        return self.estimated
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is

@@ -14,7 +14,7 @@ from ..montecarlo.comparison_tables import trials_data, trials_lines
 from ..rank.verdict import Verdict
 from ..report.pictures import draw_design
 from ..uncertainty.scale import Scale
-from ..uncertainty.summaries import Quantity
+from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .parts import (
     quantities_data,
@@ -50,10 +50,14 @@ class Prediction(Result):
     design: Design
     verdict: Verdict
     quantities: dict[str, Quantity]
-    tasks: tuple[TaskUncertainty, ...] = ()
     lengths: Quantity | None = None
     scale: Scale | None = None
     monte_carlo: Trials | None = None
+
+    @property
+    def tasks(self) -> tuple[TaskUncertainty, ...]:
+        """The measuring tasks one by one."""
+        return tasks_of(self.quantities)
 
     def headline(self) -> str:
         return ", ".join([rank_words(self.verdict), *length_headline(self.quantities)])

@@ -22,8 +22,8 @@ from ..gross_errors.search import diagnosis
 from ..gross_errors.suspects import Diagnosis
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
-from ..uncertainty.summaries import Quantity, uncertainties
-from ..uncertainty.tasks import TaskUncertainty, task_uncertainties
+from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
+from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, adjustments
 from .estimates import estimated_functions, parameter_estimates
 from .fit import Fit
@@ -34,13 +34,16 @@ from .residuals import largest_residuals
 
 @dataclass(frozen=True)
 class PlannedUncertainty:
-    """Uncertainties alone, for searches that judge many designs: rank deficiency, quantities and
-    tasks.
+    """Uncertainties alone, for searches that judge many designs: rank deficiency and quantities,
+    the measuring tasks among them.
     """
 
     deficiency: int
     quantities: dict[str, Quantity]
-    tasks: tuple[TaskUncertainty, ...]
+
+    @property
+    def tasks(self) -> tuple[TaskUncertainty, ...]:
+        return tasks_of(self.quantities)
 
 
 def check(
@@ -60,7 +63,7 @@ def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
     """What `predict` finds, less the explanation of the rank, which takes most of its time."""
     at = linearise(lay_out(experiment))
     found = uncertainties(at, target=experiment.target_accuracy)
-    return PlannedUncertainty(at.deficiency, found, task_uncertainties(at))
+    return PlannedUncertainty(at.deficiency, found)
 
 
 @single_threaded
@@ -70,16 +73,14 @@ def _predict(
     at, target = linearise(design), experiment.target_accuracy
     judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities: dict[str, Quantity] = {}
-    tasks: tuple[TaskUncertainty, ...] = ()
     if with_quantities:
         quantities = uncertainties(at, target=target)
-        tasks = task_uncertainties(at)
         lengths = quantities.get("U6")
     else:
         lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
     scale = scale_of(experiment, at) if with_scale else None
     return Prediction(
-        experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale
+        experiment.label, experiment.title, design, judged, quantities, lengths, scale
     )
 
 
@@ -107,6 +108,7 @@ def fit(
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
     untested = too_many_entries(design)
+    functions = estimated_functions(at, monomials)
     return Fit(
         experiment.label,
         experiment.title,
@@ -118,15 +120,14 @@ def fit(
         estimated,
         freedom,
         uncertainties(at, scale, experiment.target_accuracy),
-        parameter_estimates(estimated_functions(at, monomials), scale),
+        parameter_estimates(functions, scale),
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        task_uncertainties(at, scale),
         Diagnosis() if untested else diagnosis(at, observed.x, freedom, estimated),
         observed.marks,
-        monomials,
         untested,
+        functions,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from ballplate.simulator.inputs.messages import in_one_line
 from filelock import FileLock, Timeout
 
 from ..results.result import Result
+from ..running.steps import Report, unreported
 from .bundle import Bundle, changes, definition
 from .execute import Runner, Summary, run_sweep
 from .frame import frame
@@ -167,7 +168,7 @@ def compute_sweep(
     runner: AbstractContextManager[Runner],
     retry_failed: bool = False,
     fail_fast: bool = False,
-    report: Callable[[Summary], None] = lambda summary: None,
+    report: Report = unreported,
 ) -> Summary:
     """Compute what is left of a sweep that is entered.
 

@@ -46,17 +46,26 @@ class ObservedReadings:
     marks: tuple[Mark, ...] = ()
 
 
+def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
+    """Readings in millimetres as the columns of their file: position, ball, probe, x_mm, y_mm and
+    z_mm.
+    """
+    names = {
+        "position": [design.position_names[k] for k in readings.position],
+        "ball": [design.ball_names[k] for k in readings.ball],
+        "probe": [design.probe_names[k] for k in readings.probe],
+    }
+    lengths = zip(AXES[: design.dimension], (1e3 * x).T.tolist(), strict=True)
+    return names | {f"{axis}_mm": column for axis, column in lengths}
+
+
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
-    """Write readings in millimetres with all digits: position, ball, probe, x_mm, y_mm and z_mm."""
+    """Write the columns of readings with all digits."""
     writer = CsvWriter(stream)
-    writer.writerow(
-        ["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])]
-    )
-    positions, balls, probes = design.position_names, design.ball_names, design.probe_names
-    for ball, position, probe, row in zip(
-        readings.ball, readings.position, readings.probe, (1e3 * x).tolist(), strict=True
-    ):
-        writer.writerow([positions[position], balls[ball], probes[probe], *map(repr, row)])
+    columns = reading_columns(design, readings, x)
+    writer.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow([*row[:3], *map(repr, row[3:])])
 
 
 def read_readings(

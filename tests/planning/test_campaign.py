@@ -21,6 +21,7 @@ from ballplate.planning.offer import offer
 from ballplate.planning.search import Problem
 from ballplate.results.study import predict
 from ballplate.running.internal_error import InternalError
+from ballplate.running.steps import Step
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
@@ -321,12 +322,12 @@ def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
 
 
 def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
-    steps: list[tuple[str, int, int]] = []
+    steps: list[Step] = []
     request = Request("U6", Budget(positions=4))
-    campaign(load(drawn, planning=True)[0], request, report=lambda *step: steps.append(step))
-    searched = [(done, wanted) for what, done, wanted in steps if what == "starts of the search"]
+    campaign(load(drawn, planning=True)[0], request, report=steps.append)
+    searched = [(step.done, step.wanted) for step in steps if step.what == "starts of the search"]
     assert len(searched) > 1
     assert searched == [
         (done, searched[0][1]) for done in range(searched[0][0], searched[0][1] + 1)
     ]
-    assert all(0 <= done <= wanted for _, done, wanted in steps)
+    assert all(0 <= step.done <= step.wanted for step in steps)
