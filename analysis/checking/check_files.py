@@ -34,7 +34,7 @@ class CheckedDesign:
     these and of what is weak.
     """
 
-    plan: Prediction
+    prediction: Prediction
     place: Mark | None
     repairs: Repairs | None = None
     goals: tuple[str, ...] = ()
@@ -44,7 +44,7 @@ class CheckedDesign:
     @property
     def complaints(self) -> tuple[str, ...]:
         """What is wrong: the rank, then goals and weak directions that were not to be."""
-        complaint = self.plan.verdict.complaint
+        complaint = self.prediction.verdict.complaint
         return (*([complaint] if complaint else []), *self.missed)
 
 
@@ -110,25 +110,25 @@ def check_files(
 
 
 def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wanted) -> CheckedDesign:
-    plan = check(experiment, with_scale=True)
+    prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
         from ..planning.repair.scale import scale_certificate
         from ..planning.repair.search import repairs
 
         found = repairs(with_pool)
-        certificate = scale_certificate(with_pool, plan.scale)
+        certificate = scale_certificate(with_pool, prediction.scale)
     goals, missed = _goals(experiment, wanted.goals)
-    if wanted.nothing_weak and plan.verdict.weak:
-        count = len(plan.verdict.weak)
+    if wanted.nothing_weak and prediction.verdict.weak:
+        count = len(prediction.verdict.weak)
         missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
-    design = CheckedDesign(plan, None, found, goals, missed, certificate)
+    design = CheckedDesign(prediction, None, found, goals, missed, certificate)
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (
-        ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_accuracy",)
+        ("expected_rank_deficiency",) if prediction.verdict.complaint else ("target_accuracy",)
     )
-    if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
+    if not prediction.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
     return replace(design, place=experiment.place(steps))
 

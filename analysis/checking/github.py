@@ -37,18 +37,18 @@ def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> lis
 
 
 def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> list[str]:
-    plan = design.plan
+    prediction = design.prediction
     told = [
-        *verdict_lines(plan.verdict, lengths=plan.lengths),
-        *target_lines(plan.lengths),
-        *scale_lines(plan.scale),
+        *verdict_lines(prediction.verdict, lengths=prediction.lengths),
+        *target_lines(prediction.lengths),
+        *scale_lines(prediction.scale),
     ]
     suggested = advice_lines(design)
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space
         # after a hash.
         first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
-        start = f"as expected: {file}: {design.plan.label}: "
+        start = f"as expected: {file}: {design.prediction.label}: "
         return [
             in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)
         ]
@@ -56,22 +56,20 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     # The log of a run shows only the message, so that it names the place again.
     text = "\n".join(
         [
-            f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}",
+            f"{place.file}:{place.line}:{place.column}: {prediction.label}: {told[0]}",
             *told[1:],
             *suggested,
         ]
     )
-    what = "rank" if plan.verdict.complaint else "goals"
-    return [
-        _error(place.file, place.line, place.column, f"{what} of {plan.label}", text, workspace)
-    ]
+    what = f"{'rank' if prediction.verdict.complaint else 'goals'} of {prediction.label}"
+    return [_error(place.file, place.line, place.column, what, text, workspace)]
 
 
 def advice_lines(design: CheckedDesign) -> list[str]:
     """Goals, and what is suggested, as lines of text."""
     return [
         *design.goals,
-        *repair_lines(design.repairs, design.plan.verdict),
+        *repair_lines(design.repairs, design.prediction.verdict),
         *certificate_lines(design.certificate),
     ]
 

@@ -46,15 +46,16 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
-    case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
+    prediction = design.prediction
+    case = ElementTree.Element("testcase", {"classname": file, "name": _clean(prediction.label)})
     # Outside attributes a line's end is one, and the log of a build server may take what follows
     # for a command.
-    told = [_clean(in_one_line(line)) for line in (*design.plan.lines(), *advice_lines(design))]
+    told = [_clean(in_one_line(line)) for line in (*prediction.lines(), *advice_lines(design))]
     if design.place is None:
         ElementTree.SubElement(case, "system-out").text = "\n".join(told)
         return case
-    is_rank = bool(design.plan.verdict.complaint)
-    message = _clean(verdict_lines(design.plan.verdict)[0] if is_rank else "; ".join(design.missed))
+    is_rank = bool(prediction.verdict.complaint)
+    message = _clean(verdict_lines(prediction.verdict)[0] if is_rank else "; ".join(design.missed))
     kind = "rank" if is_rank else "goal"
     failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"

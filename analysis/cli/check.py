@@ -118,14 +118,14 @@ def run(options: Namespace) -> int:
                 print(line, flush=True)
         elif options.format == "text":
             for design in checked.designs:
-                print_lines([*design.plan.lines(), *advice_lines(design)])
+                print_lines([*design.prediction.lines(), *advice_lines(design)])
         if options.format in ("text", "json"):
             print_errors(checked.messages, options)
     if options.format == "junit":
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([one.plan.to_dict() | _asked(one, options.suggest) for one in designs])
+        print_json([one.prediction.to_dict() | _asked(one, options.suggest) for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED

@@ -208,7 +208,7 @@ def run(options: Namespace) -> int:
         print_lines(found.lines())
     if not is_written:
         return BAD_FILE
-    is_full = found.plan.verdict.deficiency == found.left_open
+    is_full = found.prediction.verdict.deficiency == found.left_open
     return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
 
 

@@ -4,7 +4,8 @@ in section 6.2.7.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,9 @@ from ballplate.simulator.readings.generate import (
 )
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
-from ..results.estimates import ParameterEstimate
+from ..results.estimates import ParameterEstimate, estimate_rows
 from ..results.formatting import SHOWN, aligned, number
+from ..results.result import FitResult, Result
 from ..running.steps import Report, Step, unreported
 from .length_fits import has_all_errors
 
@@ -49,28 +51,59 @@ MOST_POINTS = 100_000
 ENOUGH = GaussNewtonSettings(smallest_step=1e-8)
 
 
-@dataclass(frozen=True)
-class RivalFit:
+@dataclass(frozen=True, repr=False)
+class RivalFit(FitResult):
     """Estimates of the machine's parameters by a rival estimator from `pairs` pairs of balls,
     without uncertainties.
     """
 
     label: str
     title: str
+    observed: ObservedReadings
     solution: RivalSolution
     pairs: int
-    lengths: int
     estimates: tuple[ParameterEstimate, ...]
 
+    @property
+    def lengths(self) -> int:
+        """Number of lengths of standards that it uses."""
+        return len(self.observed.design.lengths)
 
-@dataclass(frozen=True)
-class Comparison:
+    @property
+    def converged(self) -> bool:
+        return self.solution.status == "converged"
+
+    @property
+    def complaint(self) -> str:
+        if not self.converged:
+            return f"the estimate has {self.solution.status}; see the record of iterations"
+        count = self.solution.deficiency
+        return f"rank deficiency {count}: what is undetermined is left out" if count else ""
+
+    def headline(self) -> str:
+        count = self.solution.deficiency
+        rank = f"rank deficiency {count}" if count else "full rank"
+        return f"{self.solution.estimator}, {self.solution.status}, {rank}"
+
+    def lines(self) -> list[str]:
+        return _fit_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _fit_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each of the machine's parameters."""
+        return estimate_rows(self.estimates)
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
     """How far a rival's corrected distances are from the full estimator's, over `trials` synthetic
     data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
-    the other data sets, from 0.
+    the other data sets, from 0. `published` values, by "rms" and "maximum", are placed among them.
     """
 
     label: str
@@ -84,6 +117,29 @@ class Comparison:
     rms: Array
     maximum: Array
     failed: tuple[int, ...]
+    published: Mapping[str, float | None] = field(default_factory=dict)
+
+    def headline(self) -> str:
+        median = f"{1e6 * float(np.median(self.rms)):.3g} um" if len(self.rms) else "unknown"
+        failed = f", {len(self.failed)} not converged" if self.failed else ""
+        return (
+            f"{self.estimator}, {self.trials} data sets, median of the differences {median}{failed}"
+        )
+
+    def lines(self) -> list[str]:
+        return _comparison_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _comparison_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each data set on which both estimators converged."""
+        kept = [k for k in range(self.trials) if k not in self.failed]
+        columns = zip(kept, self.rms.tolist(), self.maximum.tolist(), strict=True)
+        return [
+            {"data set": k, "root mean square": rms, "maximum": maximum, "unit": "m"}
+            for k, rms, maximum in columns
+        ]
 
 
 def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
@@ -233,9 +289,7 @@ def fit_rival(
         ParameterEstimate(name, float(value), np.nan, unit)
         for name, value, unit in zip(names, values, units, strict=True)
     )
-    return RivalFit(
-        experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates
-    )
+    return RivalFit(experiment.label, experiment.title, observed, solution, len(chosen), estimates)
 
 
 def compare_estimators(
@@ -246,6 +300,7 @@ def compare_estimators(
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
+    published: Mapping[str, float | None] | None = None,
     report: Report = unreported,
 ) -> Comparison:
     """Compare a rival with the full estimator on readings of the file's true machine.
@@ -301,6 +356,7 @@ def compare_estimators(
         np.array(rms),
         np.array(maximum),
         tuple(failed),
+        published or {},
     )
 
 
@@ -349,7 +405,7 @@ def share_below(values: Array, published: float) -> float:
     return float((values < published).mean()) if len(values) else float("nan")
 
 
-def rival_fit_lines(fit: RivalFit) -> list[str]:
+def _fit_lines(fit: RivalFit) -> list[str]:
     """A rival's fit as lines of text: iterations and the machine's parameters."""
     record = fit.solution.iterations
     rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
@@ -385,7 +441,7 @@ def _used(pairs: int, lengths: int) -> str:
     return " and ".join([*words, *([f"{lengths} lengths of standards"] if lengths else [])])
 
 
-def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
+def _fit_data(fit: RivalFit) -> dict[str, Any]:
     """A rival's fit as plain data in metres and radians; what is undetermined is None."""
     return {
         "experiment": fit.label,
@@ -403,13 +459,13 @@ def rival_fit_data(fit: RivalFit) -> dict[str, Any]:
             e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit}
             for e in fit.estimates
         },
+        **fit.said(),
     }
 
 
-def comparison_lines(found: Comparison, published: dict[str, float | None]) -> list[str]:
-    """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum")
-    stand in them.
-    """
+def _comparison_lines(found: Comparison) -> list[str]:
+    """A comparison as lines of text: quantiles, and where published values stand in them."""
+    published = found.published
     across = ", across probes" if found.across_probes else ""
     used = _used(found.pairs, found.lengths)
     lines = [
@@ -453,7 +509,7 @@ def comparison_lines(found: Comparison, published: dict[str, float | None]) -> l
     return lines + aligned(rows, [False] + [True] * (len(rows[0]) - 1))
 
 
-def comparison_data(found: Comparison, published: dict[str, float | None]) -> dict[str, Any]:
+def _comparison_data(found: Comparison) -> dict[str, Any]:
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
         "experiment": found.label,
@@ -474,7 +530,7 @@ def comparison_data(found: Comparison, published: dict[str, float | None]) -> di
             },
             "values": [float(value) for value in values],
         }
-        value = published.get(key)
+        value = found.published.get(key)
         if value is not None:
             data[key] |= {"published": value, "share_below_published": share_below(values, value)}
     return data

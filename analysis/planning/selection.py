@@ -33,11 +33,11 @@ class Campaign(Selection, Result):
 
     @property
     def label(self) -> str:
-        return self.plan.label
+        return self.prediction.label
 
     @property
     def title(self) -> str:
-        return self.plan.title
+        return self.prediction.title
 
     @property
     def sheet(self) -> RunSheet:
@@ -87,7 +87,7 @@ def _lines(found: Campaign) -> list[str]:
     run sheet.
     """
     lines = [
-        f"{found.plan.label}: {found.plan.title}",
+        f"{found.prediction.label}: {found.prediction.title}",
         f"{len(found.pool.candidates)} candidates{_dropped(found)}; no more than {found.budget}",
         f"{found.criterion}: {DESCRIPTIONS[found.criterion]}",
         "",
@@ -114,7 +114,7 @@ def _lines(found: Campaign) -> list[str]:
         lines += ["", *_gain_table(found)]
     if found.curve:
         lines += ["", *_curve_table(found)]
-    return [*lines, "", *found.plan.lines()[1:], "", *sheet_lines(found.sheet)]
+    return [*lines, "", *found.prediction.lines()[1:], "", *sheet_lines(found.sheet)]
 
 
 def _interrupted(found: Campaign) -> list[str]:
@@ -214,7 +214,7 @@ def _curve_table(found: Campaign) -> list[str]:
 def _data(found: Campaign) -> dict[str, Any]:
     """A campaign as data for JSON, in metres and seconds."""
     return {
-        "experiment": found.plan.label,
+        "experiment": found.prediction.label,
         "candidates": len(found.pool.candidates),
         "dropped": dict(found.pool.dropped),
         "criterion": found.criterion,
@@ -237,7 +237,7 @@ def _data(found: Campaign) -> dict[str, Any]:
         "left_out": [_gain_data(gain) for gain in found.left_out],
         "curve": [_point_data(point) for point in found.curve],
         "run_sheet": sheet_data(found.sheet),
-        "plan": found.plan.to_dict(),
+        "plan": found.prediction.to_dict(),
     }
 
 

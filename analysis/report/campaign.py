@@ -85,7 +85,7 @@ def draw_campaign(found: Selection, path: str | Path | None = None) -> Figure:
         axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
         axes.set_axis_off()
         axes.set_aspect("equal")
-        draw_scene(axes, scene(found.plan.design), by_number=True)
+        draw_scene(axes, scene(found.prediction.design), by_number=True)
         return save(figure, path, words(found))
 
 
@@ -323,7 +323,7 @@ def _rows(found: Selection) -> list[_Row]:
     """The chosen ones with their numbers in the drawing, those first that gain most, then the best
     of the others.
     """
-    numbers = {name: k + 1 for k, name in enumerate(found.plan.design.position_names)}
+    numbers = {name: k + 1 for k, name in enumerate(found.prediction.design.position_names)}
     rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in found.gains[:MOST_CHOSEN]]
     if len(found.gains) > MOST_CHOSEN:
         rows.append(

@@ -12,13 +12,13 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import far_outside
+from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..rank.verdict import Verdict
+from ..report.scene import box_edges, projection
 from ..report.vectors import Vectors, draw_vectors
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
@@ -28,6 +28,7 @@ from .estimates import (
     EstimatedFunctions,
     ParameterEstimate,
     correct,
+    estimate_rows,
     labels,
 )
 from .formatting import SHOWN, aligned, finite, number, to_uncertainty
@@ -46,7 +47,7 @@ from .parts import (
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals
-from .result import Result
+from .result import FitResult
 
 if TYPE_CHECKING:
     import pandas
@@ -60,22 +61,21 @@ SHOWN_RESIDUALS = 3
 
 
 @dataclass(frozen=True, repr=False)
-class Fit(Result):
+class Fit(FitResult):
     """An estimate from readings; without quantities and estimates, and the design judged as drawn,
     if it has failed.
 
-    `x` (readings, d) are the scale readings in metres. `sigma` multiplies all stated uncertainties:
+    `observed` has the design and its readings. `sigma` multiplies all stated uncertainties:
     estimated from the residuals as the root of S^2 over the degrees of freedom, or 1 where the file
     says that they are given. `adjustments` are those of a three-dimensional metric. `diagnosis` is
     what the residuals make suspect, which nothing else here heeds, or `untested` says why there is
-    none; `marks` tell where readings stand. `estimated` is
+    none. `estimated` is
     everything that was estimated as functions of the parameters, without `sigma`.
     """
 
     label: str
     title: str
-    design: Design
-    x: Array
+    observed: ObservedReadings
     solution: Solution
     verdict: Verdict
     sigma: float
@@ -87,9 +87,13 @@ class Fit(Result):
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
-    marks: tuple[Mark, ...] = ()
     untested: str = ""
     estimated: EstimatedFunctions | None = None
+
+    @property
+    def design(self) -> Design:
+        """The design as it was read."""
+        return self.observed.design
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
@@ -128,7 +132,7 @@ class Fit(Result):
             return lines
         lines += ["", *self._residual_table()]
         if self.diagnosis:
-            lines += diagnosis_lines(self.diagnosis, self.marks)
+            lines += diagnosis_lines(self.diagnosis, self.observed.marks)
         lines += ["", *uncertainty_table(self.quantities), ""]
         lines += [*task_table(self.tasks), ""] if self.tasks else []
         rows = [["parameter", "value", "standard uncertainty", "unit"]]
@@ -154,7 +158,7 @@ class Fit(Result):
     def to_dict(self) -> dict[str, Any]:
         suspected: dict[str, Any] = {}
         if self.diagnosis:
-            suspected = {"suspected": diagnosis_data(self.diagnosis, self.marks)}
+            suspected = {"suspected": diagnosis_data(self.diagnosis, self.observed.marks)}
         return {
             "experiment": self.label,
             "title": self.title,
@@ -191,20 +195,12 @@ class Fit(Result):
                 else {}
             ),
             **({"adjustments": adjustment_data(self.adjustments)} if self.adjustments else {}),
+            **self.said(),
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter."""
-        return [
-            {
-                "parameter": one.name,
-                "kind": one.kind,
-                "value": one.value,
-                "standard uncertainty": one.standard_uncertainty,
-                "unit": one.unit,
-            }
-            for one in self.estimates
-        ]
+        return estimate_rows(self.estimates)
 
     @property
     def converged(self) -> bool:
@@ -291,15 +287,18 @@ class Fit(Result):
         return correct(self.functions.at, given, probes, self.sigma)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
-        """Residuals of a two-dimensional fit that has converged, for each position."""
+        """Residuals of a fit that has converged, for each position; in three dimensions as they are
+        seen from the front and above.
+        """
         design = self.design
-        readings, residuals, _ = reading_residuals(design, self.solution, self.x)
-        places = self.x[design.plate_readings]
+        view, _ = projection(design.dimension)
+        readings, residuals, _ = reading_residuals(design, self.solution, self.observed.x)
+        places = self.observed.x[design.plate_readings]
         return tuple(
             Vectors(
                 design.position_names[k],
-                places[mine],
-                residuals[mine],
+                places[mine] @ view.T,
+                residuals[mine] @ view.T,
                 tuple(design.ball_names[ball] for ball in readings.ball[mine]),
             )
             for k in np.unique(readings.position)
@@ -307,27 +306,35 @@ class Fit(Result):
         )
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Residuals of a two-dimensional fit as magnified vectors where the balls were read.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, the fit has three dimensions, or has
-            not converged.
-        """
-        if self.design.dimension != 2 or not self.converged:
-            why = "has three dimensions" if self.converged else f"has {self.solution.status}"
-            raise ValueError(
-                f"residuals are drawn of fits in two dimensions that have converged; this one {why}"
+        design, vectors = self.design, self.residual_vectors() if self.converged else ()
+        if not vectors:
+            why = (
+                "no ball of a plate was read"
+                if self.converged
+                else f"the estimate has {self.solution.status}"
             )
-        return draw_vectors(self.residual_vectors(), self.title, path)
+            raise ValueError(f"there are no residuals to be drawn: {why}")
+        if design.dimension == 2:
+            return draw_vectors(vectors, self.title, path)
+        view, towards = projection(3)
+        edges, _ = box_edges(design.lower, design.upper, towards)
+        return draw_vectors(vectors, self.title, path, edges @ view.T)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """What is to be said of sigma where it comes from few degrees of freedom, and of what was
-        not tested.
+    def cautions(self) -> tuple[str, ...]:
+        """What is to be said of residuals that are too large, of sigma where it comes from few
+        degrees of freedom, and of what was not tested.
         """
         found = []
+        if self.too_large:
+            times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
+            cure = (
+                "no single mistake explains that: try a richer error model or larger uncertainties,"
+                " and think of drifts"
+            )
+            if self.diagnosis.suspects or self.diagnosis.scatter:
+                cure = "look at what is suspected"
+            found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
@@ -337,6 +344,15 @@ class Fit(Result):
                 " them tested"
             )
         return tuple(filter(None, found))
+
+    @property
+    def complaint(self) -> str:
+        if self.converged:
+            return self.verdict.complaint
+        return (
+            f"the estimate has {self.solution.status} and nothing is made of it: see the record of"
+            " iterations, and look for wrong units, balls or probes among the readings"
+        )
 
     @property
     def too_large(self) -> bool:

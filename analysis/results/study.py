@@ -101,7 +101,7 @@ def fit(
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
-        return Fit(*names, design, observed.x, solution, judged, 1.0, False, 0, {}, (), ())
+        return Fit(*names, observed, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_accuracy)
     freedom = design.observations - design.parameter_count + judged.deficiency
@@ -112,8 +112,7 @@ def fit(
     return Fit(
         experiment.label,
         experiment.title,
-        design,
-        observed.x,
+        observed,
         solution,
         judged,
         scale,
@@ -125,7 +124,6 @@ def fit(
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
         Diagnosis() if untested else diagnosis(at, observed.x, freedom, estimated),
-        observed.marks,
         untested,
         functions,
     )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -21,7 +22,11 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import Row, column_names, read_table
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .gross_error_messages import refuse_misreadings
+from .gross_error_messages import (
+    doubts_about_lengths,
+    doubts_about_volume,
+    refuse_misreadings,
+)
 
 AXES = ("x", "y", "z")
 
@@ -45,6 +50,18 @@ class ObservedReadings:
     unplanned: tuple[str, ...]
     marks: tuple[Mark, ...] = ()
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """How far they are those that were planned, in words; nothing where they are."""
+        both = (("planned but not read", self.missing), ("read but not planned", self.unplanned))
+        return tuple(f"{what} ({len(names)}): {listing(names)}" for what, names in both if names)
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What of them is possible, and unlikely to be meant: lengths and places."""
+        of_volume = doubts_about_volume(self.design, self.x, self.marks)
+        return (*doubts_about_lengths(self.design, self.x), *of_volume)
+
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
     """Readings in millimetres as the columns of their file: position, ball, probe, x_mm, y_mm and
@@ -63,7 +80,7 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
     """Write the columns of readings with all digits."""
     writer = CsvWriter(stream)
     columns = reading_columns(design, readings, x)
-    writer.writerow(columns)
+    writer.writerow(list(columns))
     for row in zip(*columns.values(), strict=True):
         writer.writerow([*row[:3], *map(repr, row[3:])])
 

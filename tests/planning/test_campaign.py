@@ -269,7 +269,7 @@ def test_hours_buy_certificates_too(tmp_path: Path) -> None:
     found = campaign(first(path), Request("U5", Budget(seconds=6 * HOUR)))
     assert {"sides", "flatness"} & {candidate.name for candidate in found.chosen}
     assert found.spent.seconds <= 6 * HOUR
-    full = found.plan.quantities["U5"]
+    full = found.prediction.quantities["U5"]
     assert found.value == pytest.approx(full.average, rel=1e-9)
 
 

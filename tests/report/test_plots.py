@@ -74,7 +74,7 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
     pool = {"candidates": [PLACES | {"probes": ["down"]}]}
     campaign = bp.plan(bp.quickstart().with_(pool=pool), positions=7)
     assert repr(campaign).startswith("<Campaign of quickstart: 7 of ") and len(repr(campaign)) < 100
-    assert bp.run(campaign.chosen_experiment).quantities == campaign.plan.quantities
+    assert bp.run(campaign.chosen_experiment).quantities == campaign.prediction.quantities
     figure = campaign.plot(str(tmp_path / "plan.png"))
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
     drawn = {text.get_text() for axes in figure.axes for text in axes.texts}

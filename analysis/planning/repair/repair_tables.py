@@ -61,7 +61,7 @@ def _worth(one: Repair, judged: Verdict) -> str:
         words += ", and nothing is weakly determined"
     if one.removes:
         words += f"; removes {_directions(one, judged)}"
-    u6 = None if one.plan is None else one.plan.quantities.get("U6")
+    u6 = None if one.prediction is None else one.prediction.quantities.get("U6")
     if u6 is not None:
         words += f"; average U6 {number(1e6 * u6.average)} um"
     return f"{words}; smallest singular value {one.smallest:.3g}"
@@ -149,7 +149,7 @@ def repair_data(found: Repairs | None) -> dict[str, Any] | None:
 
 
 def _data(one: Repair) -> dict[str, Any]:
-    u6 = None if one.plan is None else one.plan.quantities.get("U6")
+    u6 = None if one.prediction is None else one.prediction.quantities.get("U6")
     return {
         "changes": [{"kind": KINDS[change.kind], "text": change.words} for change in one.changes],
         "rank_deficiency": one.deficiency,
