@@ -15,6 +15,7 @@ from .svg import INK, MUTED, PAPER, SERIES, drawing, micro, placed_axes, round_n
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Points: of the drawings.
 WIDTH, HEIGHT = 460.0, 300.0
@@ -22,8 +23,9 @@ WIDTH, HEIGHT = 460.0, 300.0
 LONGEST = 0.18
 
 
-def plot(curve: Curve, path: Path) -> None:
-    """Draw points, curve, its expanded uncertainty, knots and boundaries to a file.
+def draw_curve(curve: Curve, path: str | Path | None = None) -> Figure:
+    """Points, curve, its expanded uncertainty, knots and boundaries as a picture, which is written
+    to the path if there is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -83,7 +85,7 @@ def plot(curve: Curve, path: Path) -> None:
         axes.set_ylabel(f"{y.words}, {micro(y.unit)}")
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3)
-        save(figure, path, words(curve))
+        return save(figure, path, words(curve))
 
 
 def words(curve: Curve) -> str:
@@ -101,9 +103,14 @@ def words(curve: Curve) -> str:
     )
 
 
-def whiskers(curve: Curve, points: Points, path: Path, magnification: float | None = None) -> None:
-    """Draw the errors of all points of the file as bars normal to the profile, those of the fit in
-    front, to a file.
+def draw_whiskers(
+    curve: Curve,
+    points: Points,
+    path: str | Path | None = None,
+    magnification: float | None = None,
+) -> Figure:
+    """The errors of all points of the file as bars normal to the profile, those of the fit in
+    front; the picture is written to the path, if there is one.
 
     :raises SplineError: neighbouring points that stand at the same place.
     :raises OSError: the file cannot be written.
@@ -158,7 +165,7 @@ def whiskers(curve: Curve, points: Points, path: Path, magnification: float | No
         worst = int(np.argmax(comparable(np.abs(points.y))))
         told = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
         largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"
-        save(figure, path, f"{told}, magnified {magnification:g} times; {largest_told}")
+        return save(figure, path, f"{told}, magnified {magnification:g} times; {largest_told}")
 
 
 def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.ndarray:

@@ -11,13 +11,13 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from ..length_map.length_map import LengthMap
-from ..length_map.length_tables import target_words
+from ..length_map.grouped import GroupedLengths, target_words
 from ..results.formatting import percent
 from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, micro, placed_axes, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Points: of the drawing and what stands around its parts.
 WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
@@ -29,9 +29,9 @@ UNDER = 54.0
 MOST_SLICES, IN_A_ROW, BETWEEN, SCALE = 6, 3, 10.0, 62.0
 
 
-def draw_lengths(found: LengthMap, path: Path) -> None:
-    """Write a picture of the largest ratio of u to the target at each point, and of u over the
-    length.
+def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figure:
+    """A picture of the largest ratio of u to the target at each point, and of u over the length;
+    it is written to the path, if there is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -87,7 +87,7 @@ def draw_lengths(found: LengthMap, path: Path) -> None:
             f"target {micro(target_words(found.settings.target))}: u within it for {shares[0]} of"
             " the lengths, "
         )
-        save(figure, path, f"{words}{k} u for {shares[1]} of them")
+        return save(figure, path, f"{words}{k} u for {shares[1]} of them")
 
 
 def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
@@ -112,14 +112,14 @@ def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
     )
 
 
-def _mark_words(found: LengthMap, meaning: str) -> str:
+def _mark_words(found: GroupedLengths, meaning: str) -> str:
     words = f"; {meaning}" if meaning else ""
     return words + ("; undetermined ones left out" if found.whole.undetermined[0] else "")
 
 
 def _slice(  # type: ignore[no-untyped-def]
     axes: Axes,
-    found: LengthMap,
+    found: GroupedLengths,
     ratios: Array,
     marked: NDArray[np.bool_],
     limits: tuple[float, float],
@@ -149,12 +149,12 @@ def _slice(  # type: ignore[no-untyped-def]
     return image
 
 
-def _centres(found: LengthMap, axis: int) -> Array:
+def _centres(found: GroupedLengths, axis: int) -> Array:
     """Co-ordinates of the grid along an axis, in millimetres."""
     return np.unique(1e3 * found.points[:, axis].round(12))
 
 
-def _millimetres(found: LengthMap, axis: int, level: int) -> str:
+def _millimetres(found: GroupedLengths, axis: int, level: int) -> str:
     return f"{_centres(found, axis)[level] + 0.0:.6g}"
 
 
@@ -164,7 +164,7 @@ def _borders(centres: Array) -> Array:
     return np.append(centres - half, centres[-1] + half)
 
 
-def _curves(axes: Axes, found: LengthMap) -> None:
+def _curves(axes: Axes, found: GroupedLengths) -> None:
     """Average and largest u of each class of length, the largest k u, and the target."""
     groups, edges = found.by_length, 1e3 * found.edges
     middle = 0.5 * (edges[1:] + edges[:-1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,10 +107,27 @@ class Prediction(Result):
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each of U1 to U6."""
+        """One row for each of U1 to U6; where these were not asked for, one with the rank and
+        U6.
+        """
+        if self.quantities:
+            return [
+                {"symbol": symbol, **quantity_row(quantity)}
+                for symbol, quantity in self.quantities.items()
+            ]
+        judged, lengths = self.verdict, self.lengths
         return [
-            {"symbol": symbol, **quantity_row(quantity)}
-            for symbol, quantity in self.quantities.items()
+            {
+                "rank": rank_words(judged),
+                "parameters": judged.parameters,
+                "observations": judged.observations,
+                "rank deficiency": judged.deficiency,
+                "as expected": judged.as_expected,
+                "weakly determined": len(judged.weak),
+                "U6 average": math.nan if lengths is None else lengths.average,
+                "U6 maximum": math.nan if lengths is None else lengths.maximum,
+                "unit": "m",
+            }
         ]
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..running.files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .table import Block, Entry, Row, Table
 
@@ -72,11 +73,18 @@ class Result:
         """Its main table as elements of a page, as a notebook shows it."""
         return self._written(as_html)
 
-    def to_csv(self) -> str:
+    def to_csv(self, path: str | Path | None = None) -> str:
         """Its main table as CSV with a line of headings, with all digits; what is undetermined is
         empty.
+
+        With a path the text is written as well.
+
+        :raises OSError: the file cannot be written.
         """
-        return self.to_frame().to_csv(index=False)
+        text = self.to_frame().to_csv(index=False, lineterminator="\n")
+        if path is not None:
+            write_file(path, text.encode())
+        return text
 
     def __str__(self) -> str:
         return "\n".join([*self.lines(), *self.notes])

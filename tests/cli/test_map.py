@@ -285,7 +285,7 @@ def test_wrong_usage(
             "EC0Y is the squareness of Y to X, a single number: -45.00 urad at the reference point",
         ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
-        (("--points", "10"), "--points is for --line; leave it out"),
+        (("--points", "10"), "points go with a line; leave them out"),
         (("--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
         (
