@@ -135,16 +135,16 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
         ),
         (
             lambda: bp.plan("designs/planning/plate-pool.yaml", hours=-1.0),
-            "hours: -1.0 is not above 0",
+            "hours=-1.0; give hours above 0",
         ),
         (
             lambda: bp.plan("designs/planning/plate-pool.yaml", positions=0),
-            "positions: 0 is not above 0",
+            "positions=0; give 1 at least",
         ),
         (lambda: bp.run(QUICKSTART, until=float("nan")), "until=nan; give a ratio above 0"),
         (
             lambda: bp.sweep("designs/sweeps/plate-size.yaml", workers=0),
-            "workers: 0 is not above 0",
+            "workers=0; give 1 at least",
         ),
         (
             lambda: bp.reach(QUICKSTART, unknowns="rows"),

@@ -12,7 +12,7 @@ from .common import add_picture, count, print_json, print_lines
 from .outputs import add_force, write_outputs
 
 if TYPE_CHECKING:
-    from ballplate.simulator.machines.description import Three
+    from ..volumetric.volumetric_results import Line
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -105,24 +105,13 @@ def _points(text: str) -> int:
     return found
 
 
-def _line(text: str) -> dict[str, float] | tuple[Three, Three]:
-    from ballplate.simulator.experiment.error_tables import LineError, parse_line, parse_point
+def _line(text: str) -> Line:
+    from ..volumetric.volumetric_results import parse_places
 
     try:
-        start, to, end = text.partition(" to ")
-        if to:
-            ends = parse_point(start), parse_point(end)
-            if ends[0] == ends[1]:
-                raise ArgumentTypeError("a line ends where it begins; give two points")
-            return ends
-        found = parse_line(text)
-    except LineError as error:
+        return parse_places(text)
+    except ValueError as error:
         raise ArgumentTypeError(str(error)) from None
-    if len(found) != 2:
-        raise ArgumentTypeError(
-            "two axes stand still on a line; write for example y = 600 mm, z = 600 mm"
-        )
-    return found
 
 
 def run(options: Namespace) -> int:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ballplate.simulator.inputs.quantities import (
@@ -16,6 +16,7 @@ from ballplate.simulator.inputs.quantities import (
     parse_length,
     parse_ratio,
 )
+from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.splines.read import Column, Points
 
 from .error_curve import EVERY, CurveSettings, Hold, Place
@@ -52,6 +53,29 @@ class Asked:
     period: str | None = None
     uncertainty: str | None = None
     evaluate: str | None = None
+
+
+# Kinds of what is asked for that is no text.
+KINDS = {"every": int, "order": int, "periodic": bool}
+LISTS = ("boundary", "straight", "at")
+
+
+def ensure_asked(given: Mapping[str, object]) -> None:
+    """Refuse what cannot be asked for of a curve.
+
+    :raises TypeError: an unknown name, or another kind of value.
+    """
+    names = [one.name for one in fields(Asked)]
+    for name, value in given.items():
+        if name not in names:
+            raise TypeError(f'"{name}" is unknown; {hint(name, names)}')
+        kind = KINDS.get(name, str)
+        if name in LISTS:
+            if isinstance(value, str) or not isinstance(value, Sequence):
+                raise TypeError(f"{name}={value!r}; give a list")
+        elif value is not None and not isinstance(value, kind):
+            words = {int: "a whole number", bool: "True or False", str: "a text with a unit"}
+            raise TypeError(f"{name}={value!r}; give {words[kind]}")
 
 
 def curve_settings(options: Asked, points: Points) -> CurveSettings:

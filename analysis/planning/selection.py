@@ -17,8 +17,9 @@ from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Budget, Spent
 from .criteria import DESCRIPTIONS
 from .done import base_name
+from .experiment_file import experiment_text
 from .schedule import RunSheet, run_sheet
-from .sheet_forms import sheet_data, sheet_lines
+from .sheet_forms import sheet_csv, sheet_data, sheet_lines, sheet_markdown, sheet_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,6 +53,35 @@ class Campaign(Selection, Result):
         sheet.
         """
         return with_chosen(self.experiment, self.sheet.chosen)
+
+    def to_yaml(self, folder: str | Path = ".") -> str:
+        """The choice as the text of an experiment file that is to stand in a folder.
+
+        :raises ExperimentError: the experiment comes from no file.
+        """
+        source = self.experiment.source.name
+        header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
+        header += f" than {self.budget}."
+        deficiency = self.left_open or None
+        return experiment_text(
+            self.experiment, self.sheet.chosen, header, Path(folder), None, deficiency
+        )
+
+    def sheet_text(self, form: str = ".txt") -> str:
+        """The run sheet as .html to print, .md, .csv or .txt.
+
+        :raises ValueError: another form.
+        """
+        sheet, experiment = self.sheet, self.experiment
+        if form == ".html":
+            return sheet_page(sheet, experiment, experiment.title)
+        if form == ".md":
+            return sheet_markdown(sheet, experiment.title)
+        if form == ".csv":
+            return sheet_csv(sheet)
+        if form == ".txt":
+            return "\n".join([experiment.title, "", *sheet_lines(sheet), ""])
+        raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.experiment.error_tables import parse_line, parse_point
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import Message
 from ballplate.simulator.machines.volumetric import meaning
@@ -177,6 +178,26 @@ class ErrorAlongAxis(MachineErrors):
 
 Line = Mapping[str, float] | Sequence[Sequence[float]]
 """The places in metres of the two axes that stand still, by their names, or two points."""
+
+
+def parse_places(text: str) -> Line:
+    """A line that is written as on the command line.
+
+    :raises ValueError: written otherwise.
+
+    >>> parse_places("y = 600 mm, z = 600 mm")
+    {'y': 0.6, 'z': 0.6}
+    """
+    start, to, end = text.partition(" to ")
+    if to:
+        ends = parse_point(start), parse_point(end)
+        if ends[0] == ends[1]:
+            raise ValueError("a line ends where it begins; give two points")
+        return ends
+    found = parse_line(text)
+    if len(found) != 2:
+        raise ValueError("two axes stand still on a line; write for example y = 600 mm, z = 600 mm")
+    return found
 
 
 def machine_errors(
