@@ -673,10 +673,10 @@ def _ensure_path(name: str, given: object) -> None:
 
 
 def _several(name: str, given: int | Sequence[int]) -> tuple[int, ...]:
-    if isinstance(given, Iterable) and not isinstance(given, str):
-        return tuple(given)
-    ensure_whole(2, **{name: given})
-    return (given,)
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        ensure_whole(2, **{name: given})
+        return (given,)
+    return tuple(given)
 
 
 def _argument(option: re.Match[str]) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Integral, Real
 
+import numpy as np
 from ballplate.simulator.inputs.settings import hint
 
 
@@ -22,7 +22,7 @@ def ensure_whole(least: int, most: int | None = None, **given: object) -> None:
     for name, value in given.items():
         if value is None:
             continue
-        if isinstance(value, bool) or not isinstance(value, Integral):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
             raise TypeError(f"{name}={value!r}; give a whole number")
         if value < least:
             raise ValueError(f"{name}={value}; give {least} at least")
@@ -44,7 +44,7 @@ def ensure_positive(what: str, most: float | None = None, **given: object) -> No
     for name, value in given.items():
         if value is None:
             continue
-        if isinstance(value, bool) or not isinstance(value, Real):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             raise TypeError(f"{name}={value!r}; give {what}")
         if not 0.0 < value <= (float("inf") if most is None else most):
             raise ValueError(f"{name}={value}; give {what}")
