@@ -672,7 +672,7 @@ def _ensure_path(name: str, given: object) -> None:
         raise TypeError(f"{name}={given!r}; give the path of a file or folder")
 
 
-def _several(name: str, given: int | Sequence[int]) -> tuple[int, ...]:
+def _several(name: str, given: Any) -> tuple[int, ...]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         ensure_whole(2, **{name: given})
         return (given,)
@@ -694,7 +694,7 @@ def _table(name: str, given: PathLike | pandas.DataFrame) -> Path | GivenText:
     return GivenText(name, given.to_csv(index=False))
 
 
-def _experiment(given: Experiment | PathLike) -> Experiment:
+def _experiment(given: Any) -> Experiment:
     if isinstance(given, Experiment):
         return given
     if isinstance(given, str | os.PathLike):

@@ -56,7 +56,7 @@ class Groups:
         return np.asarray(np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GroupedLengths:
     """Lengths between all points of a grid, grouped.
 
