@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         spline,
         sweep,
     )
-    from .estimators.choice import ESTIMATORS
+    from .estimators.estimator_choice import ESTIMATORS
     from .simulator.experiment.model import Experiment
     from .sweeps.running import OtherSweepError
     from .sweeps.store_file import StoreError
@@ -62,7 +62,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "ESTIMATORS": "ballplate.estimators.choice",
+    "ESTIMATORS": "ballplate.estimators.estimator_choice",
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
     "OtherSweepError": "ballplate.sweeps.running",

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 
-from .running.signals import ANSWERS
+from ballplate.simulator.computing.signals import ANSWERS
 
 
 def _leave(number: int, _: object) -> None:

@@ -15,11 +15,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.inputs.arguments import (
+    ensure_one_of,
+    ensure_positive,
+    ensure_report,
+    ensure_type,
+    ensure_whole,
+)
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
 
-from .estimators.choice import (
+from .estimators.estimator_choice import (
     ESTIMATORS,
     OF_DISTANCES,
     OF_LENGTHS,
@@ -28,35 +36,27 @@ from .estimators.choice import (
     PairSet,
     takers,
 )
-from .running.arguments import (
-    ensure_one_of,
-    ensure_positive,
-    ensure_report,
-    ensure_type,
-    ensure_whole,
-)
-from .running.steps import Report, unreported
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
 
 if TYPE_CHECKING:
     import pandas
 
-    from .certified.score_result import CertifiedScores
-    from .error_curve.curve_result import ErrorCurve
-    from .estimators.distances import Comparison
+    from .error_maps.curve_result import FittedCurve
+    from .error_maps.length_tables import LengthMap
+    from .error_maps.volumetric_results import Line, MachineErrors
+    from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
-    from .length_map.length_tables import LengthMap
     from .planning.criteria import CriterionName
+    from .planning.requirements.answers import Reach
+    from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
+    from .presentation.result import FitResult
     from .reproduction.reproduction_result import ReproducedDocument
-    from .requirements.answers import Reach
-    from .requirements.unknowns import UnknownName
+    from .reproduction.score_result import CertifiedScores
     from .results.fit import Fit
     from .results.prediction import Prediction
-    from .results.result import FitResult
     from .sweeps.running import SweepResult
-    from .volumetric.volumetric_results import Line, MachineErrors
 
 PathLike = str | os.PathLike[str]
 
@@ -286,7 +286,7 @@ def fit(
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
-    from .estimators.choice import fit_readings
+    from .estimators.estimator_choice import fit_readings
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=estimator)
@@ -319,7 +319,7 @@ def compare(
     published_rms: str | None = None,
     published_maximum: str | None = None,
     report: Report = unreported,
-) -> Comparison:
+) -> EstimatorComparison:
     """How far the distances that an estimator of distances or lengths alone corrects are from those
     by the full one, on synthetic data sets of the true machine.
 
@@ -455,9 +455,9 @@ def reach(
     >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
     True
     """
-    from .requirements.goals import parse_goal
-    from .requirements.search import reach as search
-    from .requirements.unknowns import NAMES
+    from .planning.requirements.goals import parse_goal
+    from .planning.requirements.root_search import reach as search
+    from .planning.requirements.unknowns import NAMES
 
     ensure_type(str, 'a text such as "U6 average 0.3 um"', goal=goal)
     ensure_type(str, 'a text with a unit, such as "0.5 um"', target=target)
@@ -497,7 +497,7 @@ def lengths(
     >>> lengths(quickstart(), "1 um + L/1000000", grid=3).is_met
     True
     """
-    from .length_map.length_map import length_map, length_settings
+    from .error_maps.length_map import length_map, length_settings
 
     ensure_type(str, 'a text with a unit, such as "0.5 um + L/1000000"', target=target)
     ensure_type(str, "the name of a probe", probe=probe)
@@ -527,8 +527,8 @@ def map(
     >>> map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
     <ErrorsOnLine of npl-like: 3 points, resultant 16.17 um at most>
     """
-    from .volumetric.volumetric_errors import MOST_POINTS
-    from .volumetric.volumetric_results import machine_errors, parse_places
+    from .error_maps.volumetric_errors import MOST_POINTS
+    from .error_maps.volumetric_results import machine_errors, parse_places
 
     _ensure_path("machine", machine)
     ensure_type(str, "the name of a parametric error, such as EXX", error=error)
@@ -553,7 +553,7 @@ def spline(
     sigma: Literal["estimated", "given"] | None = None,
     powers: Literal["local", "global"] = "local",
     **wanted: Any,
-) -> ErrorCurve:
+) -> FittedCurve:
     """A spline with prescribed values and slopes through the measured errors of a CSV file.
 
     `x` and `y` are columns, and `points` names those that are used. What curve is `wanted` is said
@@ -565,8 +565,8 @@ def spline(
     >>> spline(table, "arc_length", "finish_error", "12-32", start_slope="0")
     <ErrorCurve of table-1: 21 points, 7 free coefficients>
     """
-    from .error_curve.asked import Asked, OptionError, ensure_asked
-    from .error_curve.curve_result import error_curve
+    from .error_maps.curve_options import Asked, OptionError, ensure_asked
+    from .error_maps.curve_result import error_curve
 
     _ensure_path("file", file)
     ensure_type(str, "the name of a column", x=x, y=y)
@@ -601,9 +601,9 @@ def reproduce(
     >>> reproduce("npl", "6.1.2").is_right
     True
     """
-    from .certified.score_result import score_certified
     from .montecarlo.trials import MOST_TRIALS
     from .reproduction.reproduction_result import reproduce_npl
+    from .reproduction.score_result import score_certified
 
     if document not in ("npl", "certified"):
         raise ValueError(f'document: "{document}" is unknown; give npl or certified')

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from ballplate.cli import main
-from ballplate.running.steps import Step
+from ballplate.simulator.computing.steps import ProgressStep
 from matplotlib.colors import to_hex
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -236,9 +236,9 @@ def test_every_function_reports_steps_alike(tmp_path: Path) -> None:
             "designs/sweeps/plate-size.yaml", tmp_path / "a.sqlite", report=report
         ),
     ):
-        told: list[Step] = []
+        told: list[ProgressStep] = []
         call(told.append)
-        assert told and all(type(step) is Step for step in told)
+        assert told and all(type(step) is ProgressStep for step in told)
         assert told[-1].done == told[-1].wanted and str(told[-1]).startswith(f"{told[-1].done} of ")
 
 

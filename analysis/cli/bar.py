@@ -5,9 +5,8 @@ from __future__ import annotations
 import shutil
 from threading import RLock
 
+from ballplate.simulator.computing.steps import ProgressStep
 from tqdm import tqdm
-
-from ..running.steps import Step
 
 # What is told beside the bar, and in lines without one.
 FORM = "{n_fmt}/{total_fmt} {desc}, {elapsed} so far, {remaining} left{postfix}"
@@ -41,10 +40,10 @@ def width() -> int:
     return shutil.get_terminal_size().columns - 1
 
 
-def line(step: Step, elapsed: float) -> str:
+def line(step: ProgressStep, elapsed: float) -> str:
     """How far a step has come, in words alone.
 
-    >>> line(Step("data sets", 512, 2048, "accurate to 1.5 %"), 20.0)
+    >>> line(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"), 20.0)
     '512/2048 data sets, 00:20 so far, 01:00 left, accurate to 1.5 %'
     """
     return tqdm.format_meter(

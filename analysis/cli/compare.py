@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from argparse import ArgumentTypeError, Namespace
 
-from ..estimators.choice import OF_DISTANCES, OF_LENGTHS, PAIR_SETS
+from ..estimators.estimator_choice import OF_DISTANCES, OF_LENGTHS, PAIR_SETS
 from .common import add_file, add_json, count, seed, trial_count
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "compare",
-        help="compare a rival estimator with the full one on synthetic data",
+        help="compare an alternative estimator with the full one on synthetic data",
         description=(
             "Estimate synthetic data sets of the file's true machine with the full estimator and"
             " with one that uses distances or lengths alone, and tell how far the distances that"
@@ -53,7 +53,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
-    """Add the choice of the pairs of balls whose distances a rival estimator uses."""
+    """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
     parser.add_argument(
         "--pairs",
         choices=PAIR_SETS,

@@ -6,7 +6,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from ..estimators.choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
+from ..estimators.estimator_choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
 from .outputs import add_force, write_outputs
@@ -14,6 +14,7 @@ from .outputs import add_force, write_outputs
 WRONG_USAGE, BAD_FILE = 2, 3
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "fit",

@@ -17,7 +17,7 @@ from functools import partial
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from ..running.signals import ANSWERS
+from ballplate.simulator.computing.signals import ANSWERS
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -34,7 +34,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--grid",
@@ -95,8 +95,8 @@ def _factor(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ..length_map.length_map import length_map, length_settings, pair_csv
-    from ..length_map.length_tables import point_csv
+    from ..error_maps.length_map import length_map, length_settings, pair_csv
+    from ..error_maps.length_tables import point_csv
     from .progress import progress
 
     experiment = single(options)

@@ -12,7 +12,7 @@ from .common import add_picture, count, print_json, print_lines
 from .outputs import add_force, write_outputs
 
 if TYPE_CHECKING:
-    from ..volumetric.volumetric_results import Line
+    from ..error_maps.volumetric_results import Line
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -78,7 +78,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _grid(text: str) -> tuple[int, int, int]:
-    from ..volumetric.volumetric_errors import MOST_POINTS
+    from ..error_maps.volumetric_errors import MOST_POINTS
 
     parts = [part.strip() for part in text.split(",")]
     if len(parts) == 3 and all(
@@ -97,7 +97,7 @@ def _grid(text: str) -> tuple[int, int, int]:
 
 
 def _points(text: str) -> int:
-    from ..volumetric.volumetric_errors import MOST_POINTS
+    from ..error_maps.volumetric_errors import MOST_POINTS
 
     found = count(text)
     if not 2 <= found <= MOST_POINTS:
@@ -106,7 +106,7 @@ def _points(text: str) -> int:
 
 
 def _line(text: str) -> Line:
-    from ..volumetric.volumetric_results import parse_places
+    from ..error_maps.volumetric_results import parse_places
 
     try:
         return parse_places(text)
@@ -116,7 +116,7 @@ def _line(text: str) -> Line:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
-    from ..volumetric.volumetric_results import VolumetricMap, machine_errors
+    from ..error_maps.volumetric_results import VolumetricMap, machine_errors
 
     is_grid = options.line is None and options.error is None
     try:

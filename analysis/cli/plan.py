@@ -18,6 +18,7 @@ AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 SHEETS = (".html", ".md", ".csv", ".txt")
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "plan",
@@ -148,12 +149,12 @@ def _sheet(text: str) -> Path:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
+    from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
     from ..planning.earlier import begun
-    from ..running.processes import processors
     from .excerpts import print_errors
     from .progress import progress
 
@@ -185,18 +186,18 @@ def run(options: Namespace) -> int:
     return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
 
 
-def _written(found: Campaign, options: Namespace) -> bool:
+def _written(campaign: Campaign, options: Namespace) -> bool:
     """Write what was asked for; False if something cannot be written."""
     writers: dict[Path, Writer] = {}
     if options.output is not None:
-        text = found.to_yaml(options.output.parent)
+        text = campaign.to_yaml(options.output.parent)
         writers[options.output] = text_writer(lambda stream: stream.write(text))
     if options.sheet is not None:
-        told = found.sheet_text(options.sheet.suffix.lower())
+        told = campaign.sheet_text(options.sheet.suffix.lower())
         writers[options.sheet] = text_writer(lambda stream: stream.write(told))
     if options.plot is not None:
         # Numbered as on the run sheet.
-        writers[options.plot] = replace(found, chosen=found.sheet.chosen).plot
+        writers[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot
     is_written = write_outputs(writers, options.force)
     for path in (options.output, options.sheet):
         if is_written and path is not None:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..running.steps import Step
+    from ballplate.simulator.computing.steps import ProgressStep
+
     from .bar import Bar
 
 # Seconds between two lines where there is no terminal.
@@ -21,7 +22,7 @@ LINE_INTERVAL = 5.0
 
 
 @dataclass
-class Progress:
+class ProgressDisplay:
     """Shows one step after the other; `what` is counted, which is also what tells steps apart."""
 
     is_quiet: bool = False
@@ -33,7 +34,7 @@ class Progress:
     last: float = 0.0
     bar: Bar | None = None
 
-    def show(self, step: Step) -> None:
+    def show(self, step: ProgressStep) -> None:
         """Report how far a step has come; the time left does not count what was done before."""
         if step.what != self.what:
             self.close()
@@ -49,7 +50,7 @@ class Progress:
             self.last = time.monotonic()
             print(line(step, self.last - self.started), file=sys.stderr, flush=True)
 
-    def _draw(self, step: Step) -> None:
+    def _draw(self, step: ProgressStep) -> None:
         # Loaded only where it is seen.
         from .bar import Bar, width
 
@@ -72,9 +73,9 @@ class Progress:
 
 
 @contextmanager
-def progress(options: Namespace) -> Iterator[Progress]:
+def progress(options: Namespace) -> Iterator[ProgressDisplay]:
     """What shows the steps of a command, for as long as they take."""
-    shown = Progress(options.quiet, options.verbose)
+    shown = ProgressDisplay(options.quiet, options.verbose)
     try:
         yield shown
     finally:

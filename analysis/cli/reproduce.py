@@ -13,6 +13,7 @@ from .common import trial_count
 WRONG_USAGE = 2
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reproduce",
@@ -81,8 +82,8 @@ def run(options: Namespace) -> int:
     """Reproduce a document; 1 if a published figure does not come out within the limits stated, or
     an answer to a certified problem is wrong or missing.
     """
-    from ..certified.score_result import CertifiedScores, score_certified
     from ..reproduction.reproduction_result import ReproducedDocument, reproduce_npl
+    from ..reproduction.score_result import CertifiedScores, score_certified
     from .common import print_json, print_lines
     from .progress import progress
 

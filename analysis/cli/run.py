@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from .common import add_file, add_json, count, percentage, seed, trial_count
 
 if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
 
     from ..montecarlo.experiments import Trials
-    from ..running.steps import Step
 
 WRONG_USAGE = 2
 
@@ -100,14 +100,15 @@ def run(options: Namespace) -> int:
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
+    from ballplate.simulator.computing.processes import processors
+
     from ..montecarlo.experiments import trials
     from ..montecarlo.trials import MOST_TRIALS
-    from ..running.processes import processors
     from .progress import progress
 
     with progress(options) as shown:
 
-        def report(step: Step) -> None:
+        def report(step: ProgressStep) -> None:
             options.interruption.answer()
             options.interruption.kept = lambda: (
                 f"the figures of the {step.done} data sets done are lost"

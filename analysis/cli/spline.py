@@ -13,11 +13,12 @@ from .common import add_picture, count, print_json, print_lines
 from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 
 if TYPE_CHECKING:
-    from ballplate.simulator.splines.read import Points
+    from ballplate.simulator.splines.read import CurvePoints
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser: ArgumentParser = commands.add_parser(
         "spline",
@@ -147,8 +148,8 @@ def run(options: Namespace) -> int:
     """Fit, print and draw."""
     from ballplate.simulator.inputs.messages import in_one_line
 
-    from ..error_curve.asked import Asked, OptionError
-    from ..error_curve.curve_result import error_curve
+    from ..error_maps.curve_options import Asked, OptionError
+    from ..error_maps.curve_result import error_curve
 
     asked = Asked(**{one.name: getattr(options, one.name) for one in fields(Asked)})
     try:
@@ -186,12 +187,12 @@ def run(options: Namespace) -> int:
     return 0 if is_written else BAD_FILE
 
 
-def _check(options: Namespace, points: Points) -> None:
+def _check(options: Namespace, points: CurvePoints) -> None:
     """Refuse options that do not go together.
 
     :raises OptionError: there are such.
     """
-    from ..error_curve.asked import OptionError
+    from ..error_maps.curve_options import OptionError
 
     if options.whiskers is not None and points.places is None:
         raise OptionError(

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from .common import count
 
 if TYPE_CHECKING:
-    from ..running.steps import Step
+    from ballplate.simulator.computing.steps import ProgressStep
+
     from ..sweeps.bundle import Bundle
     from ..sweeps.execute import Runner, Summary
     from ..sweeps.model import Sweep
@@ -125,7 +126,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     try:
         with progress(options) as shown:
 
-            def report(step: Step) -> None:
+            def report(step: ProgressStep) -> None:
                 options.interruption.answer()
                 shown.show(step)
 
@@ -149,7 +150,8 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
 
 
 def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
-    from ..running.processes import processors
+    from ballplate.simulator.computing.processes import processors
+
     from ..sweeps.cluster import cluster_runner
     from ..sweeps.local import local_runner
 
@@ -193,7 +195,8 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    from ..running.processes import processors
+    from ballplate.simulator.computing.processes import processors
+
     from ..sweeps.estimate import seconds_of
     from .progress import duration
 

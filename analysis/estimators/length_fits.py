@@ -24,11 +24,11 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
+from ..presentation.formatting import aligned, finite, number
+from ..presentation.result import FitResult
 from ..rank.verdict import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.formatting import aligned, finite, number
 from ..results.parts import adjustment_data, adjustment_lines
-from ..results.result import FitResult
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 

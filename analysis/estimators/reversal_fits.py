@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import (
@@ -29,7 +30,6 @@ from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.settings import MetricSettings, build_error_model
-from ballplate.simulator.numerics.threads import single_threaded
 from ballplate.simulator.readings.reading_files import ObservedReadings
 from numpy.typing import NDArray
 

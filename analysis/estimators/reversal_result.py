@@ -13,12 +13,12 @@ from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
-from ..report.vectors import Vectors, draw_vectors
+from ..presentation.formatting import SHOWN, aligned, number, to_uncertainty
+from ..presentation.result import FitResult
+from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fit import Fit
-from ..results.formatting import SHOWN, aligned, number, to_uncertainty
 from ..results.parts import MOST_BALLS
-from ..results.result import FitResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

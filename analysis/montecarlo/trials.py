@@ -8,15 +8,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.montecarlo.reference import Reference
-from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
-from ballplate.simulator.numerics.threads import single_threaded
+from ballplate.montecarlo.reference import Reference
+from ballplate.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
+from ballplate.simulator.computing.threads import single_threaded
 
-from ..running.processes import in_processes
-from ..running.steps import Report, Step, unreported
-from .figures import Outcome, outcome
-from .tally import Tally, tally
-from .targets import Target, targets
+from .accumulator import Accumulator, accumulate
+from .figures import MonteCarloOutcome, outcome
+from .targets import MonteCarloQuantity, targets
 
 # Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
 BATCHES = 4
@@ -33,7 +33,7 @@ def run_trials(
     until: float | None = None,
     workers: int = 1,
     report: Report = unreported,
-) -> Outcome:
+) -> MonteCarloOutcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
     With `until` the run ends as soon as the relative standard error of every ratio of spread to
@@ -44,7 +44,7 @@ def run_trials(
     :raises KeyboardInterrupt: before the first task was done.
     """
     aims = targets(shared)
-    total: Tally | None = None
+    total: Accumulator | None = None
     interrupted = False
     try:
         for part in _parts(shared, aims, seed, trials, workers):
@@ -57,7 +57,7 @@ def run_trials(
                 else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
             )
             remark = f"accurate to {100 * accuracy:.2g} %" if accuracy < 1.0 else ""
-            report(Step("data sets", count, enough, remark))
+            report(ProgressStep("data sets", count, enough, remark))
             if until is not None and accuracy <= until:
                 break
     except KeyboardInterrupt:
@@ -68,7 +68,7 @@ def run_trials(
     return replace(outcome(shared, aims, total), interrupted=interrupted)
 
 
-def accuracy_of(total: Tally) -> float:
+def accuracy_of(total: Accumulator) -> float:
     """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite
     for 1 replicate.
     """
@@ -85,23 +85,23 @@ def accuracy_of(total: Tally) -> float:
 
 @single_threaded
 def sum_of_task(
-    shared: Reference, aims: tuple[Target, ...], seed: int, task: int, trials: int
-) -> Tally:
+    shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, task: int, trials: int
+) -> Accumulator:
     """Sums over the replicates of one task."""
-    total: Tally | None = None
+    total: Accumulator | None = None
     for batch in range(task * BATCHES, (task + 1) * BATCHES):
         count = min(BATCH, trials - batch * BATCH)
         if count <= 0:
             break
-        part = tally(shared, aims, estimate_batch(shared, seed, batch), count)
+        part = accumulate(shared, aims, estimate_batch(shared, seed, batch), count)
         total = part if total is None else total + part
     assert total is not None
     return total
 
 
 def _parts(
-    shared: Reference, aims: tuple[Target, ...], seed: int, trials: int, workers: int
-) -> Iterator[Tally]:
+    shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, trials: int, workers: int
+) -> Iterator[Accumulator]:
     tasks = range(-(-trials // TASK))
     if workers == 1 or len(tasks) == 1:
         for task in tasks:

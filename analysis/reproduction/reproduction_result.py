@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.designs import shipped
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.settings import hint
 
-from ..results.result import Result
-from ..running.steps import Report, unreported
+from ..presentation.result import Result
 from .compare import Reproduction, reproduce
 from .published import npl
 from .reproduction_tables import reproduction_data, reproduction_lines, reproduction_markdown

@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
+from ..presentation.formatting import SHOWN, aligned, finite, number, to_uncertainty
+from ..presentation.result import FitResult
+from ..presentation.scene import box_edges, projection
+from ..presentation.vectors import Vectors, draw_vectors
 from ..rank.verdict import Verdict
-from ..report.scene import box_edges, projection
-from ..report.vectors import Vectors, draw_vectors
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
@@ -31,7 +33,6 @@ from .estimates import (
     estimate_rows,
     labels,
 )
-from .formatting import SHOWN, aligned, finite, number, to_uncertainty
 from .parts import (
     adjustment_data,
     adjustment_lines,
@@ -47,7 +48,6 @@ from .parts import (
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
 from .residuals import Residual, reading_residuals
-from .result import FitResult
 
 if TYPE_CHECKING:
     import pandas

@@ -18,10 +18,10 @@ from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.done import done_candidates
 from ballplate.planning.earlier import earlier_choice
 from ballplate.planning.offer import offer
-from ballplate.planning.search import Problem
+from ballplate.planning.search import SelectionProblem
 from ballplate.results.study import predict
-from ballplate.running.internal_error import InternalError
-from ballplate.running.steps import Step
+from ballplate.simulator.computing.internal_error import InternalError
+from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
@@ -299,7 +299,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
 
     right = planning.bound
 
-    def wrong(problem: Problem) -> Bound | None:
+    def wrong(problem: SelectionProblem) -> Bound | None:
         found = right(problem)
         is_wrong = problem.constraints.budget.positions == positions
         return replace(found, value=10 * found.value) if found is not None and is_wrong else found
@@ -322,7 +322,7 @@ def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
 
 
 def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
-    steps: list[Step] = []
+    steps: list[ProgressStep] = []
     request = Request("U6", Budget(positions=4))
     campaign(load(drawn, planning=True)[0], request, report=steps.append)
     searched = [(step.done, step.wanted) for step in steps if step.what == "starts of the search"]

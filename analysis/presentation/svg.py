@@ -1,0 +1,206 @@
+"""Drawings as SVG that stands inside a page: the same bytes each time, in the page's own
+colours.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .files import write_file
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Stand-ins that the page's colours replace, so that drawings follow its light and dark schemes.
+INK, MUTED, PAPER = "#010203", "#808182", "#fdfcfb"
+SERIES = ("#0a72b1", "#d55e01", "#019e74", "#cc79a8", "#e69f02", "#57b4e8")
+COLOURS = {INK: "--ink", MUTED: "--muted", PAPER: "--paper"} | {
+    colour: f"--series-{k}" for k, colour in enumerate(SERIES)
+}
+
+# Lines are told apart by these as well, so that nothing depends on colour.
+DASHES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 3)))
+MARKERS = ("o", "s", "^", "D", "v", "P")
+
+# Width of a drawing in points: small enough for a telephone with its text still readable.
+WIDTH = 360.0
+
+SETTINGS: Any = {
+    "svg.hashsalt": "ballplate",
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 10.0,
+    "axes.labelsize": 10.0,
+    "axes.titlesize": 10.5,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "legend.fontsize": 9.5,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "grid.color": MUTED,
+    "grid.alpha": 0.35,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.5,
+    "lines.markersize": 5.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "path.simplify": False,
+    "hatch.color": MUTED,
+    "axes.unicode_minus": True,
+}
+
+
+def round_number(value: float) -> float:
+    """The largest of 1, 2, 5, 10, … and of 0.5, 0.2, 0.1, … that is not larger than a positive
+    value.
+
+    >>> round_number(730.0), round_number(0.0021), round_number(1e6)
+    (500.0, 0.002, 1000000.0)
+    """
+    power = 10.0 ** math.floor(math.log10(value) + 1e-12)
+    return power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))
+
+
+@contextmanager
+def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
+    """A figure of a size in points. Its parts are placed by hand, which takes half the time of a
+    layout found.
+
+    :raises ImportError: matplotlib is missing; the text has the command that installs it.
+    """
+    try:
+        import matplotlib
+    except ImportError as error:
+        text = (
+            "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
+        )
+        raise ImportError(text, name="matplotlib") from error
+    from .figures import Picture
+
+    # A user's own settings must not change the page.
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(SETTINGS)
+        # Letters that the measuring font lacks are drawn by the reader's.
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure = Picture(figsize=(width / 72.0, height / 72.0), facecolor="none")
+        figure.settings = SETTINGS
+        yield figure
+
+
+def placed_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Axes at a place in points."""
+    w, h = 72.0 * figure.get_size_inches()
+    return figure.add_axes((left / w, bottom / h, width / w, height / h))
+
+
+def blank_axes(figure: Figure) -> Axes:
+    """Axes of the whole figure, with equal scales and without frame, ticks and background."""
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    return axes
+
+
+def micro(text: str) -> str:
+    """Units of micrometres as they are printed.
+
+    >>> micro("U2 maximum, um or urad"), micro("um")
+    ('U2 maximum, µm or µrad', 'µm')
+    """
+    return re.sub(r"(^|, | or )u(m|rad)\b", r"\1µ\2", text)
+
+
+def as_svg(figure: Figure, name: str, words: str) -> str:
+    """The figure as an element of a page, with `name` in front of its ids and a text for those who
+    do not see it.
+    """
+    found = io.StringIO()
+    figure.savefig(
+        found,
+        format="svg",
+        transparent=True,
+        metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")),
+    )
+    body = found.getvalue()
+    body = body[body.index("<svg") :]
+    size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', body)
+    assert size is not None
+    inner = body[body.index(">") + 1 :]
+    inner = re.sub(r"<metadata>.*?</metadata>", "", inner, flags=re.DOTALL)
+    inner = re.sub(r"<!--.*?-->\s*", "", inner, flags=re.DOTALL)
+    # A style inside would hold for the whole page, which has it in its own.
+    inner = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", inner, flags=re.DOTALL)
+    # Groups that nothing refers to need no id.
+    used = set(re.findall(r'(?:xlink:href="#|url\(#)([^")]+)', inner))
+    inner = re.sub(
+        r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", inner
+    )
+    inner = re.sub(r'xlink:href="#([^"]+)"', rf'href="#{name}-\1"', inner)
+    inner = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", inner)
+    for colour, variable in COLOURS.items():
+        inner = inner.replace(colour, f"var({variable})")
+    inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font: \1px sans-serif", inner)
+    inner = re.sub(r"\n\s*", "\n", inner)
+    start = (
+        f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img"'
+        f' aria-label="{escape(words, quote=True)}">'
+    )
+    return start + inner.strip()
+
+
+PICTURES = (".svg", ".png", ".pdf")
+
+
+def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
+    """Write the figure to a file of its own, of the kind its name ends in, with words for those who
+    do not see it.
+
+    The figure is given back, with the words as its label; without a path nothing is written.
+
+    It has a white ground and needs no fonts of the reader's; the same figure gives the same bytes.
+
+    :raises ValueError: the name ends in none of `PICTURES`.
+    :raises OSError: the file cannot be written.
+    """
+    import matplotlib
+
+    figure.set_label(words)
+    if path is None:
+        return figure
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in PICTURES:
+        raise ValueError(f"{path} should end in one of {', '.join(PICTURES)}")
+    metadata: dict[str, str | None] = {"Title": words, "Creator": None}
+    if kind == ".svg":
+        metadata["Date"] = None
+    elif kind == ".pdf":
+        metadata |= {"CreationDate": None, "Producer": None}
+    else:
+        metadata = {"Title": words, "Software": None}
+    with matplotlib.rc_context({"svg.fonttype": "path"}):
+        # Not to the file itself: where a disk is full, errors of the compression hide that of the
+        # file.
+        whole = io.BytesIO()
+        figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
+    write_file(path, whole.getvalue())
+    return figure
