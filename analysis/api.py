@@ -673,10 +673,10 @@ def _ensure_path(name: str, given: object) -> None:
 
 
 def _several(name: str, given: Any) -> tuple[int, ...]:
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        ensure_whole(2, **{name: given})
-        return (given,)
-    return tuple(given)
+    if isinstance(given, Iterable) and type(given) is not str:
+        return tuple(given)
+    ensure_whole(2, None, **{name: given})
+    return (given,)
 
 
 def _argument(option: re.Match[str]) -> str:

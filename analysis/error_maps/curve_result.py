@@ -15,10 +15,10 @@ from ballplate.simulator.splines.read import Column, CurvePoints, choose_points,
 from ballplate.simulator.splines.spline_problems import SplineError
 
 from ..presentation.result import Result
-from ..report.error_curve_plots import draw_curve, draw_whiskers
 from .curve_options import Asked, curve_settings, listed, positive
 from .curve_tables import coefficients_csv, curve_data, curve_lines, shown
 from .error_curve import ErrorCurve, fit_curve
+from .error_curve_plots import draw_curve, draw_whiskers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,8 +13,8 @@ from ballplate.simulator.machines.protocol import Array
 
 from ..presentation.formatting import aligned, finite, number, percent, uncertainty_words
 from ..presentation.result import Result
-from ..report.length_plots import draw_lengths
 from .length_groups import GroupedLengths, LengthGroups, target_words
+from .length_plots import draw_lengths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

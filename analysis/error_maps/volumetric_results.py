@@ -16,7 +16,6 @@ from ballplate.simulator.inputs.messages import Message
 from ballplate.simulator.machines.volumetric import meaning
 
 from ..presentation.result import Result
-from ..report.volumetric_plots import draw_along, draw_grid, draw_line
 from .volumetric_errors import (
     AlongAxis,
     LengthErrors,
@@ -25,6 +24,7 @@ from .volumetric_errors import (
     along_axes,
     between,
 )
+from .volumetric_plots import draw_along, draw_grid, draw_line
 from .volumetric_tables import (
     along_csv,
     along_data,

@@ -1,5 +1,5 @@
-"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a comparison as
-in section 6.2.7.
+"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a
+comparison as in section 6.2.7.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
-# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for each, and
-# more for few parameters.
+# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for
+# each, and more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
 # Pairs of points of a comparison.
@@ -57,8 +57,8 @@ COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 @dataclass(frozen=True, repr=False)
 class AlternativeFit(FitResult):
-    """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of balls,
-    without uncertainties.
+    """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of
+    balls, without uncertainties.
     """
 
     label: str
@@ -102,8 +102,8 @@ class AlternativeFit(FitResult):
 
 @dataclass(frozen=True, repr=False)
 class EstimatorComparison(Result):
-    """How far an alternative estimator's corrected distances are from the full estimator's, over `trials` synthetic
-    data sets.
+    """How far an alternative estimator's corrected distances are from the full estimator's, over
+    `trials` synthetic data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
@@ -173,11 +173,11 @@ def count_terms(
     name: str | None = None,
     across_probes: bool = False,
 ) -> int:
-    """Number of terms of an alternative estimator, but for certificates and priors, if every position has
-    all the balls.
+    """Number of terms of an alternative estimator, but for certificates and priors, if every
+    position has all the balls.
     """
     count = 0
-    artefact_of = design.ball_artefact[design.readings.ball]
+    artefact_of = design.balls.artefact[design.readings.ball]
     for k, (artefact, layout) in enumerate(experiment.layouts.items()):
         if experiment.artefacts[artefact].role != "plate":
             continue
@@ -224,11 +224,9 @@ def _refuse_unknown_lengths(experiment: Experiment, design: Design) -> None:
 
     :raises ExperimentError: a Bryan gauge, or a length standard without a certificate.
     """
-    gauges = design.is_gauge is not None and bool(design.is_gauge.any())
-    if gauges or design.length_names:
-        what = (
-            "a Bryan gauge's pivot" if gauges else f"an unknown length ({design.length_names[0]})"
-        )
+    gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
+    if gauges or unknown:
+        what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
         text = (
             f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
         )
@@ -309,7 +307,7 @@ def compare_estimators(
     published: Mapping[str, float | None] | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
-    """Compare a rival with the full estimator on readings of the file's true machine.
+    """Compare an alternative with the full estimator on readings of the file's true machine.
 
     Each data set has noise, a certificate and `points` random pairs of points in the volume of its
     own, all drawn from `seed` (default: the file's) and its number, so that more data sets only add
@@ -324,9 +322,8 @@ def compare_estimators(
         _refuse_unknown_lengths(experiment, design)
         _refuse_many_terms(experiment, design, estimator, pair_set, across_probes)
         chosen = ball_pairs(experiment, pair_set)
-    corners = (tuple(map(float, design.lower)), tuple(map(float, design.upper)))
     on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
+        design, true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     )
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
@@ -343,7 +340,7 @@ def compare_estimators(
         if both is None:
             failed.append(trial)
         else:
-            ends = design.lower + (design.upper - design.lower) * generator.random(
+            ends = design.machine.volume.lower + design.machine.volume.size * generator.random(
                 (2, points, design.dimension)
             )
             difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
@@ -391,7 +388,7 @@ def _both_estimates(
             if full.status == "converged" and solved.converged
             else None
         )
-    rival = alternative_estimate(
+    alternative = alternative_estimate(
         observed.design,
         observed.x,
         chosen,
@@ -400,14 +397,14 @@ def _both_estimates(
         COMPARISON_TOLERANCE,
         start=full.state.a,
     )
-    if full.status != "converged" or rival.status != "converged":
+    if full.status != "converged" or alternative.status != "converged":
         return None
-    return full.state.a, rival.a
+    return full.state.a, alternative.a
 
 
 def _distances(design: Design, a: Array, ends: Array) -> Array:
     """Distances (m,) between corrected points of scale readings `ends` (2, m, d)."""
-    offsets = np.broadcast_to(design.probes[design.point_probe], ends.shape[1:])
+    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], ends.shape[1:])
     corrected = [x + design.model.error(x, a, offsets) for x in ends]
     return np.asarray(np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1)))
 
@@ -454,7 +451,9 @@ def _used(pairs: int, lengths: int) -> str:
 
 
 def _fit_data(fit: AlternativeFit) -> dict[str, Any]:
-    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is None."""
+    """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
+    None.
+    """
     return {
         "experiment": fit.label,
         "title": fit.title,

@@ -120,28 +120,7 @@ def fit_lengths(
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
     """
     design = observed.design
-    if design.dimension != 3 or not len(design.lengths):
-        what = "machine.volume" if design.dimension != 3 else "artefacts"
-        has = (
-            "has two dimensions"
-            if design.dimension != 3
-            else "has no ball bar or Bryan gauge whose lengths are read"
-        )
-        text = (
-            f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
-        )
-        bars = [
-            name
-            for name, one in experiment.artefacts.items()
-            if isinstance(one, TwoSpheresSettings)
-        ]
-        if bars and design.dimension == 3:
-            text = (
-                f"is a plate, but {estimator} needs length standards; state role: length_standard"
-            )
-            mark = experiment.place(("artefacts", bars[0]))
-            raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
-        raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+    _refuse_other_artefacts(experiment, design, estimator)
     try:
         solution = length_estimate(design, observed.x, estimator)
     except NotAMetricError as error:
@@ -150,12 +129,64 @@ def fit_lengths(
             " directions"
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
+    remarks = _remarks(design, estimator, solution)
+    if sigma is not None:
+        remarks.append(
+            "--sigma has no effect: uncertainties come from the scatter about the equations"
+        )
+    factors = np.where(solution.open_factors, np.nan, solution.factors)
+    centres = np.where(solution.open_centres, np.nan, solution.centres)
+    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
+    return LengthFit(
+        experiment.label,
+        experiment.title,
+        observed,
+        experiment.expected_rank_deficiency,
+        solution,
+        adjustments(
+            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
+        ),
+        tuple(factors.tolist()),
+        tuple(
+            (design.positions.names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
+        ),
+        tuple(zip(design.unknown_lengths.names, lengths.tolist(), strict=True)),
+        tuple(remarks),
+        tuple(_spheres(design, observed.x)),
+    )
+
+
+def _refuse_other_artefacts(
+    experiment: Experiment, design: Design, estimator: LengthEstimator
+) -> None:
+    """Refuse an experiment that has no lengths in three dimensions."""
+    if design.dimension == 3 and len(design.lengths):
+        return
+    what = "machine.volume" if design.dimension != 3 else "artefacts"
+    has = (
+        "has two dimensions"
+        if design.dimension != 3
+        else "has no ball bar or Bryan gauge whose lengths are read"
+    )
+    text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
+    bars = [
+        name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)
+    ]
+    if bars and design.dimension == 3:
+        text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
+        mark = experiment.place(("artefacts", bars[0]))
+        raise ExperimentError([mark.message(f"artefacts.{bars[0]}", text)])
+    raise ExperimentError([Message(str(experiment.source), 0, 0, what, text)])
+
+
+def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolution) -> list[str]:
+    """What should be known beside the figures."""
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
     if len(design.priors):
         remarks.append(f"{estimator} takes no notice of priors")
-    if design.free_offsets is not None and design.free_offsets.any():
+    if design.probes.free.any():
         remarks.append(
             f"{estimator} takes the probes' offsets as the file states them, though they are"
             " unknown"
@@ -180,30 +211,7 @@ def fit_lengths(
     instead = "the full estimator with --sigma given takes the uncertainties as stated"
     doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
     remarks += [doubt] if doubt else []
-    if sigma is not None:
-        remarks.append(
-            "--sigma has no effect: uncertainties come from the scatter about the equations"
-        )
-    factors = np.where(solution.open_factors, np.nan, solution.factors)
-    centres = np.where(solution.open_centres, np.nan, solution.centres)
-    lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
-    return LengthFit(
-        experiment.label,
-        experiment.title,
-        observed,
-        experiment.expected_rank_deficiency,
-        solution,
-        adjustments(
-            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
-        ),
-        tuple(factors.tolist()),
-        tuple(
-            (design.position_names[k], tuple(centres[k].tolist())) for k in design.gauge_positions
-        ),
-        tuple(zip(design.length_names, lengths.tolist(), strict=True)),
-        tuple(remarks),
-        tuple(_spheres(design, observed.x)),
-    )
+    return remarks
 
 
 def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
@@ -212,10 +220,10 @@ def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
     """
     for k in design.gauge_positions:
         rows = design.readings.position == k
-        points = x[rows] + design.probes[design.readings.probe[rows]]
+        points = x[rows] + design.probes.offsets[design.readings.probe[rows]]
         extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if len(points) > design.dimension and extent[-1] > FLAT * extent[0]:
-            yield design.position_names[k], fit_sphere(points, design.origins[k])[1]
+            yield design.positions.names[k], fit_sphere(points, design.positions.origins[k])[1]
 
 
 def _lines(fit: LengthFit) -> list[str]:

@@ -275,8 +275,8 @@ class Fit(FitResult):
                 " volume"
             )
             raise ValueError(f"{told}; give points in metres")
-        names = design.probe_names
-        given_probe = names[design.point_probe] if probe is None else probe
+        names = design.probes.names
+        given_probe = names[design.evaluation.probe] if probe is None else probe
         asked = [given_probe] if isinstance(given_probe, str) else list(given_probe)
         for name in asked:
             if name not in names:
@@ -296,10 +296,10 @@ class Fit(FitResult):
         places = self.observed.x[design.plate_readings]
         return tuple(
             Vectors(
-                design.position_names[k],
+                design.positions.names[k],
                 places[mine] @ view.T,
                 residuals[mine] @ view.T,
-                tuple(design.ball_names[ball] for ball in readings.ball[mine]),
+                tuple(design.balls.names[ball] for ball in readings.ball[mine]),
             )
             for k in np.unique(readings.position)
             for mine in [readings.position == k]
@@ -317,7 +317,8 @@ class Fit(FitResult):
         if design.dimension == 2:
             return draw_vectors(vectors, self.title, path)
         view, towards = projection(3)
-        edges, _ = box_edges(design.lower, design.upper, towards)
+        volume = design.machine.volume
+        edges, _ = box_edges(volume.lower, volume.upper, towards)
         return draw_vectors(vectors, self.title, path, edges @ view.T)
 
     @property

@@ -125,7 +125,9 @@ class TaskSettings(Settings):
     )
     target_uncertainty: LengthFunction | None = Field(
         None,
-        description="what is to be reached, as target_uncertainty of the file, which is the default",
+        description=(
+            "what is to be reached, as target_uncertainty of the file, which is the default"
+        ),
     )
 
 
@@ -211,8 +213,8 @@ class ExperimentSettings(Settings):
     coverage_factor: Annotated[float, Field(ge=1, le=10)] = Field(
         1.0,
         description=(
-            "k of the expanded uncertainty U = k u that is compared with target_uncertainty; default"
-            " 1: the standard uncertainty u is"
+            "k of the expanded uncertainty U = k u that is compared with target_uncertainty;"
+            " default 1: the standard uncertainty u is"
         ),
     )
     sigma: Literal["estimated", "given"] = Field(

@@ -230,7 +230,7 @@ def test_a_picture_for_other_programs(scales: Path, tmp_path: Path) -> None:
 
 
 def test_magnification_is_round() -> None:
-    from ballplate.report.volumetric_plots import magnification_of
+    from ballplate.error_maps.volumetric_plots import magnification_of
 
     built = Volumetric(load_machine(ARM))
     found = built.errors(built.grid((3, 3, 3)))

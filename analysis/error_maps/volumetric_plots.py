@@ -12,7 +12,6 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.volumetric import meaning, symbol
 
-from ..error_maps.volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 from ..presentation.formatting import SHOWN, number
 from ..presentation.scene import box_edges, projection
 from ..presentation.svg import (
@@ -29,6 +28,7 @@ from ..presentation.svg import (
     round_number,
     save,
 )
+from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

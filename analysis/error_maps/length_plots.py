@@ -11,7 +11,6 @@ import numpy as np
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 
-from ..error_maps.length_groups import GroupedLengths, target_words
 from ..presentation.formatting import percent
 from ..presentation.svg import (
     DASHES,
@@ -25,6 +24,7 @@ from ..presentation.svg import (
     placed_axes,
     save,
 )
+from .length_groups import GroupedLengths, target_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +57,7 @@ def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figur
         )
     columns = min(len(levels), IN_A_ROW) if len(levels) != 4 else 2
     rows = -(-len(levels) // columns)
-    span = found.design.upper - found.design.lower
+    span = found.design.machine.volume.size
     side = (WIDTH - LEFT - RIGHT - SCALE - (IN_A_ROW - 1) * BETWEEN) / IN_A_ROW
     side = side if columns == IN_A_ROW else 1.5 * side
     high = float(np.clip(side * span[1] / span[0], 0.4 * side, 1.6 * side))

@@ -9,8 +9,6 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.splines.read import CurvePoints
 
-from ..error_maps.curve_tables import derivative_unit, shown
-from ..error_maps.error_curve import ErrorCurve, whole_profile
 from ..presentation.svg import (
     INK,
     MUTED,
@@ -22,6 +20,8 @@ from ..presentation.svg import (
     round_number,
     save,
 )
+from .curve_tables import derivative_unit, shown
+from .error_curve import ErrorCurve, whole_profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
