@@ -280,7 +280,7 @@ def fit(
     >>> fit(quickstart(), readings.iloc[1:]).remarks
     ('planned but not read (1): z low: ball r1c1 with down',)
     >>> fit(quickstart(), readings, estimator="distances", pairs="braced")
-    <RivalFit of quickstart: distances, converged, full rank>
+    <AlternativeFit of quickstart: distances, converged, full rank>
     """
     from ballplate.simulator.design.layout import lay_out
     from ballplate.simulator.readings.certificate_files import read_certificate
@@ -563,7 +563,7 @@ def spline(
 
     >>> table = "designs/gilsinn/table-1.csv"
     >>> spline(table, "arc_length", "finish_error", "12-32", start_slope="0")
-    <ErrorCurve of table-1: 21 points, 7 free coefficients>
+    <FittedCurve of table-1: 21 points, 7 free coefficients>
     """
     from .error_maps.curve_options import Asked, OptionError, ensure_asked
     from .error_maps.curve_result import error_curve
