@@ -137,15 +137,38 @@ def quickstart() -> Experiment:
     return load(shipped("quickstart.yaml"))
 
 
-def check(experiment: Experiment | PathLike) -> Prediction:
+def check(
+    experiment: Experiment | PathLike,
+    goals: str | Iterable[str] = (),
+    share: float | None = None,
+    suggest: bool = False,
+) -> Prediction:
     """Whether a design determines everything it asks for and, if not, what it leaves open.
+
+    `goals` are what it is to reach, too, as in `reach`, with the `share` of lengths that are to be
+    within; with `suggest` changes are looked for that would determine the rest. Both are in the
+    result's `advice`.
 
     >>> check("designs/quickstart.yaml").verdict.deficiency
     0
+    >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
+    ('goal not met: average U6 at most 0.1 um; average U6 0.1428 um',)
     """
-    from .results import study
+    from .cli.check_files import Wanted, checked_design
+    from .planning.requirements.goals import parse_goal
+    from .simulator.experiment.load import with_pool
 
-    return study.check(_experiment(experiment), with_scale=True)
+    ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
+    ensure_type(bool, "True or False", suggest=suggest)
+    texts = (goals,) if isinstance(goals, str) else tuple(goals)
+    for text in texts:
+        ensure_type(str, 'texts such as "U6 average 0.3 um"', goals=text)
+    if share is not None and "lengths" not in texts:
+        raise ValueError("share goes with the goal lengths; add it, or leave it out")
+    parsed = tuple(parse_goal(text, share if text == "lengths" else None) for text in texts)
+    chosen = _experiment(experiment)
+    wanted = Wanted(parsed, repairs=suggest)
+    return checked_design(chosen, with_pool(chosen) if suggest else None, wanted).prediction
 
 
 def run(

@@ -67,6 +67,13 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             ("reach", QUICKSTART, "--by=repeatability", "--target=1 um", "--share=90%"),
         ),
         (
+            lambda: bp.check("designs/certified/deficient.yaml", "U6 average 1 um", suggest=True),
+            (
+                *("check", "designs/certified/deficient.yaml", "--goal=U6 average 1 um"),
+                "--suggest",
+            ),
+        ),
+        (
             lambda: bp.fit(bp.load(REAL[0], "with scale"), REAL[1], estimator="reversal"),
             ("fit", *REAL, "--variant=with scale", "--estimator=reversal"),
         ),
@@ -205,6 +212,9 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.reproduce("npl", "6.9"), ValueError, 'no experiment "6.9"'),
     (lambda: bp.reach(QUICKSTART, share=2), ValueError, "share=2; give a ratio above 0"),
     (lambda: bp.reach(QUICKSTART, target=3), TypeError, "target=3; give a text with a unit"),
+    (lambda: bp.check(QUICKSTART, goals=[3]), TypeError, "goals=3; give texts such as"),
+    (lambda: bp.check(QUICKSTART, "U9"), ValueError, '"U9" is no goal'),
+    (lambda: bp.check(QUICKSTART, share=0.9), ValueError, "share goes with the goal lengths"),
     (lambda: bp.plan(QUICKSTART, hours="7 h"), TypeError, "hours='7 h'; give hours above 0"),
     (lambda: bp.plan(QUICKSTART, done=3), TypeError, "done=3; give the path of a CSV file"),
     (lambda: bp.sweep(3), TypeError, "path=3; give the path of a file"),

@@ -6,12 +6,12 @@ import os
 import sys
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .common import add_file, percentage
 
 if TYPE_CHECKING:
-    from .check_files import CheckedDesign
+    pass
 
 FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
@@ -96,7 +96,7 @@ def run(options: Namespace) -> int:
     from .common import print_json, print_lines
     from .excerpts import print_errors
     from .file_patterns import matching_files
-    from .github import advice_lines, annotation_lines
+    from .github import annotation_lines
     from .junit import junit_report
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
@@ -120,27 +120,14 @@ def run(options: Namespace) -> int:
                 print(line, flush=True)
         elif options.format == "text":
             for design in checked.designs:
-                print_lines([*design.prediction.lines(), *advice_lines(design)])
+                print_lines(design.prediction.lines())
         if options.format in ("text", "json"):
             print_errors(checked.messages, options)
     if options.format == "junit":
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([one.prediction.to_dict() | _asked(one, options.suggest) for one in designs])
+        print_json([one.prediction.to_dict() for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED
-
-
-def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:
-    """What was asked for besides the rank, as plain data."""
-    from ..planning.repair.repair_tables import certificate_data, repair_data
-
-    told: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
-    if with_suggestions:
-        told |= {
-            "repairs": repair_data(design.repairs),
-            "scale_certificate": certificate_data(design.certificate),
-        }
-    return told

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
@@ -15,8 +15,14 @@ from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.yamltree import Mark
 
+from ..planning.repair.repair_tables import (
+    certificate_data,
+    certificate_lines,
+    repair_data,
+    repair_lines,
+)
 from ..planning.requirements.goals import Goal, GoalError, check_goal, judge
-from ..results.prediction import Prediction
+from ..results.prediction import Advice, Prediction
 from ..results.study import check, planned_uncertainty
 
 if TYPE_CHECKING:
@@ -98,7 +104,7 @@ def check_files(
             # What a plan may choose from is loaded where it is asked for only.
             pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
             doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
-            judged = tuple(_checked(one, pools.get(one.name), wanted) for one in chosen)
+            judged = tuple(checked_design(one, pools.get(one.name), wanted) for one in chosen)
             yield CheckedFile(str(path), judged, (), doubts)
         except ExperimentError as error:
             complete = False
@@ -109,7 +115,10 @@ def check_files(
         yield CheckedFile(messages[0].file, (), messages)
 
 
-def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wanted) -> CheckedDesign:
+def checked_design(
+    experiment: Experiment, with_pool: Experiment | None, wanted: Wanted
+) -> CheckedDesign:
+    """An experiment judged, with changes looked for in its pool if there is one."""
     prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
@@ -122,6 +131,12 @@ def _checked(experiment: Experiment, with_pool: Experiment | None, wanted: Wante
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
+    lines = [*goals, *repair_lines(found, prediction.verdict), *certificate_lines(certificate)]
+    data: dict[str, Any] = {"goals": list(goals), "missed": list(missed)}
+    if wanted.repairs:
+        data["repairs"] = repair_data(found)
+        data["scale_certificate"] = certificate_data(certificate)
+    prediction = replace(prediction, advice=Advice(missed, tuple(lines), data))
     design = CheckedDesign(prediction, None, found, goals, missed, certificate)
     if not design.complaints:
         return design

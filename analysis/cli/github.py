@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
-from ..planning.repair.repair_tables import certificate_lines, repair_lines
 from ..results.parts import scale_lines, target_lines, verdict_lines
 from .check_files import CheckedDesign, CheckedFile
 
@@ -43,7 +42,8 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
         *target_lines(prediction.lengths),
         *scale_lines(prediction.scale),
     ]
-    suggested = advice_lines(design)
+    advice = prediction.advice
+    suggested = () if advice is None else advice.lines
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space
         # after a hash.
@@ -63,15 +63,6 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     )
     what = f"{'rank' if prediction.verdict.complaint else 'goals'} of {prediction.label}"
     return [_error(place.file, place.line, place.column, what, text, workspace)]
-
-
-def advice_lines(design: CheckedDesign) -> list[str]:
-    """Goals, and what is suggested, as lines of text."""
-    return [
-        *design.goals,
-        *repair_lines(design.repairs, design.prediction.verdict),
-        *certificate_lines(design.certificate),
-    ]
 
 
 def _error(file: str, line: int, column: int, title: str, text: str, workspace: Path | None) -> str:

@@ -37,13 +37,25 @@ if TYPE_CHECKING:
     from ..montecarlo.experiments import Trials
 
 
+@dataclass(frozen=True)
+class Advice:
+    """What a check was asked for besides the rank: which goals are `missed`, and goals and
+    suggested changes as `lines` of text and as plain `data`.
+    """
+
+    missed: tuple[str, ...]
+    lines: tuple[str, ...]
+    data: Mapping[str, Any]
+
+
 @dataclass(frozen=True, repr=False)
 class Prediction(Result):
     """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they
     were asked for.
 
     `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if
-    that was asked for and is determined. `monte_carlo` has replicates, if they were asked for.
+    that was asked for and is determined. `monte_carlo` has replicates, and `advice` what a check
+    was asked for besides the rank, if they were asked for.
     """
 
     label: str
@@ -54,6 +66,7 @@ class Prediction(Result):
     lengths: Quantity | None = None
     scale: Scale | None = None
     monte_carlo: Trials | None = None
+    advice: Advice | None = None
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
@@ -61,10 +74,12 @@ class Prediction(Result):
         return tasks_of(self.quantities)
 
     def headline(self) -> str:
-        return ", ".join([rank_words(self.verdict), *length_headline(self.quantities)])
+        count = 0 if self.advice is None else len(self.advice.missed)
+        missed = [f"{count} goal{'s' if count > 1 else ''} missed"] if count else []
+        return ", ".join([rank_words(self.verdict), *length_headline(self.quantities), *missed])
 
     def lines(self) -> list[str]:
-        lines = self.table_lines()
+        lines = [*self.table_lines(), *(() if self.advice is None else self.advice.lines)]
         return lines if self.monte_carlo is None else [*lines, "", *trials_lines(self.monte_carlo)]
 
     def table_lines(self) -> list[str]:
@@ -92,6 +107,7 @@ class Prediction(Result):
             ),
             **({"tasks": task_data(self.tasks)} if self.tasks else {}),
             "scale": scale_data(self.scale),
+            **({} if self.advice is None else self.advice.data),
             **({} if self.monte_carlo is None else {"monte_carlo": trials_data(self.monte_carlo)}),
         }
 
