@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class CheckedDesign:
     """The verdict on one design; `place` is where its file should change, None where nothing is to
-    be complained of.
+    be complained of, and `variant` its name in the file.
 
     `repairs` are changes that would determine what is open, None where nothing is or none were
     asked for. `goals` tell how each goal that was asked for is met, and `missed` what fails of
@@ -46,6 +47,7 @@ class CheckedDesign:
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
     certificate: ScaleCertificate | None = None
+    variant: str | None = None
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -88,15 +90,20 @@ class CheckedFile:
 
 
 def check_files(
-    files: Sequence[Path], variants: Sequence[str] = (), wanted: Wanted = Wanted()
+    files: Sequence[Path],
+    variants: Sequence[str] = (),
+    wanted: Wanted = Wanted(),
+    report: Report = unreported,
 ) -> Iterator[CheckedFile]:
     """Check all files, one after the other; with `variants` only designs of these names.
 
-    A variant that no file has is told last, as the error of all files together.
+    A variant that no file has is told last, as the error of all files together. What is reported
+    are files, the designs of a single file, or the search for repairs of a single design.
     """
     found: set[str | None] = set()
     complete = True
-    for path in files:
+    within = report if len(files) == 1 else unreported
+    for path in counted(files, "files", len(files), report) if len(files) > 1 else files:
         try:
             experiments = load(path, with_modules=wanted.with_modules)
             found |= {experiment.name for experiment in experiments}
@@ -104,7 +111,12 @@ def check_files(
             # What a plan may choose from is loaded where it is asked for only.
             pools = {one.name: one for one in load(path, planning=True)} if wanted.repairs else {}
             doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
-            judged = tuple(checked_design(one, pools.get(one.name), wanted) for one in chosen)
+            is_single = len(chosen) == 1
+            designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
+            of_search = within if is_single else unreported
+            judged = tuple(
+                checked_design(one, pools.get(one.name), wanted, of_search) for one in designs
+            )
             yield CheckedFile(str(path), judged, (), doubts)
         except ExperimentError as error:
             complete = False
@@ -116,7 +128,10 @@ def check_files(
 
 
 def checked_design(
-    experiment: Experiment, with_pool: Experiment | None, wanted: Wanted
+    experiment: Experiment,
+    with_pool: Experiment | None,
+    wanted: Wanted,
+    report: Report = unreported,
 ) -> CheckedDesign:
     """An experiment judged, with changes looked for in its pool if there is one."""
     prediction = check(experiment, with_scale=True)
@@ -125,19 +140,14 @@ def checked_design(
         from ..planning.repair.repair_search import repairs
         from ..planning.repair.scale import scale_certificate
 
-        found = repairs(with_pool)
+        found = repairs(with_pool, report=report)
         certificate = scale_certificate(with_pool, prediction.scale)
     goals, missed = _goals(experiment, wanted.goals)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
-    lines = [*goals, *repair_lines(found, prediction.verdict), *certificate_lines(certificate)]
-    data: dict[str, Any] = {"goals": list(goals), "missed": list(missed)}
-    if wanted.repairs:
-        data["repairs"] = repair_data(found)
-        data["scale_certificate"] = certificate_data(certificate)
-    prediction = replace(prediction, advice=Advice(missed, tuple(lines), data))
-    design = CheckedDesign(prediction, None, found, goals, missed, certificate)
+    design = CheckedDesign(prediction, None, found, goals, missed, certificate, experiment.name)
+    design = advised(design, wanted.repairs)
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (
@@ -146,6 +156,19 @@ def checked_design(
     if not prediction.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
     return replace(design, place=experiment.place(steps))
+
+
+def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
+    """A design whose prediction tells what it was checked for besides the rank."""
+    prediction, repairs, certificate = design.prediction, design.repairs, design.certificate
+    lines = [*design.goals, *repair_lines(repairs, prediction.verdict)]
+    lines += certificate_lines(certificate)
+    data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
+    if with_repairs:
+        data["repairs"] = repair_data(repairs)
+        data["scale_certificate"] = certificate_data(certificate)
+    advice = Advice(design.missed, tuple(lines), data)
+    return replace(design, prediction=replace(prediction, advice=advice))
 
 
 def _goals(

@@ -31,7 +31,7 @@ def add_file(parser: ArgumentParser, several: bool = False) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="only this variant; may be repeated",
+        help="use only this variant; may be repeated",
     )
 
 

@@ -13,10 +13,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "compare",
         help="compare an alternative estimator with the full one on synthetic data",
         description=(
-            "Estimate synthetic data sets of the file's true machine with the full estimator and"
-            " with one that uses distances or lengths alone, and tell how far the distances that"
-            " both correct are apart (NPL Report CISE 15/98, section 6.2.7). The exit status is 0"
-            " if all estimates converged, otherwise 1."
+            "Estimate synthetic data sets of the file's true machine with the full estimator"
+            " and with one that uses distances or lengths alone, and compare the distances that"
+            " the two correct (NPL Report CISE 15/98, section 6.2.7). The exit status is 0 if"
+            " all estimates converged, otherwise 1."
         ),
     )
     add_file(parser, several=True)
@@ -46,7 +46,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
             f"--published-{key}",
             metavar="LENGTH",
             type=_length,
-            help=f"a published {words} to place, such as '0.35 um'",
+            help=f"published {words} to compare with, such as '0.35 um'",
         )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -65,7 +65,7 @@ def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--across-probes",
         action="store_true",
-        help="use distances between balls read with different probes in the same position, too",
+        help="also use distances between balls read with different probes in the same position",
     )
 
 

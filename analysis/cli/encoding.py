@@ -81,6 +81,7 @@ def write_data_in_utf8(options: Namespace) -> None:
     is_data = (
         getattr(options, "json", False)
         or getattr(options, "prints_data", False)
+        or getattr(options, "diff", False)
         or getattr(options, "format", "text") in DATA_FORMATS
         or any(isinstance(value, Path) and str(value) == "-" for value in vars(options).values())
     )

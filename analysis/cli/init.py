@@ -15,8 +15,8 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "init",
         help="write a commented experiment or machine file to start from",
         description=(
-            "Write an experiment file with comments on what may be said, ready for check and run,"
-            " or a machine file, ready for map."
+            "Write a commented experiment file, ready for check and run, or a machine file,"
+            " ready for map."
         ),
     )
     add_output(parser, "file", metavar="NAME.yaml", help="file to write")

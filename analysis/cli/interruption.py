@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -46,7 +46,12 @@ def files_named(options: Namespace) -> dict[Path, Signature | None]:
         for value in vars(options).values()
         for one in (value if isinstance(value, list) else [value])
     ]
-    return {path: _signature(path) for path in values if isinstance(path, Path)}
+    return signatures(path for path in values if isinstance(path, Path))
+
+
+def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:
+    """Whether files are there, and what tells that one was written to."""
+    return {path: _signature(path) for path in paths}
 
 
 def _signature(path: Path) -> Signature | None:

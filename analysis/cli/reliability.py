@@ -18,14 +18,14 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reliability",
         help=(
-            "tell which biases of readings and certificates would be noticed, and what the"
-            " others do"
+            "find which biases of readings and certificates would be noticed, and what the"
+            " others change"
         ),
         description=(
             "Compute the redundancy of every observation of a design, the smallest biases of"
-            " readings, certificates, probes and positions that a test of the residuals finds, and"
-            " what a bias just too small for it changes in the error function (U4), in distances"
-            " between balls (U5) and between corrected points (U6)."
+            " readings, certificates, probes and positions that a test of the residuals finds,"
+            " and the effect of a bias just too small to be found on the error function (U4) and"
+            " on distances between balls (U5) and between corrected points (U6)."
         ),
     )
     add_file(parser, several=True)
@@ -34,7 +34,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         metavar="0.1%",
         type=_share,
         default=0.001,
-        help="chance that the test of one bias finds one where there is none; default 0.1%%",
+        help="chance that the test of one bias raises a false alarm; default 0.1%%",
     )
     parser.add_argument(
         "--power",

@@ -20,9 +20,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         "simulate",
         help="write synthetic readings of a design",
         description=(
-            "Write readings that the file's true machine would give of artefacts that differ from"
-            " their certificates by the stated uncertainties, with noise of the stated"
-            " repeatability. The same seed gives the same readings, with and without --certificate."
+            "Write the readings that the file's true machine would give, of artefacts that"
+            " differ from their certificates within the stated uncertainties, with noise of the"
+            " stated repeatability. The same seed gives the same readings, with and without"
+            " --certificate."
         ),
     )
     add_file(parser)
@@ -47,7 +48,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument("--seed", type=seed, help="seed of the noise, instead of the file's")
     parser.add_argument(
-        "--exact", action="store_true", help="leave all noise out; artefacts are as drawn"
+        "--exact",
+        action="store_true",
+        help="leave out all noise; artefacts are as stated in the file",
     )
     add_force(parser)
     parser.set_defaults(run=run)

@@ -117,7 +117,9 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     output = parser.add_argument_group("output")
     output.add_argument(
-        "--evaluate", metavar="PLACES", help='values there too, such as "10 mm, 12.5 mm"'
+        "--evaluate",
+        metavar="PLACES",
+        help=('also print the values at these places, such as "10 mm, 12.5 mm"'),
     )
     output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
     add_output(
@@ -133,7 +135,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     add_force(output)
     output.add_argument(
-        "--magnification", metavar="N", type=float, help="of the bars; default: one that suits"
+        "--magnification",
+        metavar="N",
+        type=float,
+        help="magnification of the bars; default: one that fits",
     )
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
     parser.set_defaults(run=run)
