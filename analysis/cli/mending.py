@@ -66,7 +66,7 @@ def with_repairs(
     if repaired and not status:
         names = [name for name in repaired if name is not None]
         (again,) = check_files([path], names, replace(wanted, repairs=options.suggest))
-        after = {design.variant: design for design in again.designs}
+        after = {design.variant: advised(design, with_repairs=True) for design in again.designs}
         messages += again.messages
     designs = tuple(
         after.get(one.variant, _as_asked(one, options.suggest)) for one in checked.designs
