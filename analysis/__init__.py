@@ -11,45 +11,60 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import ExperimentError
 
     from .api import (
+        certificate,
         check,
+        compare,
         experiment,
         fit,
+        lengths,
         load,
         load_all,
+        map,
         plan,
         quickstart,
         reach,
         reliability,
         repair,
+        reproduce,
         run,
         simulate,
+        spline,
         sweep,
     )
+    from .estimators.estimator_choice import ESTIMATORS
     from .simulator.experiment.model import Experiment
     from .sweeps.running import OtherSweepError
     from .sweeps.store_file import StoreError
 
 __all__ = [
+    "ESTIMATORS",
     "Experiment",
     "ExperimentError",
     "OtherSweepError",
     "StoreError",
+    "certificate",
     "check",
+    "compare",
     "experiment",
     "fit",
+    "lengths",
     "load",
     "load_all",
+    "map",
     "plan",
     "quickstart",
     "reach",
     "reliability",
     "repair",
+    "reproduce",
     "run",
     "simulate",
+    "spline",
     "sweep",
 ]
 
 _PLACES = {
+    "ESTIMATORS": "ballplate.estimators.estimator_choice",
     "Experiment": "ballplate.simulator.experiment.model",
     "ExperimentError": "ballplate.simulator.inputs.messages",
     "OtherSweepError": "ballplate.sweeps.running",

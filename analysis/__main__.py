@@ -10,24 +10,25 @@ import os
 import signal
 import sys
 
+from ballplate.simulator.computing.signals import ANSWERS
+
 # Objects made between two searches for garbage. What a command loads stays, and to search all of it
 # again and again takes a tenth of the time that a short command takes.
 OBJECTS_BETWEEN_SEARCHES = 50_000
 
-ANSWERS = {signal.SIGINT: (130, b"interrupted"), signal.SIGTERM: (143, b"terminated")}
-
 
 def _leave(number: int, _: object) -> None:
-    status, word = ANSWERS[signal.Signals(number)]
-    os.write(2, word + b"; no file was written\n")
+    status, word = ANSWERS[signal.Signals(number).name]
+    os.write(2, f"{word}; no file was written\n".encode())
     os._exit(status)
 
 
 def main() -> int:
     """Run the command and return its exit status."""
     gc.set_threshold(OBJECTS_BETWEEN_SEARCHES)
-    for number in ANSWERS:
-        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+    for name in ANSWERS:
+        number = getattr(signal, name, None)
+        if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _leave)
     from .cli import main as command
 

@@ -1,45 +1,66 @@
 """ballplate from Python: what the commands do, with results in place of text.
 
-Wherever an experiment is taken, so is the path of a file with one. Values in results are in metres,
-radians and ratios. Every function raises `ballplate.ExperimentError` for a file or an experiment
-that is wrong, and ValueError for an argument that is.
+Wherever an experiment is taken, so is the path of a file with one; wherever a table, the path of a
+CSV file or a data frame. Values in results are in metres, radians and ratios. `report` is told of
+each step that has come further: what is counted, how many are done, and of how many. Every function
+raises `ballplate.ExperimentError` for a file or an experiment that is wrong, ValueError for an
+argument that is, and TypeError for one of another kind.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.inputs.arguments import (
+    ensure_one_of,
+    ensure_positive,
+    ensure_report,
+    ensure_type,
+    ensure_whole,
+)
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText, read_text
 
+from .estimators.estimator_choice import (
+    ESTIMATORS,
+    OF_DISTANCES,
+    OF_LENGTHS,
+    PAIR_SETS,
+    EstimatorName,
+    PairSet,
+    takers,
+)
 from .simulator.experiment.load import load as load_file
 from .simulator.experiment.model import Experiment
 
 if TYPE_CHECKING:
     import pandas
 
+    from .error_maps.curve_result import FittedCurve
+    from .error_maps.length_tables import LengthMap
+    from .error_maps.volumetric_results import Line, MachineErrors
+    from .estimators.distances import EstimatorComparison
     from .gross_errors.reliability import Reliability
-    from .montecarlo.trials import MonteCarloProgress
     from .planning.criteria import CriterionName
     from .planning.requirements.answers import Reach
     from .planning.requirements.unknowns import UnknownName
     from .planning.selection import Campaign
+    from .presentation.result import FitResult
+    from .reproduction.reproduction_result import ReproducedDocument
+    from .reproduction.score_result import CertifiedScores
     from .results.fit import Fit
     from .results.prediction import Prediction
-    from .sweeps.execute import Summary
     from .sweeps.running import SweepResult
 
 PathLike = str | os.PathLike[str]
 
 SIGMAS = ("estimated", "given")
-
-# Chances that `ballplate reliability` takes too; beyond them there is no test that could be told.
-LEAST_CHANCE, MOST_CHANCE = 1e-12, 0.999999
 
 
 def load(path: PathLike, variant: str | None = None) -> Experiment:
@@ -52,6 +73,7 @@ def load(path: PathLike, variant: str | None = None) -> Experiment:
     >>> load("designs/npl/6.1.1.yaml", variant="B").label
     '6.1.1[B]'
     """
+    ensure_type(str, "the name of a variant", variant=variant)
     found = load_all(path)
     names = [str(one.name) for one in found]
     if variant is not None:
@@ -76,6 +98,7 @@ def load_all(path: PathLike) -> tuple[Experiment, ...]:
     >>> [one.name for one in load_all("designs/npl/6.1.1.yaml")]
     ['A', 'B', 'C', 'D']
     """
+    _ensure_path("path", path)
     return load_file(path)
 
 
@@ -97,6 +120,9 @@ def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experimen
     """
     from .simulator.experiment.load import written_in_python
 
+    if not isinstance(sections, Mapping):
+        raise TypeError(f"sections={sections!r}; give a mapping of what a file would hold")
+    _ensure_path("folder", folder)
     return written_in_python(sections, Path(folder))
 
 
@@ -111,15 +137,38 @@ def quickstart() -> Experiment:
     return load(shipped("quickstart.yaml"))
 
 
-def check(experiment: Experiment | PathLike) -> Prediction:
+def check(
+    experiment: Experiment | PathLike,
+    goals: str | Iterable[str] = (),
+    share: float | None = None,
+    suggest: bool = False,
+) -> Prediction:
     """Whether a design determines everything it asks for and, if not, what it leaves open.
+
+    `goals` are what it is to reach, too, as in `reach`, with the `share` of lengths that are to be
+    within; with `suggest` changes are looked for that would determine the rest. Both are in the
+    result's `advice`.
 
     >>> check("designs/quickstart.yaml").verdict.deficiency
     0
+    >>> check("designs/quickstart.yaml", "U6 average 0.1 um").advice.missed
+    ('goal not met: average U6 at most 0.1 um; average U6 0.1428 um',)
     """
-    from .results import study
+    from .cli.check_files import Wanted, checked_design
+    from .planning.requirements.goals import parse_goal
+    from .simulator.experiment.load import with_pool
 
-    return study.check(_experiment(experiment), with_scale=True)
+    ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
+    ensure_type(bool, "True or False", suggest=suggest)
+    texts = (goals,) if isinstance(goals, str) else tuple(goals)
+    for text in texts:
+        ensure_type(str, 'texts such as "U6 average 0.3 um"', goals=text)
+    if share is not None and "lengths" not in texts:
+        raise ValueError("share goes with the goal lengths; add it, or leave it out")
+    parsed = tuple(parse_goal(text, share if text == "lengths" else None) for text in texts)
+    chosen = _experiment(experiment)
+    wanted = Wanted(parsed, repairs=suggest)
+    return checked_design(chosen, with_pool(chosen) if suggest else None, wanted).prediction
 
 
 def repair(path: PathLike, variant: str | None = None) -> str:
@@ -159,7 +208,7 @@ def run(
     until: float | None = None,
     seed: int | None = None,
     workers: int = 1,
-    report: Callable[[MonteCarloProgress], None] = lambda progress: None,
+    report: Report = unreported,
 ) -> Prediction:
     """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them where `trials`
     are asked for.
@@ -172,19 +221,19 @@ def run(
     """
     from dataclasses import replace
 
+    from .montecarlo.trials import MOST_TRIALS
     from .results import study
 
-    _positive("workers", workers)
-    if trials is not None and trials < 2:
-        raise ValueError(f"trials={trials}; give 2 at least, since fewer have no scatter")
-    if until is not None and not 0.0 < until <= 1.0:
-        raise ValueError(f"until={until}; give a ratio above 0 and at most 1, such as 0.01")
+    ensure_whole(2, MOST_TRIALS, trials=trials)
+    ensure_whole(0, seed=seed)
+    ensure_whole(1, workers=workers)
+    ensure_positive("a ratio above 0 and at most 1, such as 0.01", 1.0, until=until)
+    ensure_report(report)
     chosen = _experiment(experiment)
     predicted = study.predict(chosen, with_scale=True)
     if trials is None and until is None:
         return predicted
     from .montecarlo import experiments as replicates
-    from .montecarlo.trials import MOST_TRIALS
 
     found = replicates.trials(
         chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report
@@ -202,19 +251,60 @@ def simulate(
     ['position', 'ball', 'probe', 'x_mm', 'y_mm', 'z_mm']
     """
     import pandas
-    from ballplate.simulator.readings.reading_files import AXES
+    from ballplate.simulator.readings.reading_files import reading_columns
     from ballplate.simulator.readings.simulated import simulated_readings
 
+    ensure_whole(0, seed=seed)
+    ensure_type(bool, "True or False", exact=exact)
     found = simulated_readings(_experiment(experiment), seed, exact)
-    design, readings = found.design, found.readings
-    columns: dict[str, Any] = {
-        "position": [design.positions.names[k] for k in readings.position],
-        "ball": [design.balls.names[k] for k in readings.ball],
-        "probe": [design.probes.names[k] for k in readings.probe],
-    }
-    for k, axis in enumerate(AXES[: design.dimension]):
-        columns[f"{axis}_mm"] = 1e3 * found.x[:, k]
-    return pandas.DataFrame(columns)
+    return pandas.DataFrame(reading_columns(found.design, found.readings, found.x))
+
+
+def certificate(
+    experiment: Experiment | PathLike, seed: int | None = None, exact: bool = False
+) -> pandas.DataFrame:
+    """Values of certificates, priors and probe offsets that go with `simulate` of the same seed, as
+    a table that `fit` takes.
+
+    >>> certificate(quickstart()).head(2)[["item", "first", "second"]].values.tolist()
+    [['calibration[0]', 'r1c1', 'r1c5'], ['calibration[0]', 'r5c1', 'r5c5']]
+    """
+    import pandas
+    from ballplate.simulator.readings import certificate_files
+    from ballplate.simulator.readings.simulated import simulated_readings
+
+    ensure_whole(0, seed=seed)
+    ensure_type(bool, "True or False", exact=exact)
+    chosen = _experiment(experiment)
+    certificate_files.ensure_certified(chosen)
+    found = certificate_files.with_drawn_values(chosen, simulated_readings(chosen, seed, exact))
+    rows = certificate_files.certificate_rows(found)
+    return pandas.DataFrame(rows, columns=list(certificate_files.COLUMNS))
+
+
+@overload
+def fit(
+    experiment: Experiment | PathLike,
+    readings: PathLike | pandas.DataFrame,
+    sigma: Literal["estimated", "given"] | None = None,
+    monomials: bool = False,
+    certificate: PathLike | pandas.DataFrame | None = None,
+) -> Fit: ...
+
+
+@overload
+def fit(
+    experiment: Experiment | PathLike,
+    readings: PathLike | pandas.DataFrame,
+    sigma: Literal["estimated", "given"] | None = None,
+    monomials: bool = False,
+    certificate: PathLike | pandas.DataFrame | None = None,
+    estimator: EstimatorName = "full",
+    pairs: PairSet | None = None,
+    across_probes: bool = False,
+    scale: Literal["x", "y", "split", "none"] | None = None,
+    offsets: bool = True,
+) -> FitResult: ...
 
 
 def fit(
@@ -222,24 +312,102 @@ def fit(
     readings: PathLike | pandas.DataFrame,
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
-) -> Fit:
-    """The estimate from readings, of a CSV file or a data frame with the same columns.
+    certificate: PathLike | pandas.DataFrame | None = None,
+    estimator: EstimatorName = "full",
+    pairs: PairSet | None = None,
+    across_probes: bool = False,
+    scale: Literal["x", "y", "split", "none"] | None = None,
+    offsets: bool = True,
+) -> FitResult:
+    """The estimate from readings.
 
     `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
-    coefficients of t, t^2, ... on [0, 1].
+    coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
+    own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
+    `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
+    `offsets` between its positions are estimated. What is to be known beside the figures is in the
+    result's `remarks`, `warnings` and `complaint`.
 
-    >>> fit(quickstart(), simulate(quickstart())).converged
+    >>> readings = simulate(quickstart())
+    >>> fit(quickstart(), readings).converged
     True
+    >>> fit(quickstart(), readings.iloc[1:]).remarks
+    ('planned but not read (1): z low: ball r1c1 with down',)
+    >>> fit(quickstart(), readings, estimator="distances", pairs="braced")
+    <AlternativeFit of quickstart: distances, converged, full rank>
     """
     from ballplate.simulator.design.layout import lay_out
+    from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
-    from .results import study
+    from .estimators.estimator_choice import fit_readings
 
-    _one_of("sigma", sigma, SIGMAS)
-    chosen = _experiment(experiment)
-    observed = read_readings(_table(readings), lay_out(chosen))
-    return study.fit(chosen, observed, sigma, monomials)
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_one_of(ESTIMATORS, estimator=estimator)
+    ensure_one_of(PAIR_SETS, pairs=pairs)
+    ensure_one_of(("x", "y", "split", "none"), scale=scale)
+    ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
+    ensure_type(bool, "True or False", offsets=offsets)
+    asked = {"scale": scale, "offsets": not offsets, "pairs": pairs}
+    asked |= {"across_probes": across_probes, "monomials": monomials}
+    wrong = takers(estimator, [name for name, value in asked.items() if value])
+    if wrong is not None:
+        raise ValueError(f"{wrong[0]} goes with the estimator {wrong[1]} only; leave it out")
+    chosen, table = _experiment(experiment), _table("readings", readings)
+    if certificate is not None:
+        chosen = read_certificate(_table("certificate", certificate), chosen)
+    observed = read_readings(table, lay_out(chosen))
+    return fit_readings(
+        chosen, observed, estimator, sigma, monomials, pairs, across_probes, scale, offsets
+    )
+
+
+def compare(
+    experiment: Experiment | PathLike,
+    estimator: EstimatorName = "distances",
+    trials: int = 100,
+    pairs: PairSet | None = None,
+    across_probes: bool = False,
+    seed: int | None = None,
+    points: int = 200,
+    published_rms: str | None = None,
+    published_maximum: str | None = None,
+    report: Report = unreported,
+) -> EstimatorComparison:
+    """How far the distances that an estimator of distances or lengths alone corrects are from those
+    by the full one, on synthetic data sets of the true machine.
+
+    `published` values, as texts with a unit, are placed among the differences.
+
+    >>> compare(quickstart(), trials=2, points=10).failed
+    ()
+    """
+    from ballplate.simulator.inputs.quantities import parse_length
+
+    from .estimators.distances import MOST_POINTS, compare_estimators
+    from .montecarlo.trials import MOST_TRIALS
+
+    ensure_one_of((*OF_DISTANCES, *OF_LENGTHS), estimator=estimator)
+    ensure_one_of(PAIR_SETS, pairs=pairs)
+    ensure_type(bool, "True or False", across_probes=across_probes)
+    ensure_whole(1, MOST_TRIALS, trials=trials)
+    ensure_whole(0, seed=seed)
+    ensure_whole(1, MOST_POINTS, points=points)
+    texts = {"rms": published_rms, "maximum": published_maximum}
+    ensure_type(str, "a length with a unit, such as '0.35 um'", **texts)
+    ensure_report(report)
+    published = {key: None if text is None else parse_length(text) for key, text in texts.items()}
+    return compare_estimators(
+        _experiment(experiment),
+        trials,
+        estimator,  # type: ignore[arg-type]
+        pairs,
+        across_probes,
+        seed,
+        points,
+        published,
+        report,
+    )
 
 
 def plan(
@@ -251,12 +419,18 @@ def plan(
     curve: bool = False,
     seed: int = 1,
     workers: int = 1,
+    done: PathLike | pandas.DataFrame | None = None,
+    moved: bool = False,
+    earlier: PathLike | None = None,
     report: Report = unreported,
 ) -> Campaign:
     """Positions and certificates chosen from the experiment's pool for a budget, with the bound of
     any choice.
 
-    Without a budget the choice may cost what the positions of the experiment itself do.
+    Without a budget the choice may cost what the positions of the experiment itself do. Readings
+    that are `done` already are kept; where the artefact has `moved` since, a position interrupted
+    there can only be set up again. `earlier` is the file of a choice from this pool before, to
+    compare with and go on from.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
@@ -267,21 +441,23 @@ def plan(
     from .planning.campaign import Request, campaign
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
+    from .planning.earlier import begun
     from .simulator.experiment.load import with_pool
 
-    _one_of("criterion", criterion, NAMES)
-    for name, most in {
-        "hours": hours,
-        "positions": positions,
-        "readings": readings,
-        "workers": workers,
-    }.items():
-        _positive(name, most)
+    ensure_one_of(NAMES, criterion=criterion)
+    ensure_positive("hours above 0", 1e5, hours=hours)
+    ensure_whole(1, positions=positions, readings=readings, workers=workers)
+    ensure_whole(0, seed=seed)
+    ensure_type(bool, "True or False", curve=curve, moved=moved)
+    ensure_report(report)
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
     request = Request(criterion, budget, curve, seed)
-    return campaign(with_pool(_experiment(experiment)), request, workers=workers, report=report)
+    chosen = with_pool(_experiment(experiment))
+    taken = None if done is None else _table("done", done)
+    before = None if earlier is None else Path(earlier)
+    return campaign(chosen, request, *begun(chosen, taken, moved, before), workers, report)
 
 
 def reliability(
@@ -289,6 +465,7 @@ def reliability(
     false_alarm: float = 0.001,
     power: float = 0.8,
     sigma: Literal["estimated", "given"] | None = None,
+    report: Report = unreported,
 ) -> Reliability:
     """Which mistakes in readings and certificates residuals would show, and what those do that they
     would not.
@@ -297,15 +474,18 @@ def reliability(
     580
     """
     from .gross_errors import redundancy
+    from .gross_errors.power import LEAST_CHANCE, MOST_CHANCE
 
-    _one_of("sigma", sigma, SIGMAS)
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_positive("a ratio", 1.0, false_alarm=false_alarm, power=power)
+    ensure_report(report)
     if not LEAST_CHANCE <= false_alarm < power <= MOST_CHANCE:
         limits = f"{LEAST_CHANCE:g} and {MOST_CHANCE:g}"
         raise ValueError(
             f"false_alarm={false_alarm}, power={power}; give ratios between {limits}, the power the"
             " larger"
         )
-    return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma)
+    return redundancy.reliability(_experiment(experiment), false_alarm, power, sigma, report)
 
 
 def reach(
@@ -313,12 +493,18 @@ def reach(
     goal: str = "lengths",
     unknowns: UnknownName | Sequence[UnknownName] | None = None,
     target: str | None = None,
+    share: float | None = None,
+    artefact: str | None = None,
+    calibration: int | None = None,
+    report: Report = unreported,
 ) -> Reach:
     """The repeatability, certificate, repeats, balls or size of the plate with which a goal is met.
 
-    `goal` is as `ballplate reach --goal` has it, `unknowns` one of repeatability, certificate,
-    repeats, balls and size, or several; without any it is all of them. `target` replaces the
-    experiment's target, as a text with a unit.
+    `goal` is as `ballplate reach --goal` has it, with the `share` of lengths that are to be within,
+    `unknowns` one of repeatability, certificate, repeats, balls and size, or several; without any
+    it is all of them. `target` replaces the experiment's target, as a text with a unit. The
+    `artefact` by its name and the entry of the `calibration` are what varies where there are
+    several.
 
     >>> reach(quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met
     True
@@ -327,10 +513,164 @@ def reach(
     from .planning.requirements.root_search import reach as search
     from .planning.requirements.unknowns import NAMES
 
+    ensure_type(str, 'a text such as "U6 average 0.3 um"', goal=goal)
+    ensure_type(str, 'a text with a unit, such as "0.5 um"', target=target)
+    ensure_type(str, "the name of an artefact", artefact=artefact)
+    ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
+    ensure_whole(0, calibration=calibration)
+    ensure_report(report)
     names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns or NAMES)
     for name in names:
-        _one_of("unknowns", name, NAMES)
-    return search(_experiment(experiment), parse_goal(goal), names, target=target)
+        ensure_one_of(NAMES, unknowns=name)
+    return search(
+        _experiment(experiment),
+        parse_goal(goal, share),
+        names,
+        artefact,
+        calibration,
+        target,
+        report,
+    )
+
+
+def lengths(
+    experiment: Experiment | PathLike,
+    target: str | None = None,
+    grid: int | Sequence[int] = 6,
+    probe: str | None = None,
+    coverage_factor: float | None = None,
+    with_repeatability: bool = False,
+    report: Report = unreported,
+) -> LengthMap:
+    """Uncertainties of all lengths between points of a grid over the volume, against a target.
+
+    `target` replaces that of the experiment, as a text with a unit; `grid` has the number of points
+    along every axis, or along each. With `with_repeatability` the scatter of the two readings of a
+    length counts, too.
+
+    >>> lengths(quickstart(), "1 um + L/1000000", grid=3).is_met
+    True
+    """
+    from .error_maps.length_map import length_map, length_settings
+
+    ensure_type(str, 'a text with a unit, such as "0.5 um + L/1000000"', target=target)
+    ensure_type(str, "the name of a probe", probe=probe)
+    ensure_type(bool, "True or False", with_repeatability=with_repeatability)
+    ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
+    ensure_report(report)
+    counts = _several("grid", grid)
+    ensure_whole(2, **{f"grid[{k}]": count for k, count in enumerate(counts)})
+    chosen = _experiment(experiment)
+    settings = length_settings(chosen, target, counts, probe, coverage_factor, with_repeatability)
+    return length_map(chosen, settings, report)
+
+
+def map(
+    machine: PathLike,
+    grid: Sequence[int] | None = None,
+    line: str | Line | None = None,
+    error: str | None = None,
+    points: int | None = None,
+) -> MachineErrors:
+    """Volumetric errors of a machine file: on a grid over the volume, along a line of so many
+    points, or one parametric error along its axis.
+
+    `line` is a text as in `ballplate map --line`, the places in metres of the two axes that stand
+    still, or two points.
+
+    >>> map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
+    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 um at most>
+    """
+    from .error_maps.volumetric_errors import MOST_POINTS
+    from .error_maps.volumetric_results import machine_errors, parse_places
+
+    _ensure_path("machine", machine)
+    ensure_type(str, "the name of a parametric error, such as EXX", error=error)
+    ensure_whole(2, MOST_POINTS, points=points)
+    counts = None
+    if grid is not None:
+        if len(several := _several("grid", grid)) != 3:
+            raise ValueError(f"grid={grid!r}; give three numbers of points, such as (5, 5, 5)")
+        ensure_whole(2, MOST_POINTS, **{f"grid[{k}]": count for k, count in enumerate(several)})
+        if (count := several[0] * several[1] * several[2]) > MOST_POINTS:
+            raise ValueError(f"{count} points are too many; at most {MOST_POINTS} are possible")
+        counts = several[0], several[1], several[2]
+    places = parse_places(line) if isinstance(line, str) else line
+    return machine_errors(Path(machine), counts, places, error, points)
+
+
+def spline(
+    file: PathLike,
+    x: str | None = None,
+    y: str | None = None,
+    points: str | None = None,
+    sigma: Literal["estimated", "given"] | None = None,
+    powers: Literal["local", "global"] = "local",
+    **wanted: Any,
+) -> FittedCurve:
+    """A spline with prescribed values and slopes through the measured errors of a CSV file.
+
+    `x` and `y` are columns, and `points` names those that are used. What curve is `wanted` is said
+    as by the options of `ballplate spline`: order, every, knots, start, end, boundary, straight,
+    start_value, start_slope, end_value, end_slope, at, periodic, period, uncertainty and evaluate,
+    in texts with units.
+
+    >>> table = "designs/gilsinn/table-1.csv"
+    >>> spline(table, "arc_length", "finish_error", "12-32", start_slope="0")
+    <FittedCurve of table-1: 21 points, 7 free coefficients>
+    """
+    from .error_maps.curve_options import Asked, OptionError, ensure_asked
+    from .error_maps.curve_result import error_curve
+
+    _ensure_path("file", file)
+    ensure_type(str, "the name of a column", x=x, y=y)
+    ensure_type(str, 'names of points such as "12-32"', points=points)
+    ensure_one_of(SIGMAS, sigma=sigma)
+    ensure_one_of(("local", "global"), powers=powers)
+    ensure_asked(wanted)
+    try:
+        return error_curve(Path(file), x, y, points, Asked(**wanted), sigma, powers)
+    except OptionError as error:
+        # Options are arguments here.
+        named = re.sub(r"--([a-z]+)-?([a-z]*)", _argument, str(error))
+        raise ValueError(named) from None
+
+
+def reproduce(
+    document: Literal["npl", "certified"],
+    experiment: str | Iterable[str] = (),
+    trials: int | None = 100,
+    designs: PathLike | None = None,
+    results: PathLike | None = None,
+    report: Report = unreported,
+) -> ReproducedDocument | CertifiedScores:
+    """The published figures of NPL Report CISE 15/98 beside ours, or the problems with certified
+    answers solved.
+
+    An `experiment` is a section such as 6.2.1, or the name of a problem; without any it is all of
+    them. `trials` is the number of synthetic data sets of section 6.2.7, None leaves them out.
+    `designs` is a folder in place of the designs that come with ballplate, `results` a JSON file
+    with another program's answers to the certified problems.
+
+    >>> reproduce("npl", "6.1.2").is_right
+    True
+    """
+    from .montecarlo.trials import MOST_TRIALS
+    from .reproduction.reproduction_result import reproduce_npl
+    from .reproduction.score_result import score_certified
+
+    if document not in ("npl", "certified"):
+        raise ValueError(f'document: "{document}" is unknown; give npl or certified')
+    ensure_whole(1, MOST_TRIALS, trials=trials)
+    ensure_report(report)
+    chosen = (experiment,) if isinstance(experiment, str) else tuple(experiment)
+    folder = None if designs is None else Path(designs)
+    if document == "npl":
+        if results is not None:
+            raise ValueError("results go with certified only; leave them out")
+        return reproduce_npl(chosen, trials, folder, report)
+    answers = None if results is None else Path(results)
+    return score_certified(chosen, answers, folder, report)
 
 
 def sweep(
@@ -339,12 +679,16 @@ def sweep(
     workers: int = 1,
     retry_failed: bool = False,
     beside: bool = False,
-    report: Callable[[Summary], None] = lambda summary: None,
+    fail_fast: bool = False,
+    folders: Sequence[PathLike] = (),
+    report: Report = unreported,
 ) -> SweepResult:
     """A family of experiments, computed into a store, from which it goes on where it ended.
 
     The store is the sweep file's name with .sqlite, unless another is named. A sweep other than the
-    one that it holds is refused, or entered `beside` that.
+    one that it holds is refused, or entered `beside` that. `folders` are those, besides those of
+    the sweep file and of its base, whose files the sweep may name; with `fail_fast` it ends when a
+    cell fails.
 
     :raises StoreError: the store cannot be used.
     :raises OtherSweepError: it holds another sweep.
@@ -361,33 +705,54 @@ def sweep(
     from .sweeps.local import local_runner
     from .sweeps.running import compute_sweep, enter, result_of, writable_store
 
-    _positive("workers", workers)
-    given = load_sweep(path)
+    _ensure_path("path", path)
+    ensure_whole(1, workers=workers)
+    ensure_type(bool, "True or False", retry_failed=retry_failed, beside=beside)
+    ensure_type(bool, "True or False", fail_fast=fail_fast)
+    ensure_report(report)
+    given = load_sweep(path, folders=tuple(Path(os.path.abspath(one)) for one in folders))
     bundle = bundle_of(given)
     with writable_store(
         Path(path).with_suffix(".sqlite") if store is None else Path(store)
     ) as opened:
         entered = enter(opened, given, bundle, beside)
         runner = nullcontext(local_runner(given, bundle, workers))
-        summary = compute_sweep(opened, given, entered, runner, retry_failed, report=report)
+        summary = compute_sweep(opened, given, entered, runner, retry_failed, fail_fast, report)
         return result_of(opened, given, entered, summary)
 
 
-def _one_of(name: str, given: str | None, known: Sequence[str]) -> None:
-    if given is not None and given not in known:
-        raise ValueError(f'{name}: "{given}" is unknown; {hint(given, known)}')
+def _ensure_path(name: str, given: object) -> None:
+    if not isinstance(given, str | os.PathLike):
+        raise TypeError(f"{name}={given!r}; give the path of a file or folder")
 
 
-def _positive(name: str, given: float | None) -> None:
-    if given is not None and not given > 0:
-        raise ValueError(f"{name}: {given!r} is not above 0")
+def _several(name: str, given: Any) -> tuple[int, ...]:
+    if isinstance(given, Iterable) and type(given) is not str:
+        return tuple(given)
+    ensure_whole(2, None, **{name: given})
+    return (given,)
 
 
-def _table(readings: PathLike | pandas.DataFrame) -> Path | GivenText:
-    if isinstance(readings, str | os.PathLike):
-        return Path(readings)
-    return GivenText("readings", readings.to_csv(index=False))
+def _argument(option: re.Match[str]) -> str:
+    """The name of an argument for that of an option."""
+    return "_".join(filter(None, option.groups()))
 
 
-def _experiment(given: Experiment | PathLike) -> Experiment:
-    return given if isinstance(given, Experiment) else load(given)
+def _table(name: str, given: PathLike | pandas.DataFrame) -> Path | GivenText:
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    import pandas
+
+    if not isinstance(given, pandas.DataFrame):
+        raise TypeError(f"{name}={given!r}; give the path of a CSV file, or a data frame")
+    return GivenText(name, given.to_csv(index=False))
+
+
+def _experiment(given: Any) -> Experiment:
+    if isinstance(given, Experiment):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return load(given)
+    what = "make one of it with experiment()" if isinstance(given, Mapping) else "give either"
+    kind = type(given).__name__
+    raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from threading import RLock
 
+from ballplate.simulator.computing.steps import ProgressStep
 from tqdm import tqdm
 
 # What is told beside the bar, and in lines without one.
@@ -39,12 +40,18 @@ def width() -> int:
     return shutil.get_terminal_size().columns - 1
 
 
-def line(what: str, done: int, wanted: int, before: int, elapsed: float, remark: str) -> str:
+def line(step: ProgressStep, elapsed: float) -> str:
     """How far a step has come, in words alone.
 
-    >>> line("data sets", 512, 2048, 0, 20.0, "accurate to 1.5 %")
+    >>> line(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"), 20.0)
     '512/2048 data sets, 00:20 so far, 01:00 left, accurate to 1.5 %'
     """
     return tqdm.format_meter(
-        done, wanted, elapsed, prefix=what, initial=before, bar_format=FORM, postfix=remark or None
+        step.done,
+        step.wanted,
+        elapsed,
+        prefix=step.what,
+        initial=step.before,
+        bar_format=FORM,
+        postfix=step.remark or None,
     )

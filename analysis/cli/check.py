@@ -7,7 +7,7 @@ import sys
 from argparse import Namespace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .common import add_file, percentage
 from .interruption import signatures, written
@@ -15,7 +15,7 @@ from .outputs import UsageError
 
 if TYPE_CHECKING:
     from ..planning.requirements.goals import Goal
-    from .check_files import CheckedDesign, CheckedFile
+    from .check_files import CheckedFile
 
 FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
@@ -143,7 +143,7 @@ def run(options: Namespace) -> int:
         print(junit_report(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([one.plan.to_dict() | _asked(one, wanted.repairs) for one in designs])
+        print_json([one.prediction.to_dict() for one in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     if not all(checked.as_expected for checked in files):
@@ -166,7 +166,7 @@ def _goals(options: Namespace) -> tuple[Goal, ...]:
 def _print(checked: CheckedFile, options: Namespace) -> None:
     from .common import print_lines
     from .excerpts import print_errors
-    from .github import advice_lines, annotation_lines
+    from .github import annotation_lines
 
     for doubt in checked.doubts:
         print(f"warning: {doubt}", file=sys.stderr)
@@ -176,19 +176,6 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
             print(line, flush=True)
     elif options.format == "text" and not options.diff:
         for design in checked.designs:
-            print_lines([*design.plan.lines(), *advice_lines(design)])
+            print_lines(design.prediction.lines())
     if options.format in ("text", "json"):
         print_errors(checked.messages, options)
-
-
-def _asked(design: CheckedDesign, with_suggestions: bool) -> dict[str, Any]:
-    """What was asked for besides the rank, as plain data."""
-    from ..planning.repair.repair_tables import certificate_data, repair_data
-
-    told: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
-    if with_suggestions:
-        told |= {
-            "repairs": repair_data(design.repairs),
-            "scale_certificate": certificate_data(design.certificate),
-        }
-    return told

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.load import load
@@ -16,8 +16,14 @@ from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.yamltree import Mark
 
+from ..planning.repair.repair_tables import (
+    certificate_data,
+    certificate_lines,
+    repair_data,
+    repair_lines,
+)
 from ..planning.requirements.goals import Goal, GoalError, check_goal, judge
-from ..results.prediction import Prediction
+from ..results.prediction import Advice, Prediction
 from ..results.study import check, planned_uncertainty
 
 if TYPE_CHECKING:
@@ -35,7 +41,7 @@ class CheckedDesign:
     these and of what is weak.
     """
 
-    plan: Prediction
+    prediction: Prediction
     place: Mark | None
     repairs: Repairs | None = None
     goals: tuple[str, ...] = ()
@@ -46,7 +52,7 @@ class CheckedDesign:
     @property
     def complaints(self) -> tuple[str, ...]:
         """What is wrong: the rank, then goals and weak directions that were not to be."""
-        complaint = self.plan.verdict.complaint
+        complaint = self.prediction.verdict.complaint
         return (*([complaint] if complaint else []), *self.missed)
 
 
@@ -108,7 +114,9 @@ def check_files(
             is_single = len(chosen) == 1
             designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
             of_search = within if is_single else unreported
-            judged = tuple(_checked(one, pools.get(one.name), wanted, of_search) for one in designs)
+            judged = tuple(
+                checked_design(one, pools.get(one.name), wanted, of_search) for one in designs
+            )
             yield CheckedFile(str(path), judged, (), doubts)
         except ExperimentError as error:
             complete = False
@@ -119,30 +127,48 @@ def check_files(
         yield CheckedFile(messages[0].file, (), messages)
 
 
-def _checked(
-    experiment: Experiment, with_pool: Experiment | None, wanted: Wanted, report: Report
+def checked_design(
+    experiment: Experiment,
+    with_pool: Experiment | None,
+    wanted: Wanted,
+    report: Report = unreported,
 ) -> CheckedDesign:
-    plan = check(experiment, with_scale=True)
+    """An experiment judged, with changes looked for in its pool if there is one."""
+    prediction = check(experiment, with_scale=True)
     found, certificate = None, None
     if with_pool is not None:
         from ..planning.repair.repair_search import repairs
         from ..planning.repair.scale import scale_certificate
 
         found = repairs(with_pool, report=report)
-        certificate = scale_certificate(with_pool, plan.scale)
+        certificate = scale_certificate(with_pool, prediction.scale)
     goals, missed = _goals(experiment, wanted.goals)
-    if wanted.nothing_weak and plan.verdict.weak:
-        count = len(plan.verdict.weak)
+    if wanted.nothing_weak and prediction.verdict.weak:
+        count = len(prediction.verdict.weak)
         missed += (f"{count} weakly determined {'direction' if count == 1 else 'directions'}",)
-    design = CheckedDesign(plan, None, found, goals, missed, certificate, experiment.name)
+    design = CheckedDesign(prediction, None, found, goals, missed, certificate, experiment.name)
+    design = advised(design, wanted.repairs)
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (
-        ("expected_rank_deficiency",) if plan.verdict.complaint else ("target_uncertainty",)
+        ("expected_rank_deficiency",) if prediction.verdict.complaint else ("target_uncertainty",)
     )
-    if not plan.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
+    if not prediction.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
     return replace(design, place=experiment.place(steps))
+
+
+def advised(design: CheckedDesign, with_repairs: bool) -> CheckedDesign:
+    """A design whose prediction tells what it was checked for besides the rank."""
+    prediction, repairs, certificate = design.prediction, design.repairs, design.certificate
+    lines = [*design.goals, *repair_lines(repairs, prediction.verdict)]
+    lines += certificate_lines(certificate)
+    data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
+    if with_repairs:
+        data["repairs"] = repair_data(repairs)
+        data["scale_certificate"] = certificate_data(certificate)
+    advice = Advice(design.missed, tuple(lines), data)
+    return replace(design, prediction=replace(prediction, advice=advice))
 
 
 def _goals(

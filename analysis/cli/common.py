@@ -49,9 +49,7 @@ def add_json(parser: ArgumentParser) -> None:
 
 def count(text: str) -> int:
     """Read a number of things from the command line."""
-    if not text.isascii() or not text.isdigit() or int(text) < 1:
-        raise ArgumentTypeError(f'expected a whole number, 1 or above, not "{text}"')
-    return int(text)
+    return whole(text, 1)
 
 
 def trial_count(text: str) -> int:
@@ -66,10 +64,10 @@ def trial_count(text: str) -> int:
     return found
 
 
-def whole(text: str) -> int:
-    """Read an index from the command line."""
-    if not text.isascii() or not text.isdigit():
-        raise ArgumentTypeError(f'expected a whole number, 0 or above, not "{text}"')
+def whole(text: str, least: int = 0, what: str = "expected") -> int:
+    """Read a whole number from the command line."""
+    if not text.isascii() or not text.isdigit() or int(text) < least:
+        raise ArgumentTypeError(f'{what} a whole number, {least} or above, not "{text}"')
     return int(text)
 
 
@@ -86,9 +84,7 @@ def percentage(text: str) -> float:
 
 def seed(text: str) -> int:
     """Read a seed from the command line."""
-    if not text.isascii() or not text.isdigit():
-        raise ArgumentTypeError(f'a seed is a whole number, 0 or above, not "{text}"')
-    return int(text)
+    return whole(text, what="a seed is")
 
 
 def add_picture(parser: Any, name: str, help: str) -> None:

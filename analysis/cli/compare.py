@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentTypeError, Namespace
 
+from ..estimators.estimator_choice import OF_DISTANCES, OF_LENGTHS, PAIR_SETS
 from .common import add_file, add_json, count, seed, trial_count
-
-PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "braced", "all")
 
 
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
@@ -30,7 +29,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument(
         "--estimator",
-        choices=("distances", "cresto", "kruth", "length-equations", "sphere-then-metric"),
+        choices=(*OF_DISTANCES, *OF_LENGTHS),
         default="distances",
         help=(
             "default: distances; of ball bars and Bryan gauges length-equations or"
@@ -94,7 +93,7 @@ def run(options: Namespace) -> int:
     """Compare the estimators for all experiments of the files; 1 if an estimate did not
     converge.
     """
-    from ..estimators.distances import compare_estimators, comparison_data, comparison_lines
+    from ..estimators.distances import compare_estimators
     from .common import experiments, print_json, print_lines
     from .progress import progress
 
@@ -110,13 +109,12 @@ def run(options: Namespace) -> int:
                 options.across_probes,
                 options.seed,
                 options.points,
+                published,
                 shown.show,
             )
         found.append(comparison)
         if not options.json:
-            print_lines(
-                [*([""] if len(found) > 1 else []), *comparison_lines(comparison, published)]
-            )
+            print_lines([*([""] if len(found) > 1 else []), *comparison.lines()])
     if options.json:
-        print_json([comparison_data(comparison, published) for comparison in found])
+        print_json([comparison.to_dict() for comparison in found])
     return 0 if not any(comparison.failed for comparison in found) else 1

@@ -5,18 +5,13 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ..estimators.estimator_choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
 from .common import add_file, add_json, add_picture
 from .compare import add_pairs
-from .estimators import ESTIMATORS
 from .outputs import add_force, write_outputs
 
-if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment
-    from ballplate.simulator.readings.reading_files import ObservedReadings
-
-    from ..results.fit import Fit
+WRONG_USAGE, BAD_FILE = 2, 3
 
 
 # In one piece: one option after the other, with its help.
@@ -56,7 +51,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     )
     parser.add_argument(
         "--estimator",
-        choices=("full", *ESTIMATORS),
+        choices=ESTIMATORS,
         default="full",
         help=(
             "full (default); distances, cresto or kruth, which use distances alone and estimate the"
@@ -82,158 +77,75 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     add_picture(
         parser,
         "--plot",
-        help=(
-            "draw the residuals of a two-dimensional experiment as magnified vectors (.svg, .png or"
-            " .pdf)"
-        ),
+        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
     )
     add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
 
-OF_DISTANCES = ("distances", "cresto", "kruth")
-
-
 def run(options: Namespace) -> int:
-    """Fit one experiment; 1 if it did not converge or its rank is not as expected."""
+    """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.design.layout import lay_out
+    from ballplate.simulator.inputs.messages import in_one_line
     from ballplate.simulator.readings.certificate_files import read_certificate
     from ballplate.simulator.readings.reading_files import read_readings
 
-    from ..results.study import fit
     from .common import print_json, print_lines, single
 
-    if complaint := _misused(options):
-        print(f"ballplate fit: {complaint}", file=sys.stderr)
-        return 2
+    refusal = _refusal(options)
+    if refusal:
+        print(f"ballplate fit: {refusal}", file=sys.stderr)
+        return WRONG_USAGE
     experiment = single(options)
     if options.certificate:
         experiment = read_certificate(options.certificate, experiment)
-    if options.plot and (
-        experiment.dimension != 2 or options.estimator not in ("full", "reversal")
-    ):
-        text = (
-            "--plot draws residuals of readings in two dimensions, by the full estimator or"
-            " reversal; leave it out"
-        )
-        print(f"ballplate fit: {text}", file=sys.stderr)
-        return 2
     observed = read_readings(options.readings, lay_out(experiment))
-    _warn_of_readings(options, observed)
-    if options.estimator != "full":
-        return _run_other(options, experiment, observed)
-    result = fit(experiment, observed, options.sigma, options.monomials)
-    has_converged = result.solution.status == "converged"
+    for remark in observed.remarks:
+        print(in_one_line(f"{options.readings}: {remark}"), file=sys.stderr)
+    for doubt in observed.doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
+    result = fit_readings(
+        experiment,
+        observed,
+        options.estimator,
+        options.sigma,
+        options.monomials,
+        options.pairs,
+        options.across_probes,
+        options.scale,
+        not options.no_offsets,
+    )
     is_drawn = (
         not options.plot
-        or not has_converged
+        or not result.converged
         or write_outputs({options.plot: result.plot}, options.force)
     )
     if options.json:
         print_json([result.to_dict()])
     else:
         print_lines(result.lines())
-    if not has_converged:
-        text = (
-            "see the record of iterations, and look for wrong units, balls or probes among the"
-            " readings"
-        )
-        print(
-            f"the estimate has {result.solution.status} and nothing is made of it: {text}",
-            file=sys.stderr,
-        )
-        return 1
+    for caution in result.cautions if is_drawn else ():
+        print(f"warning: {caution}", file=sys.stderr)
     if not is_drawn:
-        return 3
-    _warn(result)
-    if not result.verdict.as_expected:
-        print(result.verdict.complaint, file=sys.stderr)
-        return 1
-    return 0
+        return BAD_FILE
+    if result.complaint:
+        print(result.complaint, file=sys.stderr)
+    return 1 if result.complaint else 0
 
 
-def _misused(options: Namespace) -> str:
-    """What is wrong with options that do not go together; empty where they do."""
-    for option, given, estimators in (
-        ("--scale", options.scale, ("reversal",)),
-        ("--no-offsets", options.no_offsets, ("reversal",)),
-        ("--pairs", options.pairs, OF_DISTANCES),
-        ("--across-probes", options.across_probes, OF_DISTANCES),
-        ("--monomials", options.monomials, ("full", *OF_DISTANCES)),
-    ):
-        if given and options.estimator not in estimators:
-            wanted = " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
-            return f"{option} goes with --estimator {wanted} only; leave it out"
-    if options.files[0].suffix.lower() == ".csv" and options.readings.suffix.lower() in (
-        ".yaml",
-        ".yml",
-    ):
-        return (
-            f"the experiment file comes first, then the readings: fit {options.readings}"
-            f" {options.files[0]}"
-        )
+def _refusal(options: Namespace) -> str:
+    """Why the options do not go together; empty where they do."""
+    given = [name for name in TAKE if getattr(options, name, False)]
+    given += ["offsets"] if options.no_offsets else []
+    wrong = takers(options.estimator, given)
+    if wrong is not None:
+        name, estimators = wrong
+        option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
+        return f"--{option} goes with --estimator {estimators} only; leave it out"
+    first, second = options.files[0], options.readings
+    if first.suffix.lower() == ".csv" and second.suffix.lower() in (".yaml", ".yml"):
+        return f"the experiment file comes first, then the readings: fit {second} {first}"
+    if options.plot and options.estimator not in DRAWN:
+        return "--plot draws residuals by the full estimator or reversal; leave it out"
     return ""
-
-
-def _warn_of_readings(options: Namespace, observed: ObservedReadings) -> None:
-    """Warn of readings that are missing or not planned, and of those that are in doubt."""
-    from ballplate.simulator.inputs.messages import in_one_line
-    from ballplate.simulator.inputs.settings import listing
-    from ballplate.simulator.readings.gross_error_messages import (
-        doubts_about_lengths,
-        doubts_about_volume,
-    )
-
-    for what, names in (
-        ("planned but not read", observed.missing),
-        ("read but not planned", observed.unplanned),
-    ):
-        if names:
-            told = f"{options.readings}: {what} ({len(names)}): {listing(names)}"
-            print(in_one_line(told), file=sys.stderr)
-    doubts = doubts_about_lengths(observed.design, observed.x)
-    for doubt in (*doubts, *doubts_about_volume(observed.design, observed.x, observed.marks)):
-        print(f"warning: {doubt}", file=sys.stderr)
-
-
-def _warn(result: Fit) -> None:
-    """Warn where the fit leaves more than the stated uncertainties explain, and of its doubts."""
-    if result.too_large:
-        times = result.solution.factor.sum_of_squares / result.degrees_of_freedom
-        advice = (
-            "no single mistake explains that: try a richer error model or larger uncertainties, and"
-            " think of drifts"
-        )
-        if result.diagnosis.suspects or result.diagnosis.scatter:
-            advice = "look at what is suspected"
-        print(
-            f"warning: S^2 is {times:.3g} times what the stated uncertainties explain; {advice}",
-            file=sys.stderr,
-        )
-    for doubt in result.doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
-
-
-def _run_other(options: Namespace, experiment: Experiment, observed: ObservedReadings) -> int:
-    """Fit with another estimator than the full one; 1 if it complains."""
-    from .common import print_json, print_lines
-
-    found = ESTIMATORS[options.estimator](options, experiment, observed)
-    is_drawn = (
-        not options.plot
-        or not found.draw
-        or write_outputs({options.plot: found.draw}, options.force)
-    )
-    if options.json:
-        print_json([found.data])
-    else:
-        print_lines(found.lines)
-    if not is_drawn:
-        return 3
-    for warning in found.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    if found.complaint:
-        print(found.complaint, file=sys.stderr)
-        return 1
-    return 0

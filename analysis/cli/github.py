@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
-from ..planning.repair.repair_tables import certificate_lines, repair_lines
 from ..results.parts import scale_lines, target_lines, verdict_lines
 from .check_files import CheckedDesign, CheckedFile
 
@@ -37,18 +36,19 @@ def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> lis
 
 
 def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> list[str]:
-    plan = design.plan
+    prediction = design.prediction
     told = [
-        *verdict_lines(plan.verdict, lengths=plan.lengths),
-        *target_lines(plan.lengths),
-        *scale_lines(plan.scale),
+        *verdict_lines(prediction.verdict, lengths=prediction.lengths),
+        *target_lines(prediction.lengths),
+        *scale_lines(prediction.scale),
     ]
-    suggested = advice_lines(design)
+    advice = prediction.advice
+    suggested = () if advice is None else advice.lines
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space
         # after a hash.
         first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
-        start = f"as expected: {file}: {design.plan.label}: "
+        start = f"as expected: {file}: {design.prediction.label}: "
         return [
             in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)
         ]
@@ -56,24 +56,13 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     # The log of a run shows only the message, so that it names the place again.
     text = "\n".join(
         [
-            f"{place.file}:{place.line}:{place.column}: {plan.label}: {told[0]}",
+            f"{place.file}:{place.line}:{place.column}: {prediction.label}: {told[0]}",
             *told[1:],
             *suggested,
         ]
     )
-    what = "rank" if plan.verdict.complaint else "goals"
-    return [
-        _error(place.file, place.line, place.column, f"{what} of {plan.label}", text, workspace)
-    ]
-
-
-def advice_lines(design: CheckedDesign) -> list[str]:
-    """Goals, and what is suggested, as lines of text."""
-    return [
-        *design.goals,
-        *repair_lines(design.repairs, design.plan.verdict),
-        *certificate_lines(design.certificate),
-    ]
+    what = f"{'rank' if prediction.verdict.complaint else 'goals'} of {prediction.label}"
+    return [_error(place.file, place.line, place.column, what, text, workspace)]
 
 
 def _error(file: str, line: int, column: int, title: str, text: str, workspace: Path | None) -> str:
@@ -98,8 +87,7 @@ def in_message(text: str) -> str:
     >>> in_message("5 %\nnext")
     '5 %25%0Anext'
     """
-    lines = (in_one_line(line) for line in text.split("\n"))
-    return "\n".join(lines).replace("%", "%25").replace("\n", "%0A")
+    return in_lines(text).replace("%", "%25").replace("\n", "%0A")
 
 
 def in_property(text: str) -> str:

@@ -17,17 +17,13 @@ from functools import partial
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
+from ballplate.simulator.computing.signals import ANSWERS
+
 if TYPE_CHECKING:
     from argparse import Namespace
     from pathlib import Path
     from socket import socket
 
-# Exit status and what is told, by signal; SIGBREAK is Ctrl-Break on Windows.
-ANSWERS = {
-    "SIGINT": (130, "interrupted"),
-    "SIGBREAK": (130, "interrupted"),
-    "SIGTERM": (143, "terminated"),
-}
 # Seconds that a command has for an orderly end.
 ORDERLY_LIMIT = 0.5
 # Seconds within which signals count as one: programs in between, such as `timeout`, send what the

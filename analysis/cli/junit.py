@@ -10,7 +10,6 @@ from ballplate.simulator.inputs.messages import in_one_line
 
 from ..results.parts import verdict_lines
 from .check_files import CheckedDesign, CheckedFile
-from .github import advice_lines
 
 # No XML document can hold these, not even as character references.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -46,15 +45,16 @@ def _suite(checked: CheckedFile) -> ElementTree.Element:
 
 
 def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
-    case = ElementTree.Element("testcase", {"classname": file, "name": _clean(design.plan.label)})
+    prediction = design.prediction
+    case = ElementTree.Element("testcase", {"classname": file, "name": _clean(prediction.label)})
     # Outside attributes a line's end is one, and the log of a build server may take what follows
     # for a command.
-    told = [_clean(in_one_line(line)) for line in (*design.plan.lines(), *advice_lines(design))]
+    told = [_clean(in_one_line(line)) for line in prediction.lines()]
     if design.place is None:
         ElementTree.SubElement(case, "system-out").text = "\n".join(told)
         return case
-    is_rank = bool(design.plan.verdict.complaint)
-    message = _clean(verdict_lines(design.plan.verdict)[0] if is_rank else "; ".join(design.missed))
+    is_rank = bool(prediction.verdict.complaint)
+    message = _clean(verdict_lines(prediction.verdict)[0] if is_rank else "; ".join(design.missed))
     kind = "rank" if is_rank else "goal"
     failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"

@@ -6,17 +6,10 @@ import math
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from .common import add_file, add_json, add_picture, print_json, print_lines, single
 from .outputs import Writer, add_force, add_output, text_writer, write_outputs
-
-if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment
-
-    from ..error_maps.length_map import LengthMapSettings
 
 NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 1, 2, 3
 # Lines of a table of all lengths.
@@ -104,22 +97,28 @@ def _factor(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ..error_maps.length_map import length_map
-    from ..error_maps.length_tables import length_data, length_lines, pair_csv, point_csv
+    from ..error_maps.length_map import length_map, length_settings, pair_csv
+    from ..error_maps.length_tables import point_csv
     from .progress import progress
 
     experiment = single(options)
-    settings = _settings(experiment, options)
-    if isinstance(settings, str):
-        print(f"ballplate lengths: {settings}", file=sys.stderr)
-        return WRONG_USAGE
-    count = math.comb(math.prod(settings.grid), 2)
-    if options.pairs is not None and count > MOST_PAIRS:
-        told = (
-            f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
-            " --grid coarser"
+    try:
+        settings = length_settings(
+            experiment,
+            options.target,
+            options.grid,
+            options.probe,
+            options.coverage_factor,
+            options.with_repeatability,
         )
-        print(f"ballplate lengths: {told}", file=sys.stderr)
+        count = math.comb(math.prod(settings.grid), 2)
+        if options.pairs is not None and count > MOST_PAIRS:
+            raise ValueError(
+                f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
+                " --grid coarser"
+            )
+    except ValueError as error:
+        print(f"ballplate lengths: {error}", file=sys.stderr)
         return WRONG_USAGE
     with progress(options) as shown:
         found = length_map(experiment, settings, shown.show)
@@ -129,56 +128,16 @@ def run(options: Namespace) -> int:
     if options.pairs is not None:
         writers[options.pairs] = _of_lines(pair_csv(experiment, settings))
     if options.plot is not None:
-        from ..report.length_plots import draw_lengths
-
-        writers[options.plot] = partial(draw_lengths, found)
+        writers[options.plot] = found.plot
     is_written = write_outputs(writers, options.force)
     if options.json:
-        print_json([length_data(experiment.label, experiment.title, found)])
+        print_json([found.to_dict()])
     else:
-        print_lines(length_lines(f"{experiment.label}: {experiment.title}", found))
+        print_lines(found.lines())
     if not is_written:
         return BAD_FILE
     is_missed = options.fail and not found.is_met
-    is_expected = found.deficiency == (experiment.expected_rank_deficiency or 0)
-    return 0 if is_expected and not is_missed else NOT_AS_EXPECTED
-
-
-def _settings(experiment: Experiment, options: Namespace) -> LengthMapSettings | str:
-    """What was asked for, or why it cannot be."""
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
-    from ballplate.simulator.inputs.settings import hint
-
-    from ..error_maps.length_map import MOST_POINTS, LengthMapSettings
-    from ..uncertainty.tasks import expansion
-
-    try:
-        stated = (
-            None if experiment.target_uncertainty is None else experiment.target_uncertainty.stated
-        )
-        target = stated if options.target is None else parse_length_function(options.target)
-    except QuantityError as error:
-        return f"--target: {error}"
-    if target is None:
-        return (
-            'the file states no target_uncertainty; add it, or give --target, such as "0.5 um +'
-            ' L/1000000"'
-        )
-    d = experiment.dimension
-    grid = options.grid * d if len(options.grid) == 1 else options.grid
-    if len(grid) != d:
-        return (
-            f"--grid has {len(grid)} numbers, but the experiment has {d} dimensions; give one,"
-            f" or {d}"
-        )
-    if math.prod(grid) > MOST_POINTS:
-        return f"a grid of {math.prod(grid)} points is too fine; at most {MOST_POINTS} are possible"
-    probe = options.probe or experiment.evaluation.probe
-    if probe not in experiment.probes:
-        return f'unknown probe "{probe}"; {hint(probe, experiment.probes)}'
-    factor = experiment.coverage_factor
-    expanded = options.coverage_factor or expansion(factor)
-    return LengthMapSettings(grid, probe, target, expanded, options.with_repeatability, factor)
+    return 0 if found.as_expected and not is_missed else NOT_AS_EXPECTED
 
 
 def _of_lines(lines: Iterable[str]) -> Writer:

@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.yamltree import read_text
 
 from ..planning.repair.mending import mended, to_write
 from ..planning.repair.repair_tables import changes_in_words
-from .check_files import CheckedDesign, CheckedFile, Wanted, check_files
+from .check_files import CheckedDesign, CheckedFile, Wanted, advised, check_files
 from .outputs import check_overwritten, write_outputs
 from .telling import note
 
@@ -39,10 +39,10 @@ def with_repairs(
         mark, text = _text(path) if checked.designs else ("", "")
         new = text
         for design in checked.designs:
-            repair = to_write(design.repairs, design.plan.verdict, wanted.nothing_weak)
-            name = f"{path}: {design.plan.label}"
+            repair = to_write(design.repairs, design.prediction.verdict, wanted.nothing_weak)
+            name = f"{path}: {design.prediction.label}"
             if repair is None:
-                if not design.plan.verdict.deficiency:
+                if not design.prediction.verdict.deficiency:
                     told.append(f"{name}: nothing to repair")
                 continue
             try:
@@ -66,7 +66,7 @@ def with_repairs(
     if repaired and not status:
         names = [name for name in repaired if name is not None]
         (again,) = check_files([path], names, replace(wanted, repairs=options.suggest))
-        after = {design.variant: design for design in again.designs}
+        after = {design.variant: advised(design, with_repairs=True) for design in again.designs}
         messages += again.messages
     designs = tuple(
         after.get(one.variant, _as_asked(one, options.suggest)) for one in checked.designs
@@ -76,9 +76,9 @@ def with_repairs(
 
 def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
     """Without suggestions where nothing is undetermined, unless these were asked for."""
-    if with_suggestions or design.plan.verdict.deficiency:
+    if with_suggestions or design.prediction.verdict.deficiency:
         return design
-    return replace(design, repairs=None, certificate=None)
+    return advised(replace(design, repairs=None, certificate=None), with_repairs=True)
 
 
 def _text(path: Path) -> tuple[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,6 @@ from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 from .telling import note
 
 if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment
-
-    from ..planning.schedule import RunSheet
     from ..planning.selection import Campaign
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
@@ -156,38 +152,16 @@ def _sheet(text: str) -> Path:
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
     from ballplate.simulator.computing.processes import processors
-    from ballplate.simulator.experiment.load import load
-    from ballplate.simulator.inputs.messages import ExperimentError, Message
+    from ballplate.simulator.inputs.messages import ExperimentError
 
     from ..planning.campaign import Request, campaign
     from ..planning.constraints import HOUR, Budget
-    from ..planning.done import done_candidates
-    from ..planning.earlier import earlier_choice
-    from ..planning.offer import offer
+    from ..planning.earlier import begun
     from .excerpts import print_errors
     from .progress import progress
 
     experiment = single(options, planning=True)
-    offered = None if experiment.pool is None else offer(experiment.pool)
-    messages: list[Message] = []
-    earlier = None
-    try:
-        if options.done is not None and experiment.pool is not None:
-            taken = done_candidates(options.done, experiment)
-            offered = offer(experiment.pool, taken, standing=not options.moved)
-    except ExperimentError as error:
-        messages += error.messages
-    try:
-        if options.earlier is not None and offered is not None:
-            before = load(options.earlier)
-            if len(before) > 1:
-                text = "the file has several variants; name a design that was chosen"
-                raise ExperimentError([Message(str(options.earlier), 0, 0, "variants", text)])
-            earlier = earlier_choice(before[0], offered)
-    except ExperimentError as error:
-        messages += error.messages
-    if messages:
-        raise ExperimentError(messages)
+    offered, earlier = begun(experiment, options.done, options.moved, options.earlier)
     asked = (options.hours, options.readings, options.positions)
     budget = None
     if any(value is not None for value in asked):
@@ -198,9 +172,8 @@ def run(options: Namespace) -> int:
         found = campaign(
             experiment, request, offered, earlier, options.workers or processors(), shown.show
         )
-    sheet = found.sheet
     try:
-        is_written = _written(found, sheet, options)
+        is_written = _written(found, options)
     except ExperimentError as error:
         # What took so long to find is told nevertheless.
         print_errors(error.messages, options)
@@ -211,47 +184,24 @@ def run(options: Namespace) -> int:
         print_lines(found.lines())
     if not is_written:
         return BAD_FILE
-    is_full = found.plan.verdict.deficiency == found.left_open
+    is_full = found.prediction.verdict.deficiency == found.left_open
     return AS_EXPECTED if found.is_determined and is_full else NOT_AS_EXPECTED
 
 
-def _written(campaign: Campaign, sheet: RunSheet, options: Namespace) -> bool:
+def _written(campaign: Campaign, options: Namespace) -> bool:
     """Write what was asked for; False if something cannot be written."""
     writers: dict[Path, Writer] = {}
     if options.output is not None:
-        from ..planning.experiment_file import experiment_text
-
-        header = (
-            f"Chosen by ballplate plan from {options.files[0].name}: {campaign.criterion}, no more"
-            f" than {campaign.budget}."
-        )
-        deficiency = campaign.left_open or None
-        text = experiment_text(
-            campaign.experiment, sheet.chosen, header, options.output.parent, None, deficiency
-        )
+        text = campaign.to_yaml(options.output.parent)
         writers[options.output] = text_writer(lambda stream: stream.write(text))
     if options.sheet is not None:
-        told = _sheet_text(options.sheet.suffix.lower())(campaign.experiment, sheet)
+        told = campaign.sheet_text(options.sheet.suffix.lower())
         writers[options.sheet] = text_writer(lambda stream: stream.write(told))
     if options.plot is not None:
         # Numbered as on the run sheet.
-        writers[options.plot] = replace(campaign, chosen=sheet.chosen).plot
+        writers[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot
     is_written = write_outputs(writers, options.force)
     for path in (options.output, options.sheet):
         if is_written and path is not None:
             note(options, f"{path} written")
     return is_written
-
-
-def _sheet_text(suffix: str) -> Callable[[Experiment, RunSheet], str]:
-    from ..planning.sheet_forms import sheet_csv, sheet_lines, sheet_markdown, sheet_page
-
-    forms: dict[str, Callable[[Experiment, RunSheet], str]] = {
-        ".html": lambda experiment, sheet: sheet_page(sheet, experiment, experiment.title),
-        ".md": lambda experiment, sheet: sheet_markdown(sheet, experiment.title),
-        ".csv": lambda experiment, sheet: sheet_csv(sheet),
-        ".txt": lambda experiment, sheet: "\n".join(
-            [experiment.title, "", *sheet_lines(sheet), ""]
-        ),
-    }
-    return forms[suffix]

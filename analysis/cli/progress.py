@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
+
     from .bar import Bar
 
 # Seconds between two lines where there is no terminal.
@@ -32,35 +34,31 @@ class ProgressDisplay:
     last: float = 0.0
     bar: Bar | None = None
 
-    def show(self, what: str, done: int, wanted: int, remark: str = "", before: int = 0) -> None:
-        """Report work done of work wanted; the time left does not count what was done `before`."""
-        if what != self.what:
+    def show(self, step: ProgressStep) -> None:
+        """Report how far a step has come; the time left does not count what was done before."""
+        if step.what != self.what:
             self.close()
-            self.what, self.started, self.last = what, time.monotonic(), time.monotonic()
-        self.done, self.wanted = done, wanted
+            self.what, self.started, self.last = step.what, time.monotonic(), time.monotonic()
+        self.done, self.wanted = step.done, step.wanted
         if self.is_quiet or sys.stderr is None:
             return
         if sys.stderr.isatty():
-            self._draw(done, wanted, remark, before)
+            self._draw(step)
         elif time.monotonic() - self.last >= LINE_INTERVAL:
             from .bar import line
 
             self.last = time.monotonic()
-            print(
-                line(what, done, wanted, before, self.last - self.started, remark),
-                file=sys.stderr,
-                flush=True,
-            )
+            print(line(step, self.last - self.started), file=sys.stderr, flush=True)
 
-    def _draw(self, done: int, wanted: int, remark: str, before: int) -> None:
+    def _draw(self, step: ProgressStep) -> None:
         # Loaded only where it is seen.
         from .bar import Bar, width
 
         if self.bar is None:
-            self.bar = Bar(self.what, wanted, before)
-        self.bar.total, self.bar.ncols = wanted, width()
-        self.bar.set_postfix_str(remark, refresh=False)
-        self.bar.update(done - self.bar.n)
+            self.bar = Bar(step.what, step.wanted, step.before)
+        self.bar.total, self.bar.ncols = step.wanted, width()
+        self.bar.set_postfix_str(step.remark, refresh=False)
+        self.bar.update(step.done - self.bar.n)
 
     def step_aside(self) -> None:
         """Take the bar away while something else is printed; the next report brings it back."""

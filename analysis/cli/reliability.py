@@ -8,7 +8,7 @@ import sys
 from argparse import ArgumentTypeError, Namespace
 from functools import partial
 
-from .common import add_file, add_json
+from .common import add_file, add_json, percentage
 from .outputs import add_force, add_output, text_writer, write_outputs
 
 WRONG_USAGE, BAD_FILE = 2, 3
@@ -61,16 +61,17 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _share(text: str) -> float:
-    digits = text.removesuffix("%").strip()
+    from ..gross_errors.power import LEAST_CHANCE, MOST_CHANCE
+
     try:
-        value = float(digits)
-    except ValueError:
+        value = percentage(text)
+    except ArgumentTypeError:
         value = float("nan")
-    if not text.endswith("%") or not 1e-10 <= value <= 99.9999:
+    if not LEAST_CHANCE <= value <= MOST_CHANCE:
         raise ArgumentTypeError(
             f'expected a percentage between 0% and 100%, such as 0.1%, not "{text}"'
         )
-    return value / 100.0
+    return value
 
 
 def run(options: Namespace) -> int:

@@ -4,6 +4,7 @@ printed of them.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 
@@ -76,94 +77,35 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def run(options: Namespace) -> int:
-    """Reproduce a document; 1 if a published figure does not come out within the limits stated."""
-    import sys
-
-    if options.document == "certified":
-        return _certified(options)
-    if options.results:
-        print(
-            "ballplate reproduce: --results goes with certified only; leave it out", file=sys.stderr
-        )
-        return WRONG_USAGE
-
-    from ballplate.designs import shipped
-    from ballplate.simulator.inputs.settings import hint
-
-    from ..reproduction.compare import reproduce
-    from ..reproduction.published import npl
-    from ..reproduction.reproduction_tables import (
-        reproduction_data,
-        reproduction_lines,
-        reproduction_markdown,
-    )
-    from ..reproduction.shipped import Shipped
-    from .common import print_json, print_lines
-    from .progress import progress
-
-    document = npl()
-    known = document.statements.sections
-    for name in options.experiment:
-        if name not in known:
-            print(
-                f'ballplate reproduce: no experiment "{name}"; {hint(name, known)}', file=sys.stderr
-            )
-            return WRONG_USAGE
-    trials = None if options.quick else options.trials
-    with progress(options) as shown:
-        found = reproduce(
-            document,
-            Shipped(options.designs or shipped("npl")),
-            options.experiment,
-            trials,
-            shown.show,
-        )
-    if options.json:
-        print_json([reproduction_data(found)])
-    elif options.markdown:
-        print(reproduction_markdown(found))
-    else:
-        print_lines(reproduction_lines(found))
-    return 0 if found.agrees else 1
-
-
-def _certified(options: Namespace) -> int:
-    """Score answers to certified problems; 1 if a rank or count is wrong, or an answer is
-    missing.
+    """Reproduce a document; 1 if a published figure does not come out within the limits stated, or
+    an answer to a certified problem is wrong or missing.
     """
-    import sys
-
-    from ballplate.designs import shipped
-
-    from ..reproduction.certified_answers import answers
-    from ..reproduction.certified_problems import certified_problems, read_results
-    from ..reproduction.score import all_right, scores
-    from ..reproduction.score_tables import score_data, score_lines
+    from ..reproduction.reproduction_result import ReproducedDocument, reproduce_npl
+    from ..reproduction.score_result import CertifiedScores, score_certified
     from .common import print_json, print_lines
     from .progress import progress
 
-    if options.quick or options.markdown:
-        print(
-            "ballplate reproduce: --quick and --markdown go with npl only; leave them out",
-            file=sys.stderr,
-        )
-        return WRONG_USAGE
-    problems = certified_problems(options.designs or shipped("certified"), options.experiment)
-    if options.results:
-        results = read_results(options.results, problems)
-    else:
-        results = {}
+    is_certified = options.document == "certified"
+    chosen, folder = options.experiment, options.designs
+    found: CertifiedScores | ReproducedDocument
+    try:
+        if is_certified and (options.quick or options.markdown):
+            raise ValueError("--quick and --markdown go with npl only; leave them out")
+        if options.results and not is_certified:
+            raise ValueError("--results goes with certified only; leave it out")
         with progress(options) as shown:
-            for done, problem in enumerate(problems):
-                shown.show("problems", done, len(problems))
-                results[problem.name] = answers(problem)
-    found = [
-        one
-        for problem in problems
-        for one in scores(problem.name, problem.answers, results.get(problem.name))
-    ]
+            if is_certified:
+                found = score_certified(chosen, options.results, folder, shown.show)
+            else:
+                trials = None if options.quick else options.trials
+                found = reproduce_npl(chosen, trials, folder, shown.show)
+    except ValueError as error:
+        print(f"ballplate reproduce: {error}", file=sys.stderr)
+        return WRONG_USAGE
     if options.json:
-        print_json([score_data(found, results)])
+        print_json([found.to_dict()])
+    elif options.markdown:
+        print(found.to_markdown())
     else:
-        print_lines(score_lines(problems, found))
-    return 0 if all_right(found) else 1
+        print_lines(found.lines())
+    return 0 if found.is_right else 1

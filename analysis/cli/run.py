@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .common import add_file, add_json, count, percentage, seed, trial_count
 
 if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
 
     from ..montecarlo.experiments import Trials
@@ -103,18 +104,17 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
     from ballplate.simulator.computing.processes import processors
 
     from ..montecarlo.experiments import trials
-    from ..montecarlo.trials import MOST_TRIALS, MonteCarloProgress
+    from ..montecarlo.trials import MOST_TRIALS
     from .progress import progress
 
     with progress(options) as shown:
 
-        def report(now: MonteCarloProgress) -> None:
+        def report(step: ProgressStep) -> None:
             options.interruption.answer()
             options.interruption.kept = lambda: (
-                f"the figures of the {now.done} data sets done are lost"
+                f"the figures of the {step.done} data sets done are lost"
             )
-            remark = f"accurate to {100 * now.accuracy:.2g} %" if now.accuracy < 1.0 else ""
-            shown.show("data sets", now.done, now.wanted, remark)
+            shown.show(step)
 
         return trials(
             experiment,

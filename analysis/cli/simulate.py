@@ -58,11 +58,10 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Write one set of readings."""
-    from ballplate.simulator.inputs.messages import ExperimentError, Message
     from ballplate.simulator.readings.certificate_files import (
         certified_values,
-        drawn_values,
-        with_values,
+        ensure_certified,
+        with_drawn_values,
         write_certificate,
     )
     from ballplate.simulator.readings.reading_files import write_readings
@@ -71,25 +70,21 @@ def run(options: Namespace) -> int:
     from .common import single
 
     experiment = single(options)
-    if options.certificate and not certified_values(experiment):
-        text = (
-            "there is no certificate, prior or probe offset with an uncertainty; leave"
-            " --certificate out"
-        )
-        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)])
+    if options.certificate:
+        ensure_certified(experiment)
     found = simulated_readings(experiment, options.seed, options.exact)
     texts: dict[Path, Callable[[TextIO], None]] = {
         options.output: lambda stream: write_readings(stream, found.design, found.readings, found.x)
     }
     told = [f"{len(found.readings)} readings written to {options.output}"]
     if options.certificate:
-        values = drawn_values(experiment, found.design, found.truth, found.model, found.generator)
+        drawn = with_drawn_values(experiment, found)
         how = "exact" if options.exact else f"drawn with seed {found.seed}"
         comment = f"certificate values of {experiment.label}, {how}, for fit --certificate"
-        texts[options.certificate] = lambda stream: write_certificate(
-            stream, with_values(experiment, values), comment
+        texts[options.certificate] = lambda stream: write_certificate(stream, drawn, comment)
+        told.append(
+            f"{len(certified_values(drawn))} certificate values written to {options.certificate}"
         )
-        told.append(f"{len(values)} certificate values written to {options.certificate}")
     writers = {path: text_writer(write) for path, write in texts.items() if str(path) != "-"}
     if not write_outputs(writers, options.force):
         return BAD_FILE

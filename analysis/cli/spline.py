@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
-from contextlib import suppress
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .common import add_picture, count, print_json, print_lines
 from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 
 if TYPE_CHECKING:
-    from ballplate.simulator.inputs.messages import ExperimentError
-    from ballplate.simulator.splines.read import Column, CurvePoints
-    from ballplate.simulator.splines.spline_problems import SplineError
-
-    from ..error_maps.error_curve import CurveSettings, Place
+    from ballplate.simulator.splines.read import CurvePoints
 
 WRONG_USAGE, BAD_FILE = 2, 3
-
-
-class OptionError(ValueError):
-    """An option's value cannot be used."""
 
 
 # In one piece: one option after the other, with its help.
@@ -154,10 +144,6 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.set_defaults(run=run)
 
 
-# A polynomial through so many points keeps seven digits; with each further order it loses nearly
-# one.
-MOST_ORDER = 16
-
 POWERS = (
     "polynomials in the distance from the start of each piece (default), or in the abscissa itself"
 )
@@ -165,51 +151,40 @@ POWERS = (
 
 def run(options: Namespace) -> int:
     """Fit, print and draw."""
-    import numpy as np
     from ballplate.simulator.inputs.messages import in_one_line
-    from ballplate.simulator.splines.read import choose_points, read_points
-    from ballplate.simulator.splines.spline_problems import SplineError
 
-    from ..error_maps.curve_tables import coefficients_csv, curve_data, curve_lines
-    from ..error_maps.error_curve import fit_curve
-    from ..report.error_curve_plots import plot, whiskers
+    from ..error_maps.curve_options import Asked, OptionError
+    from ..error_maps.curve_result import error_curve
 
-    everything = read_points(options.file, options.x, options.y)
-    points = everything
-    if options.points is not None:
-        points = everything.chosen(choose_points(everything, options.points, str(options.file)))
+    asked = Asked(**{one.name: getattr(options, one.name) for one in fields(Asked)})
     try:
-        settings = _settings(options, points)
-        uncertainty = (
-            None if options.uncertainty is None else _positive(options.uncertainty, points.y_column)
+        found = error_curve(
+            options.file,
+            options.x,
+            options.y,
+            options.points,
+            asked,
+            options.sigma,
+            options.powers,
+            partial(_check, options),
         )
-        at = _list("--evaluate", options.evaluate, points.x_column) if options.evaluate else []
-        _check(options, points)
     except OptionError as error:
         print(in_one_line(f"ballplate spline: {error}"), file=sys.stderr)
         return WRONG_USAGE
-    try:
-        curve = fit_curve(points, settings, uncertainty, options.sigma)
-        where = np.array(at, dtype=float)
-        curve.fit.values(where)
-        lines = [] if options.json else curve_lines(curve, options.file.name, options.powers, where)
-        writers: dict[Path, Writer] = {}
-        if options.plot is not None:
-            writers[options.plot] = partial(plot, curve)
-        if options.whiskers is not None:
-            writers[options.whiskers] = lambda path: whiskers(
-                curve, everything, path, options.magnification
-            )
-        polynomials = (
-            None if options.coefficients is None else coefficients_csv(curve, options.powers)
+    lines = [] if options.json else found.lines()
+    writers: dict[Path, Writer] = {}
+    if options.plot is not None:
+        writers[options.plot] = found.plot
+    if options.whiskers is not None:
+        writers[options.whiskers] = partial(
+            found.plot_whiskers, magnification=options.magnification
         )
-        if polynomials is not None and str(options.coefficients) != "-":
-            writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
-        is_written = write_outputs(writers, options.force)
-    except SplineError as error:
-        raise _told(error, points.x_column, options.file) from None
+    polynomials = None if options.coefficients is None else found.coefficients()
+    if polynomials is not None and str(options.coefficients) != "-":
+        writers[options.coefficients] = text_writer(lambda stream: stream.write(polynomials))
+    is_written = write_outputs(writers, options.force)
     if options.json:
-        print_json([curve_data(curve, str(options.file), options.powers, where)])
+        print_json([found.to_dict()])
     elif polynomials is not None and str(options.coefficients) == "-":
         sys.stdout.write(polynomials)
     else:
@@ -217,21 +192,13 @@ def run(options: Namespace) -> int:
     return 0 if is_written else BAD_FILE
 
 
-def _told(error: SplineError, column: Column, file: Path) -> ExperimentError:
-    """The problems with places in the unit of the abscissa."""
-    from ballplate.simulator.inputs.messages import ExperimentError, Message
-
-    from ..error_maps.curve_tables import shown
-
-    texts = [problem.told(lambda place: shown(place, column)) for problem in error.problems]
-    return ExperimentError(Message(str(file), 0, 0, "", text) for text in texts)
-
-
 def _check(options: Namespace, points: CurvePoints) -> None:
     """Refuse options that do not go together.
 
     :raises OptionError: there are such.
     """
+    from ..error_maps.curve_options import OptionError
+
     if options.whiskers is not None and points.places is None:
         raise OptionError(
             "--whiskers needs a profile; add the columns nominal_x_mm and nominal_z_mm to the file"
@@ -246,135 +213,3 @@ def _check(options: Namespace, points: CurvePoints) -> None:
         raise OptionError("--magnification is that of --whiskers; add that, or leave it out")
     if options.json and str(options.coefficients) == "-":
         raise OptionError("--json and --coefficients - both go to the screen; name a file for one")
-
-
-def _settings(options: Namespace, points: CurvePoints) -> CurveSettings:
-    """What the options ask for.
-
-    :raises OptionError: a value that is no length, angle or slope.
-    """
-    from ..error_maps.error_curve import EVERY, CurveSettings, Hold
-
-    x, y = points.x_column, points.y_column
-    holds = []
-    for end in ("start", "end"):
-        for derivative, what in enumerate(("value", "slope")):
-            text = getattr(options, f"{end}_{what}")
-            if text is not None:
-                holds.append(
-                    Hold(end, derivative, _value(f"--{end}-{what}", text, derivative, x, y))
-                )
-    for place, what, text in options.at:
-        if what not in ("value", "slope"):
-            raise OptionError(
-                f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0'
-            )
-        derivative = ("value", "slope").index(what)
-        holds.append(
-            Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y))
-        )
-    knots = None
-    if options.knots is not None:
-        knots = (
-            ()
-            if options.knots.strip() == "none"
-            else tuple(sorted(_list("--knots", options.knots, x)))
-        )
-    if not 2 <= options.order <= MOST_ORDER:
-        raise OptionError(f"--order should be 2 to {MOST_ORDER}; 4 is a cubic spline")
-    period = None
-    if options.period is not None:
-        period = _positive(options.period, x, "--period")
-    elif options.periodic:
-        if x.kind == "length":
-            raise OptionError(
-                '--periodic: the abscissa is a length; state the period, as in --period "10 mm"'
-            )
-        period = _positive("360 deg", x)
-    if options.start.strip() == "end" or options.end.strip() == "start":
-        raise OptionError(
-            "the curve starts at its start and ends at its end; give --start and --end other places"
-        )
-    return CurveSettings(
-        order=options.order,
-        every=options.every or EVERY,
-        knots=knots,
-        start=_place("--start", options.start, x),
-        end=_place("--end", options.end, x),
-        boundaries=tuple(_place("--boundary", text, x) for text in options.boundary),
-        straight=tuple(options.straight),
-        holds=tuple(holds),
-        period=period,
-    )
-
-
-def _parser(kind: str) -> Callable[[object], float]:
-    from ballplate.simulator.inputs.quantities import parse_angle, parse_length
-
-    return parse_length if kind == "length" else parse_angle
-
-
-def _quantity(option: str, text: str, kind: str) -> float:
-    from ballplate.simulator.inputs.quantities import QuantityError
-
-    if text.strip() in ("0", "-0", "0.0"):
-        return 0.0
-    try:
-        return _parser(kind)(text)
-    except QuantityError as error:
-        raise OptionError(f"{option}: {error}") from None
-
-
-def _positive(text: str, column: Column, option: str = "--uncertainty") -> float:
-    found = _quantity(option, text, column.kind)
-    if found <= 0:
-        raise OptionError(f'{option}: "{text}" must be above zero')
-    return found
-
-
-def _list(option: str, text: str, column: Column) -> list[float]:
-    return [_quantity(option, part, column.kind) for part in text.split(",")]
-
-
-def _place(option: str, text: str, column: Column) -> Place:
-    plain = text.strip()
-    if plain in ("start", "end"):
-        return "start" if plain == "start" else "end"
-    parts = plain.split(",")
-    if len(parts) > 2 or len(parts) == 2 and column.kind != "length":
-        raise OptionError(
-            f'{option}: "{text}" should be one abscissa, or two nominal co-ordinates on a profile'
-        )
-    if len(parts) == 2:
-        return _quantity(option, parts[0], "length"), _quantity(option, parts[1], "length")
-    return _quantity(option, plain, column.kind)
-
-
-def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> float:
-    """A value of the error, or a slope as a unit of the error over one of the abscissa."""
-    from ballplate.simulator.inputs.quantities import (
-        UNITS,
-        QuantityError,
-        metres_or_radians,
-        parse_ratio,
-    )
-
-    if derivative == 0:
-        return _quantity(option, text, y.kind)
-    plain = text.strip().replace("µ", "u").replace("μ", "u")
-    if plain in ("0", "-0", "0.0"):
-        return 0.0
-    if re.match("[+-]?[0-9]+,[0-9]", plain):
-        raise OptionError(
-            f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
-        )
-    found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
-    units: Any = UNITS
-    with suppress(QuantityError):
-        if found and found[2] in units[y.kind] and found[3] in units[x.kind]:
-            return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
-        if x.kind == y.kind == "length":
-            return parse_ratio(plain)
-    raise OptionError(
-        f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0'
-    )

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from .common import count
 
 if TYPE_CHECKING:
+    from ballplate.simulator.computing.steps import ProgressStep
+
     from ..sweeps.bundle import Bundle
     from ..sweeps.execute import Runner, Summary
     from ..sweeps.model import Sweep
@@ -126,15 +128,9 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     try:
         with progress(options) as shown:
 
-            def report(summary: Summary) -> None:
+            def report(step: ProgressStep) -> None:
                 options.interruption.answer()
-                remark = ", ".join(
-                    ([f"{summary.blocks} blocks of data sets"] if summary.blocks else [])
-                    + ([f"{summary.failed} failed"] if summary.failed else [])
-                )
-                shown.show(
-                    "cells", summary.done + summary.failed, summary.cells, remark, summary.before
-                )
+                shown.show(step)
 
             runner = _runner(sweep, bundle, options)
             summary = compute_sweep(
@@ -169,7 +165,7 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
 def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
     from ballplate.simulator.inputs.messages import in_one_line
 
-    from ..sweeps.store import results
+    from ..sweeps.running import shortcomings
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     left = f", {summary.left} left" if summary.left else ""
@@ -179,25 +175,8 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
         f" failed{before}{left}"
     )
     print(in_one_line(told))
-    found = results(store, number, summary.cells)
-    versions = set(zip(*found.versions.values(), strict=True))
-    if len(versions) > 1:
-        text = (
-            f"{store.path}: the rows were computed with {len(versions)} different sets of versions"
-        )
-        print(in_one_line(text), file=sys.stderr)
-    if summary.failed:
-        reasons: dict[str, list[int]] = {}
-        for cell, status, reason in zip(
-            found.cells.tolist(), found.statuses, found.reasons, strict=True
-        ):
-            if status == "failed":
-                reasons.setdefault(reason, []).append(cell)
-        for reason, cells in list(reasons.items())[:10]:
-            more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
-            print(f"cell {cells[0]}{more} failed: {reason}", file=sys.stderr)
-        if len(reasons) > 10:
-            print(f"and {len(reasons) - 10} reasons more; see ballplate export", file=sys.stderr)
+    for text in shortcomings(store, number, summary.cells):
+        print(text, file=sys.stderr)
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:

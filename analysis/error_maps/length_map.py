@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from math import comb
+from collections.abc import Iterator, Sequence
+from math import comb, prod
 
 import numpy as np
 from ballplate.simulator.computing.rounding import above, comparable
-from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.quantities import LengthFunction
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
+from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 
 from ..uncertainty.pairs import PairTile, pair_tiles
+from ..uncertainty.tasks import expansion
+from .length_groups import LengthGroups, LengthMapSettings
+from .length_tables import LengthMap, csv_line
 
 # Points of a grid: twelve million lengths.
 MOST_POINTS = 5000
@@ -31,80 +35,50 @@ PARALLEL = 1e-6
 NAMED = 3
 
 
-@dataclass(frozen=True)
-class LengthMapSettings:
-    """What lengths are looked at: `grid` points along each axis, with a probe, and how they are
-    compared.
+def length_settings(
+    experiment: Experiment,
+    target: str | None = None,
+    grid: Sequence[int] = (6,),
+    probe: str | None = None,
+    coverage_factor: float | None = None,
+    with_repeatability: bool = False,
+) -> LengthMapSettings:
+    """What is asked for, and where it is not what the file says; `grid` has one number of points,
+    or one for each axis.
 
-    `with_repeatability`: whether the scatter of the two readings along the length adds to its
-    uncertainty. The `target` is meant for `target_factor` times the standard uncertainty.
+    :raises ValueError: a target, grid, probe or coverage factor that the experiment cannot have.
     """
-
-    grid: tuple[int, ...]
-    probe: str
-    target: LengthFunction
-    coverage_factor: float = 2.0
-    with_repeatability: bool = False
-    target_factor: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class LengthGroups:
-    """Lengths in g groups; all arrays (g,), uncertainties in metres, NaN where no length is
-    determined.
-
-    `count` of them there are, `undetermined` of these are open; `average` and `maximum` are
-    standard uncertainties, `average_ratio` and `maximum_ratio` those to the target; `within` and
-    `within_expanded` count the lengths whose standard and expanded uncertainties are no larger than
-    the target, `within_target` those with the uncertainty that the target is meant for.
-    """
-
-    count: Integers
-    undetermined: Integers
-    average: Array
-    maximum: Array
-    average_ratio: Array
-    maximum_ratio: Array
-    within: Integers
-    within_expanded: Integers
-    within_target: Integers
-
-    def share(self, expanded: bool = False) -> Array:
-        """Shares of lengths within the target (g,), undetermined ones counted as not; NaN of an
-        empty group.
-        """
-        within = self.within_expanded if expanded else self.within
-        return np.asarray(np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan))
-
-
-@dataclass(frozen=True, eq=False)
-class LengthMap:
-    """Lengths between all points of a grid, grouped.
-
-    `points` (n, d) are scale readings, metres, the last axis changing fastest. `by_point` has a
-    group for each point, of the lengths that start or end there; `by_length` those between
-    neighbouring `edges` (c + 1,); `by_direction` those of `directions`; `whole` a single one.
-    `worst` are the indices of the length with the largest ratio, and `open_pairs` (up to three, 2)
-    of some that are undetermined.
-    """
-
-    design: Design
-    deficiency: int
-    settings: LengthMapSettings
-    points: Array
-    edges: Array
-    directions: tuple[str, ...]
-    by_point: LengthGroups
-    by_length: LengthGroups
-    by_direction: LengthGroups
-    whole: LengthGroups
-    worst: tuple[int, int] | None
-    open_pairs: tuple[tuple[int, int], ...]
-
-    @property
-    def is_met(self) -> bool:
-        """Whether all lengths are within the target, by the uncertainty that it is meant for."""
-        return bool(self.whole.within_target[0] == self.whole.count[0])
+    try:
+        stated = (
+            None if experiment.target_uncertainty is None else experiment.target_uncertainty.stated
+        )
+        chosen = stated if target is None else parse_length_function(target)
+    except QuantityError as error:
+        raise ValueError(f"target: {error}") from None
+    if chosen is None:
+        raise ValueError(
+            'the file states no target_uncertainty; add it, or give a target, such as "0.5 um +'
+            ' L/1000000"'
+        )
+    d = experiment.dimension
+    counts = tuple(grid) * d if len(grid) == 1 else tuple(grid)
+    if len(counts) != d:
+        raise ValueError(
+            f"the grid has {len(counts)} numbers, but the experiment has {d} dimensions; give one,"
+            f" or {d}"
+        )
+    if min(counts) < 2:
+        raise ValueError(f"the grid has {min(counts)} points along an axis; give 2 at least")
+    if prod(counts) > MOST_POINTS:
+        raise ValueError(
+            f"a grid of {prod(counts)} points is too fine; at most {MOST_POINTS} are possible"
+        )
+    used = probe or experiment.evaluation.probe
+    if used not in experiment.probes:
+        raise ValueError(f'unknown probe "{used}"; {hint(used, experiment.probes)}')
+    factor = experiment.coverage_factor
+    expanded = coverage_factor or expansion(factor)
+    return LengthMapSettings(counts, used, chosen, expanded, with_repeatability, factor)
 
 
 @single_threaded
@@ -126,7 +100,7 @@ def length_map(
     worst, largest = None, -1.0
     named: list[tuple[int, int]] = []
     done, count = 0, comb(len(points), 2)
-    report("lengths", done, count)
+    report(ProgressStep("lengths", done, count))
     for tile in tiles:
         target = settings.target.at(tile.lengths)
         ratio = np.where(tile.is_open, np.nan, tile.uncertainties / target)
@@ -146,10 +120,13 @@ def length_map(
         for k in np.flatnonzero(tile.is_open)[: NAMED - len(named)]:
             named.append((int(tile.first[k]), int(tile.second[k])))
         done += len(tile.lengths)
-        report("lengths", done, count)
+        report(ProgressStep("lengths", done, count))
     return LengthMap(
+        experiment.label,
+        experiment.title,
         design,
         deficiency,
+        experiment.expected_rank_deficiency,
         settings,
         points,
         edges,
@@ -171,6 +148,20 @@ def length_pairs(
     design = lay_out(experiment)
     points = grid_points(design, settings.grid)
     return points, list(_tiles(design, points, settings)[1])
+
+
+def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
+    """A line for each length; what is undetermined is left empty."""
+    points, tiles = length_pairs(experiment, settings)
+    axes = AXIS_NAMES[: points.shape[1]]
+    heads = [f"{axis}{end}_mm" for end in (1, 2) for axis in axes]
+    yield ",".join([*heads, "length_mm,u_um,expanded_um,target_um"])
+    for tile in tiles:
+        u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
+        target = 1e6 * settings.target.at(tile.lengths)
+        columns = [1e3 * points[tile.first], 1e3 * points[tile.second], 1e3 * tile.lengths, u]
+        for row in np.column_stack([*columns, settings.coverage_factor * u, target]).tolist():
+            yield csv_line(row)
 
 
 def _tiles(

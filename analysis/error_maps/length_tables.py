@@ -2,35 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.quantities import LengthFunction, format_length
 from ballplate.simulator.machines.protocol import Array
 
 from ..presentation.formatting import aligned, finite, number, percent, uncertainty_words
-from .length_map import LengthGroups, LengthMap, LengthMapSettings, length_pairs
+from ..presentation.result import Result
+from .length_groups import GroupedLengths, LengthGroups, target_words
+from .length_plots import draw_lengths
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 AXES = "xyz"
+# What of a group says of which lengths it is.
+HEADS = ("from", "to", "direction", "point")
 POINT_COLUMNS = (
     "lengths,undetermined,u_average_um,u_maximum_um,ratio_average,ratio_maximum,share_within,"
     "share_expanded_within"
 )
 
 
-def target_words(target: LengthFunction) -> str:
-    """The target as it is written in a file.
+@dataclass(frozen=True, eq=False, repr=False)
+class LengthMap(GroupedLengths, Result):
+    """Grouped lengths that show themselves."""
 
-    >>> target_words(LengthFunction(5e-7, 1e-6))
-    '0.5 um + L/1000000'
-    """
-    return format_length(target.constant) + (f" + L/{1 / target.slope:.9g}" if target.slope else "")
+    @property
+    def as_expected(self) -> bool:
+        """Whether the rank is the one that the file expects."""
+        return self.deficiency == (self.expected or 0)
+
+    def headline(self) -> str:
+        factor = self.settings.target_factor
+        u = "u" if factor == 1.0 else f"{factor:g} u"
+        share = float(self.whole.within_target[0] / self.whole.count[0])
+        return f"{u} within {target_words(self.settings.target)} for {percent(share)} of lengths"
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each class of length, direction and point of the grid, lengths in metres."""
+        data = self.to_dict()
+        rows = []
+        for group, name in (
+            ("by_length", lambda one: f"{1e3 * one['from']:g} to {1e3 * one['to']:g} mm"),
+            ("by_direction", lambda one: one["direction"]),
+            ("by_point", lambda one: _place(one["point"])),
+        ):
+            for one in data[group]:
+                kept = {k.replace("_", " "): v for k, v in one.items() if k not in HEADS}
+                rows.append({"group": group.replace("_", " "), "of": name(one), **kept})
+        return rows
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The largest ratio of u to the target at each point, and u over the length.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
+        return draw_lengths(self, path)
 
 
-def length_lines(title: str, lengths: LengthMap) -> list[str]:
+def _lines(lengths: LengthMap) -> list[str]:
     """The share of lengths that meet the target, and where, how long and in which direction they
     are.
     """
@@ -40,7 +84,7 @@ def length_lines(title: str, lengths: LengthMap) -> list[str]:
     scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
     count, n = int(whole.count[0]), len(lengths.points)
     lines = [
-        title,
+        f"{lengths.label}: {lengths.title}",
         (
             f"{rank}{count} lengths between {n} points of a grid, with the probe"
             f" {settings.probe}{scatter}"
@@ -96,7 +140,7 @@ def _share(groups: LengthGroups, expanded: bool) -> str:
     return f"{share} of" if expanded else share
 
 
-def _place(point: Array) -> str:
+def _place(point: Iterable[float]) -> str:
     return f"({', '.join(f'{1e3 * v + 0.0:.6g}' for v in point)}) mm"
 
 
@@ -192,39 +236,21 @@ def point_csv(lengths: LengthMap) -> Iterator[str]:
     ]
     columns += [groups.average_ratio, groups.maximum_ratio, groups.share(), groups.share(True)]
     for row in np.column_stack(columns).tolist():
-        yield _csv(row)
+        yield csv_line(row)
 
 
-def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
-    """A line for each length; what is undetermined is left empty."""
-    points, tiles = length_pairs(experiment, settings)
-    axes = AXES[: points.shape[1]]
-    yield ",".join(
-        [
-            *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
-            "length_mm,u_um,expanded_um,target_um",
-        ]
-    )
-    for tile in tiles:
-        u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
-        target = 1e6 * settings.target.at(tile.lengths)
-        columns = [1e3 * points[tile.first], 1e3 * points[tile.second], 1e3 * tile.lengths, u]
-        for row in np.column_stack([*columns, settings.coverage_factor * u, target]).tolist():
-            yield _csv(row)
-
-
-def _csv(row: list[float]) -> str:
+def csv_line(row: list[float]) -> str:
     return ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
 
 
-def length_data(label: str, title: str, lengths: LengthMap) -> dict[str, Any]:
+def _data(lengths: LengthMap) -> dict[str, Any]:
     """The same as plain data in metres; what is undetermined is None."""
     settings = lengths.settings
     edges = lengths.edges.tolist()
     classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
     return {
-        "experiment": label,
-        "title": title,
+        "experiment": lengths.label,
+        "title": lengths.title,
         "rank_deficiency": lengths.deficiency,
         "grid": list(settings.grid),
         "probe": settings.probe,

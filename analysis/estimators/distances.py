@@ -4,11 +4,12 @@ comparison as in section 6.2.7.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.alternative_estimators import (
@@ -36,7 +37,8 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe
 
 from ..presentation.formatting import SHOWN, aligned, number
-from ..results.estimates import ParameterEstimate
+from ..presentation.result import FitResult, Result
+from ..results.estimates import ParameterEstimate, estimate_rows
 from .length_fits import has_all_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -53,28 +55,59 @@ MOST_POINTS = 100_000
 COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 
-@dataclass(frozen=True)
-class AlternativeFit:
+@dataclass(frozen=True, repr=False)
+class AlternativeFit(FitResult):
     """Estimates of the machine's parameters by an alternative estimator from `pairs` pairs of
     balls, without uncertainties.
     """
 
     label: str
     title: str
+    observed: ObservedReadings
     solution: AlternativeSolution
     pairs: int
-    lengths: int
     estimates: tuple[ParameterEstimate, ...]
 
+    @property
+    def lengths(self) -> int:
+        """Number of lengths of standards that it uses."""
+        return len(self.observed.design.lengths)
 
-@dataclass(frozen=True)
-class EstimatorComparison:
+    @property
+    def converged(self) -> bool:
+        return self.solution.status == "converged"
+
+    @property
+    def complaint(self) -> str:
+        if not self.converged:
+            return f"the estimate has {self.solution.status}; see the record of iterations"
+        count = self.solution.deficiency
+        return f"rank deficiency {count}: what is undetermined is left out" if count else ""
+
+    def headline(self) -> str:
+        count = self.solution.deficiency
+        rank = f"rank deficiency {count}" if count else "full rank"
+        return f"{self.solution.estimator}, {self.solution.status}, {rank}"
+
+    def lines(self) -> list[str]:
+        return _fit_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _fit_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each of the machine's parameters."""
+        return estimate_rows(self.estimates)
+
+
+@dataclass(frozen=True, repr=False)
+class EstimatorComparison(Result):
     """How far an alternative estimator's corrected distances are from the full estimator's, over
     `trials` synthetic data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
-    the other data sets, from 0.
+    the other data sets, from 0. `published` values, by "rms" and "maximum", are placed among them.
     """
 
     label: str
@@ -88,6 +121,29 @@ class EstimatorComparison:
     rms: Array
     maximum: Array
     failed: tuple[int, ...]
+    published: Mapping[str, float | None] = field(default_factory=dict)
+
+    def headline(self) -> str:
+        median = f"{1e6 * float(np.median(self.rms)):.3g} um" if len(self.rms) else "unknown"
+        failed = f", {len(self.failed)} not converged" if self.failed else ""
+        return (
+            f"{self.estimator}, {self.trials} data sets, median of the differences {median}{failed}"
+        )
+
+    def lines(self) -> list[str]:
+        return _comparison_lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _comparison_data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each data set on which both estimators converged."""
+        kept = [k for k in range(self.trials) if k not in self.failed]
+        columns = zip(kept, self.rms.tolist(), self.maximum.tolist(), strict=True)
+        return [
+            {"data set": k, "root mean square": rms, "maximum": maximum, "unit": "m"}
+            for k, rms, maximum in columns
+        ]
 
 
 def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
@@ -236,7 +292,7 @@ def fit_alternative(
         for name, value, unit in zip(names, values, units, strict=True)
     )
     return AlternativeFit(
-        experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates
+        experiment.label, experiment.title, observed, solution, len(chosen), estimates
     )
 
 
@@ -248,6 +304,7 @@ def compare_estimators(
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
+    published: Mapping[str, float | None] | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
     """Compare an alternative with the full estimator on readings of the file's true machine.
@@ -289,7 +346,7 @@ def compare_estimators(
             difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
-        report(f"data sets of {experiment.label}", trial + 1, trials)
+        report(ProgressStep(f"data sets of {experiment.label}", trial + 1, trials))
     return EstimatorComparison(
         experiment.label,
         experiment.title,
@@ -302,6 +359,7 @@ def compare_estimators(
         np.array(rms),
         np.array(maximum),
         tuple(failed),
+        published or {},
     )
 
 
@@ -356,7 +414,7 @@ def share_below(values: Array, published: float) -> float:
     return float((values < published).mean()) if len(values) else float("nan")
 
 
-def alternative_fit_lines(fit: AlternativeFit) -> list[str]:
+def _fit_lines(fit: AlternativeFit) -> list[str]:
     """An alternative estimator's fit as lines of text: iterations and the machine's parameters."""
     record = fit.solution.iterations
     rank = f"rank deficiency {fit.solution.deficiency}" if fit.solution.deficiency else "full rank"
@@ -392,7 +450,7 @@ def _used(pairs: int, lengths: int) -> str:
     return " and ".join([*words, *([f"{lengths} lengths of standards"] if lengths else [])])
 
 
-def alternative_fit_data(fit: AlternativeFit) -> dict[str, Any]:
+def _fit_data(fit: AlternativeFit) -> dict[str, Any]:
     """An alternative estimator's fit as plain data in metres and radians; what is undetermined is
     None.
     """
@@ -412,15 +470,13 @@ def alternative_fit_data(fit: AlternativeFit) -> dict[str, Any]:
             e.name: {"value": None if np.isnan(e.value) else e.value, "unit": e.unit}
             for e in fit.estimates
         },
+        **fit.said(),
     }
 
 
-def comparison_lines(
-    comparison: EstimatorComparison, published: dict[str, float | None]
-) -> list[str]:
-    """A comparison as lines of text: quantiles, and where published values (by "rms", "maximum")
-    stand in them.
-    """
+def _comparison_lines(comparison: EstimatorComparison) -> list[str]:
+    """A comparison as lines of text: quantiles, and where published values stand in them."""
+    published = comparison.published
     across = ", across probes" if comparison.across_probes else ""
     used = _used(comparison.pairs, comparison.lengths)
     lines = [
@@ -464,9 +520,7 @@ def comparison_lines(
     return lines + aligned(rows, [False] + [True] * (len(rows[0]) - 1))
 
 
-def comparison_data(
-    comparison: EstimatorComparison, published: dict[str, float | None]
-) -> dict[str, Any]:
+def _comparison_data(comparison: EstimatorComparison) -> dict[str, Any]:
     """A comparison as plain data in metres."""
     data: dict[str, Any] = {
         "experiment": comparison.label,
@@ -487,7 +541,7 @@ def comparison_data(
             },
             "values": [float(value) for value in values],
         }
-        value = published.get(key)
+        value = comparison.published.get(key)
         if value is not None:
             data[key] |= {"published": value, "share_below_published": share_below(values, value)}
     return data

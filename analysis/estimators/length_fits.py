@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
@@ -25,31 +25,82 @@ from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
 from ..presentation.formatting import aligned, finite, number
+from ..presentation.result import FitResult
+from ..rank.verdict import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
 from ..results.parts import adjustment_data, adjustment_lines
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 
 
-@dataclass(frozen=True)
-class LengthFit:
+@dataclass(frozen=True, repr=False)
+class LengthFit(FitResult):
     """Length equations solved for an experiment's readings; `pivots` have the names of the gauges'
     positions.
 
     `factors`, `pivots` and `lengths` are NaN where they are open. `spheres` are the radii of
     spheres through each position's readings of a gauge, a length in scale readings that is told
-    even where no length is known. `remarks` tell what should be known beside the figures.
+    even where no length is known. `reservations` tell what should be known beside the figures, and
+    `expected` is the rank deficiency that the file expects.
     """
 
     label: str
     title: str
+    observed: ObservedReadings
+    expected: int | None
     solution: LengthSolution
     adjustments: tuple[Adjustment, ...]
     factors: tuple[float, ...]
     pivots: tuple[tuple[str, tuple[float, float, float]], ...]
     lengths: tuple[tuple[str, float], ...]
-    remarks: tuple[str, ...]
+    reservations: tuple[str, ...]
     spheres: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        return self.solution.converged
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        return self.reservations
+
+    @property
+    def complaint(self) -> str:
+        deficiency = self.solution.deficiency
+        if not self.converged:
+            return (
+                "the estimate has not converged; look for wrong units, balls or positions among the"
+                " readings"
+            )
+        if has_all_errors(self.observed.design) and deficiency != (self.expected or 0):
+            return rank_complaint(deficiency, self.expected)
+        return ""
+
+    def headline(self) -> str:
+        count = self.solution.deficiency
+        rank = f"rank deficiency {count}" if count else "full rank"
+        status = "converged" if self.converged else "not converged"
+        return f"{self.solution.estimator}, {status}, {rank}"
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each adjustment of the machine."""
+        return [
+            {
+                "adjustment": one.what,
+                "value": one.value,
+                "standard uncertainty": one.standard_uncertainty,
+                "expanded uncertainty": one.expanded_uncertainty,
+                "unit": one.unit,
+                "to do": one.words,
+            }
+            for one in self.adjustments
+        ]
 
 
 def has_all_errors(design: Design) -> bool:
@@ -58,9 +109,13 @@ def has_all_errors(design: Design) -> bool:
 
 
 def fit_lengths(
-    experiment: Experiment, observed: ObservedReadings, estimator: LengthEstimator
+    experiment: Experiment,
+    observed: ObservedReadings,
+    estimator: LengthEstimator,
+    sigma: Literal["estimated", "given"] | None = None,
 ) -> LengthFit:
-    """Solve the length equations of an experiment's readings.
+    """Solve the length equations of an experiment's readings; a `sigma` that is asked for is told
+    to have no effect.
 
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
     """
@@ -75,12 +130,18 @@ def fit_lengths(
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)]) from None
     remarks = _remarks(design, estimator, solution)
+    if sigma is not None:
+        remarks.append(
+            "--sigma has no effect: uncertainties come from the scatter about the equations"
+        )
     factors = np.where(solution.open_factors, np.nan, solution.factors)
     centres = np.where(solution.open_centres, np.nan, solution.centres)
     lengths = np.where(solution.open_lengths, np.nan, solution.lengths)
     return LengthFit(
         experiment.label,
         experiment.title,
+        observed,
+        experiment.expected_rank_deficiency,
         solution,
         adjustments(
             solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
@@ -165,7 +226,7 @@ def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
             yield design.positions.names[k], fit_sphere(points, design.positions.origins[k])[1]
 
 
-def length_fit_lines(fit: LengthFit) -> list[str]:
+def _lines(fit: LengthFit) -> list[str]:
     """Solved length equations as lines of text."""
     found = fit.solution
     rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
@@ -202,7 +263,7 @@ def _millimetres(value: float, decimals: int) -> str:
     return "-" if np.isnan(value) else f"{1e3 * value:.{decimals}f}"
 
 
-def length_fit_data(fit: LengthFit) -> dict[str, Any]:
+def _data(fit: LengthFit) -> dict[str, Any]:
     """Solved length equations as plain data in metres and radians; what is open is None."""
     found = fit.solution
     return {
@@ -218,5 +279,5 @@ def length_fit_data(fit: LengthFit) -> dict[str, Any]:
         "pivots": {name: [finite(value) for value in centre] for name, centre in fit.pivots},
         "spheres": dict(fit.spheres),
         "lengths": {name: finite(value) for name, value in fit.lengths},
-        "remarks": list(fit.remarks),
+        **fit.said(),
     }

@@ -9,13 +9,12 @@ standard uncertainties.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.estimation.reversal import (
     Reversal,
@@ -24,7 +23,7 @@ from ballplate.simulator.estimation.reversal import (
     turn_between,
 )
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
+from ballplate.simulator.geometry.axes import in_plate_axes
 from ballplate.simulator.geometry.motions import rotation_from_vector, vector_from_rotation
 from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps
 from ballplate.simulator.inputs.settings import listing
@@ -34,118 +33,13 @@ from ballplate.simulator.machines.settings import MetricSettings, build_error_mo
 from ballplate.simulator.readings.reading_files import ObservedReadings
 from numpy.typing import NDArray
 
-from ..presentation.formatting import number
-from ..presentation.vectors import Vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fit import Fit
 from ..results.plates import axes_of_plates
 from ..results.study import fit
-
-# The first-order equations may change a result by this many of its standard uncertainties before a
-# warning is due.
-NOTICEABLE = 0.5
-# With more than this many they are of no use.
-USELESS = 5.0
-
-# Chance that offsets are missed although there are none.
-ERRS = 1e-3
+from .reversal_result import ReversalFit
 
 INSTEAD = "or fit without --estimator, which takes any positions"
-
-
-@dataclass(frozen=True, eq=False)
-class ReversalFit:
-    """Both estimates of the same readings.
-
-    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
-    first; `places` (n, 2) are the readings in the first. `names` and `coordinates` (n, 2) are the
-    balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple redundancy
-    with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless
-    `scale` is "none") and offsets as the reversal defines them, with standard uncertainties.
-    `without_offsets` is the chance of a ratio of sums of squares such as found if there were none;
-    NaN where they are parameters.
-    """
-
-    label: str
-    title: str
-    scale: Scale
-    offsets: bool
-    first: str
-    second: str
-    places: Array
-    found: Reversal
-    estimates: tuple[ParameterEstimate, ...]
-    axes: PlateAxes
-    names: tuple[str, ...]
-    coordinates: Array
-    full: Fit
-    redundant: tuple[ParameterEstimate, ...]
-    without_offsets: float
-
-    @property
-    def turn(self) -> float:
-        """The turn in radians that multiple redundancy finds, or the reversal where that finds
-        none.
-        """
-        betas = [
-            one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)
-        ]
-        return np.pi / 2.0 + (betas[0] if betas else self.found.exact_beta)
-
-    @property
-    def distortion(self) -> float:
-        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's
-        own axes.
-        """
-        exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
-        return float(np.abs(self.coordinates - exact).max())
-
-    def residual_vectors(self) -> tuple[Vectors, ...]:
-        """Readings in the first position less what those in the second predict."""
-        label = f"{self.first}, less what {self.second} predicts"
-        return (Vectors(label, self.places, self.found.residuals, self.names),)
-
-    @property
-    def complaint(self) -> str:
-        """Why the results are of no use; empty where they are of some."""
-        return self._neglected() if self.found.bias > USELESS else ""
-
-    def _neglected(self) -> str:
-        """What the first-order equations change by what they neglect."""
-        away = np.degrees(abs(self.turn - np.pi / 2.0))
-        told = f"{away:.4g} degrees" if away >= 1.0 else f"{3600.0 * away:.3g} arcsec"
-        offset = float(np.abs(self.found.offset - self.found.exact_offset).max())
-        shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
-        return (
-            f"the turn is {told} from 90 degrees, too far for equations of the first order: what"
-            " they neglect changes co-ordinates of balls by up to"
-            f" {_length(self.distortion)}{shift}, and results by up to {number(self.found.bias, 2)}"
-            " of their standard uncertainties; turn the plate closer to 90 degrees, or take the"
-            " results of multiple redundancy"
-        )
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user of the result has to know."""
-        told = []
-        if NOTICEABLE < self.found.bias <= USELESS:
-            told.append(self._neglected())
-        if self.without_offsets < ERRS:
-            told.append(
-                "the residuals are those of an offset between the positions; fit without"
-                " --no-offsets"
-            )
-        if self.full.converged and self.full.too_large:
-            told.append(
-                "the residuals are larger than the stated repeatability explains; standard"
-                " uncertainties of multiple "
-                + (
-                    "redundancy are scaled by them"
-                    if self.full.sigma_is_estimated
-                    else "redundancy are too small"
-                )
-            )
-        return tuple(told)
 
 
 @single_threaded
@@ -212,10 +106,6 @@ PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
     ("offset x", "m"),
     ("offset y", "m"),
 )
-
-
-def _length(value: float) -> str:
-    return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} um"
 
 
 def _message(experiment: Experiment, steps: Steps, text: str) -> Message:
@@ -347,7 +237,7 @@ def _redundant(design: Design, full: Fit, k: int, m: int) -> tuple[ParameterEsti
     """Alpha, beta, gamma and offsets of the full estimate, the second position `m` seen from the
     first, `k`.
     """
-    at = linearised_fit(design, full.solution)
+    at = full.functions.at
     layout, state = at.layout, at.state
     own = np.eye(len(layout))
     # Exact derivatives, as imaginary steps leave the real part alone.

@@ -13,6 +13,9 @@ POINTS = 20001
 # Non-centralities beyond this are none of a test that anybody makes.
 LARGEST = 1e4
 
+# Chances of a test that can be told from never and always.
+LEAST_CHANCE, MOST_CHANCE = 1e-12, 0.999999
+
 
 def alarm_limit(false_alarm: float, freedom: float = math.inf) -> float:
     """What a statistic exceeds in absolute value with the probability `false_alarm` if there is no

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
@@ -93,7 +93,7 @@ def reliability_of(
     }
     done = 0
     for one in responses(at, None, given):
-        report("observations", done, len(places))
+        report(ProgressStep("observations", done, len(places)))
         done += len(one.rows)
         redundancy[one.rows] = 1.0 - one.hat
         information[one.index] = one.information

@@ -7,7 +7,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, TextIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 from ballplate.simulator.computing.rounding import comparable
@@ -18,12 +19,16 @@ from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from ..presentation.formatting import SHOWN, aligned, finite, number
+from ..presentation.panels import RowOfPoints, draw_rows
 from ..presentation.result import Result
 from ..rank.proposed_bars import listed
 from ..uncertainty.quantities import QUANTITIES
 from .effects import LENGTHS, MOST_PLACES, SYMBOLS
 from .names import name
 from .patterns import SINGLE, Kind, Patterns
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # An effect below this share of the bias, in metres per unit, counts as none.
 NO_EFFECT = 1e-6
@@ -117,6 +122,37 @@ class Reliability(Result):
             names = ("name", "kind", "redundancy", "minimal_detectable", "found_by_fit", "unit")
             rows.append({name.replace("_", " "): one.get(name) for name in names} | changes)
         return rows
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The smallest biases of readings that a test finds, and what those just too small for it
+        change in U6, by position.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else, or there are no readings of plates.
+        """
+        readings = self.patterns.of_kind("reading")
+        if not len(readings):
+            raise ValueError("no readings of plates are judged, so that there is nothing to draw")
+        design = self.design
+        position = design.readings.position[self.patterns.subject[readings]]
+        panels = [
+            (
+                name,
+                [
+                    RowOfPoints(design.positions.names[k], own[np.isfinite(own)])
+                    for k in np.unique(position)
+                    for own in [1e6 * values[readings[position == k]]]
+                ],
+            )
+            for name, values in (
+                ("minimal detectable bias of a reading, um", self.minimal_detectable),
+                ("what it changes in U6 at most, um", _effect(self, "U6")),
+            )
+        ]
+        words = f"{self.title}: minimal detectable biases of readings, and their effects on U6"
+        return draw_rows(panels, words, path)
 
     @property
     def found_by_fit(self) -> Array:

@@ -4,7 +4,6 @@ optimistic?
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -17,6 +16,7 @@ from ballplate.montecarlo.reference import (
     Truth,
     reference,
 )
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.design.observations import Priors
@@ -30,7 +30,7 @@ from ballplate.simulator.readings.generate import NoReadingError, on_true_machin
 from .accumulator import Accumulator
 from .figures import MonteCarloOutcome, outcome, power_of_difference, power_of_misfit
 from .targets import targets
-from .trials import TASK, MonteCarloProgress, run_trials, sum_of_task
+from .trials import TASK, run_trials, sum_of_task
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def trials(
     seed: int | None = None,
     until: float | None = None,
     workers: int = 1,
-    report: Callable[[MonteCarloProgress], None] = lambda progress: None,
+    report: Report = unreported,
 ) -> Trials:
     """Estimate replicates of an experiment's true machine; see `run_trials`.
 

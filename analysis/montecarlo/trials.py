@@ -4,13 +4,14 @@ order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from ballplate.montecarlo.reference import Reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 
 from .accumulator import Accumulator, accumulate
@@ -25,24 +26,13 @@ TASK = BATCH * BATCHES
 MOST_TRIALS = 1_000_000
 
 
-@dataclass(frozen=True)
-class MonteCarloProgress:
-    """How far a run has come: replicates done of those wanted, and how accurate it is, relative to
-    what is measured.
-    """
-
-    done: int
-    wanted: int
-    accuracy: float
-
-
 def run_trials(
     shared: Reference,
     seed: int,
     trials: int,
     until: float | None = None,
     workers: int = 1,
-    report: Callable[[MonteCarloProgress], None] = lambda progress: None,
+    report: Report = unreported,
 ) -> MonteCarloOutcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
@@ -66,7 +56,8 @@ def run_trials(
                 if until is None
                 else min(trials, int(count * max(accuracy / until, 1.0) ** 2))
             )
-            report(MonteCarloProgress(count, enough, accuracy))
+            remark = f"accurate to {100 * accuracy:.2g} %" if accuracy < 1.0 else ""
+            report(ProgressStep("data sets", count, enough, remark))
             if until is not None and accuracy <= until:
                 break
     except KeyboardInterrupt:

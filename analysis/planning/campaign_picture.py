@@ -95,7 +95,7 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
         axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
         axes.set_axis_off()
         axes.set_aspect("equal")
-        draw_scene(axes, scene(selection.plan.design), by_number=True)
+        draw_scene(axes, scene(selection.prediction.design), by_number=True)
         return save(figure, path, words(selection))
 
 
@@ -336,7 +336,7 @@ def _rows(selection: Selection) -> list[_Row]:
     """The chosen ones with their numbers in the drawing, those first that gain most, then the best
     of the others.
     """
-    numbers = {name: k + 1 for k, name in enumerate(selection.plan.design.positions.names)}
+    numbers = {name: k + 1 for k, name in enumerate(selection.prediction.design.positions.names)}
     rows = [_row(gain, numbers.get(gain.candidate.name)) for gain in selection.gains[:MOST_CHOSEN]]
     if len(selection.gains) > MOST_CHOSEN:
         rows.append(

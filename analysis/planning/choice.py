@@ -52,7 +52,7 @@ class Selection:
     is infinite where the selection leaves something undetermined; `bound` is what no selection can
     do better than, NaN where there is none. `drawn` is the criterion of the positions of the
     experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
-    `drawn_words`; None without any. `plan` judges what is chosen in full.
+    `drawn_words`; None without any. `prediction` judges what is chosen in full.
     """
 
     experiment: Experiment
@@ -72,7 +72,7 @@ class Selection:
     target: float | None
     gains: tuple[Gain, ...]
     left_out: tuple[Gain, ...]
-    plan: Prediction
+    prediction: Prediction
     curve: tuple[CurvePoint, ...] = ()
     completed: Completion | None = None
     interrupted: tuple[Candidate, ...] = ()

@@ -18,6 +18,7 @@ from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.quantities import length_text
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.tables import column_names, read_table
+from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.reading_files import AXES, read_readings
 
@@ -51,7 +52,7 @@ class SetUp:
         return self.read.name
 
 
-def done_candidates(path: Path, experiment: Experiment) -> tuple[SetUp, ...]:
+def done_candidates(path: Path | GivenText, experiment: Experiment) -> tuple[SetUp, ...]:
     """Set-ups of a pool's candidates that a file of readings has readings of, in its order.
 
     A position may have been set up more than once: "low again" is another set-up of the candidate

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import partial
+from pathlib import Path
 
 import numpy as np
+from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Calibration, Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.yamltree import GivenText
 
-from .offer import Offer
+from .done import done_candidates
+from .offer import Offer, offer
 
 
 def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
@@ -76,3 +80,41 @@ def _equal(one: Calibration, other: Calibration) -> bool:
         np.array_equal(getattr(one, field.name), getattr(other, field.name))
         for field in fields(one)
     )
+
+
+def begun(
+    experiment: Experiment,
+    done: Path | GivenText | None = None,
+    moved: bool = False,
+    earlier: Path | None = None,
+) -> tuple[Offer | None, tuple[int, ...] | None]:
+    """What is offered where readings are `done` already, and the indices of an `earlier` choice of
+    a file; None for what is not there.
+
+    Where the artefact has `moved` since it was read last, a position interrupted there can only be
+    set up again.
+
+    :raises ExperimentError: what is wrong with both files.
+    """
+    if experiment.pool is None:
+        return None, None
+    offered, messages = offer(experiment.pool), list[Message]()
+    chosen = None
+    try:
+        if done is not None:
+            taken = done_candidates(done, experiment)
+            offered = offer(experiment.pool, taken, standing=not moved)
+    except ExperimentError as error:
+        messages += error.messages
+    try:
+        if earlier is not None:
+            before = load(earlier)
+            if len(before) > 1:
+                text = "the file has several variants; name a design that was chosen"
+                raise ExperimentError([Message(str(earlier), 0, 0, "variants", text)])
+            chosen = earlier_choice(before[0], offered)
+    except ExperimentError as error:
+        messages += error.messages
+    if messages:
+        raise ExperimentError(messages)
+    return offered, chosen

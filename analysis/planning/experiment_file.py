@@ -21,6 +21,7 @@ from ballplate.simulator.inputs.messages import ExperimentError, format_path, in
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.yamltree import (
     LOADER,
+    Node,
     parse_tree,
     read_text,
     resolve_scalar,
@@ -49,14 +50,14 @@ def experiment_text(
     stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
     position places, what is known of them, and priors about other positions.
 
+    Of an experiment that was made or changed in Python nothing of a file is kept.
+
     :raises ExperimentError: the source cannot be read any more.
     """
     source = experiment.source
-    text = read_text(source)
-    root = parse_tree(text, str(source))
-    assert isinstance(root, MappingNode)
-    tree = root if experiment.name is None else variant_trees(root, Problems(root))[experiment.name]
-    assert isinstance(tree, MappingNode)
+    text, root = _source(experiment)
+    tree = experiment.tree
+    assert isinstance(root, MappingNode) and isinstance(tree, MappingNode)
     content = _content(tree, experiment, chosen)
     if title is not None:
         content["title"] = title
@@ -64,7 +65,7 @@ def experiment_text(
         content["expected_rank_deficiency"] = expected_rank_deficiency
     if folder.resolve() != source.parent.resolve():
         content = _moved(content, source.parent, folder)
-    chunks = _chunks(text, root)
+    chunks = _chunks(text, root) if text else {}
     is_same = {
         key: (
             tree.items.get(key) is root.items[key]
@@ -73,7 +74,7 @@ def experiment_text(
         for key in root.items
     }
     kept = {key: chunk for key, chunk in chunks.items() if is_same[key]}
-    first = text.splitlines()[0]
+    first = text.partition("\n")[0]
     head = (
         [first]
         if first.startswith(SCHEMA_LINE) and folder.resolve() == source.parent.resolve()
@@ -103,6 +104,22 @@ def to_list(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: to_list(item) for key, item in value.items()}
     return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
+
+
+def _source(experiment: Experiment) -> tuple[str, Node]:
+    """The text that an experiment was loaded from, and the tree of it; without a text the
+    experiment's own, where it is not what the text says.
+
+    :raises ExperimentError: the source cannot be read any more.
+    """
+    source = experiment.source
+    if source.name == "experiment" and not source.is_file():
+        return "", experiment.tree
+    text = read_text(source)
+    root = parse_tree(text, str(source))
+    assert isinstance(root, MappingNode)
+    tree = root if experiment.name is None else variant_trees(root, Problems(root))[experiment.name]
+    return (text, root) if to_python(tree) == to_python(experiment.tree) else ("", experiment.tree)
 
 
 def _content(

@@ -17,8 +17,9 @@ from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
 from .done import base_name
+from .experiment_file import experiment_text
 from .schedule import RunSheet, run_sheet
-from .sheet_forms import sheet_data, sheet_lines
+from .sheet_forms import sheet_csv, sheet_data, sheet_lines, sheet_markdown, sheet_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,11 +34,11 @@ class Campaign(Selection, Result):
 
     @property
     def label(self) -> str:
-        return self.plan.label
+        return self.prediction.label
 
     @property
     def title(self) -> str:
-        return self.plan.title
+        return self.prediction.title
 
     @property
     def sheet(self) -> RunSheet:
@@ -52,6 +53,35 @@ class Campaign(Selection, Result):
         sheet.
         """
         return with_chosen(self.experiment, self.sheet.chosen)
+
+    def to_yaml(self, folder: str | Path = ".") -> str:
+        """The choice as the text of an experiment file that is to stand in a folder.
+
+        :raises ExperimentError: the experiment comes from no file.
+        """
+        source = self.experiment.source.name
+        header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
+        header += f" than {self.budget}."
+        deficiency = self.left_open or None
+        return experiment_text(
+            self.experiment, self.sheet.chosen, header, Path(folder), None, deficiency
+        )
+
+    def sheet_text(self, form: str = ".txt") -> str:
+        """The run sheet as .html to print, .md, .csv or .txt.
+
+        :raises ValueError: another form.
+        """
+        sheet, experiment = self.sheet, self.experiment
+        if form == ".html":
+            return sheet_page(sheet, experiment, experiment.title)
+        if form == ".md":
+            return sheet_markdown(sheet, experiment.title)
+        if form == ".csv":
+            return sheet_csv(sheet)
+        if form == ".txt":
+            return "\n".join([experiment.title, "", *sheet_lines(sheet), ""])
+        raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
@@ -87,7 +117,7 @@ def _lines(campaign: Campaign) -> list[str]:
     run sheet.
     """
     lines = [
-        f"{campaign.plan.label}: {campaign.plan.title}",
+        f"{campaign.prediction.label}: {campaign.prediction.title}",
         (
             f"{len(campaign.pool.candidates)} candidates{_dropped(campaign)};"
             f" no more than {campaign.budget}"
@@ -118,7 +148,7 @@ def _lines(campaign: Campaign) -> list[str]:
         lines += ["", *_gain_table(campaign)]
     if campaign.curve:
         lines += ["", *_curve_table(campaign)]
-    return [*lines, "", *campaign.plan.lines()[1:], "", *sheet_lines(campaign.sheet)]
+    return [*lines, "", *campaign.prediction.lines()[1:], "", *sheet_lines(campaign.sheet)]
 
 
 def _interrupted(campaign: Campaign) -> list[str]:
@@ -218,7 +248,7 @@ def _curve_table(campaign: Campaign) -> list[str]:
 def _data(campaign: Campaign) -> dict[str, Any]:
     """A campaign as data for JSON, in metres and seconds."""
     return {
-        "experiment": campaign.plan.label,
+        "experiment": campaign.prediction.label,
         "candidates": len(campaign.pool.candidates),
         "dropped": dict(campaign.pool.dropped),
         "criterion": campaign.criterion,
@@ -243,7 +273,7 @@ def _data(campaign: Campaign) -> dict[str, Any]:
         "left_out": [_gain_data(gain) for gain in campaign.left_out],
         "curve": [_point_data(point) for point in campaign.curve],
         "run_sheet": sheet_data(campaign.sheet),
-        "plan": campaign.plan.to_dict(),
+        "plan": campaign.prediction.to_dict(),
     }
 
 

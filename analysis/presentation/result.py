@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .table import Block, Entry, Row, Table
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.simulator.readings.reading_files import ObservedReadings
+    from matplotlib.figure import Figure
 
 
 class Result:
@@ -40,6 +44,11 @@ class Result:
         """
         raise NotImplementedError
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said beside tables: remarks, warnings, why it is not as expected."""
+        return ()
+
     def rows(self) -> list[dict[str, Any]]:
         """The rows of its main table, by the names of the columns; units have a column of their
         own.
@@ -64,14 +73,21 @@ class Result:
         """Its main table as elements of a page, as a notebook shows it."""
         return self._written(as_html)
 
-    def to_csv(self) -> str:
+    def to_csv(self, path: str | Path | None = None) -> str:
         """Its main table as CSV with a line of headings, with all digits; what is undetermined is
         empty.
+
+        With a path the text is written as well.
+
+        :raises OSError: the file cannot be written.
         """
-        return self.to_frame().to_csv(index=False)
+        text = self.to_frame().to_csv(index=False, lineterminator="\n")
+        if path is not None:
+            write_file(path, text.encode())
+        return text
 
     def __str__(self) -> str:
-        return "\n".join(self.lines())
+        return "\n".join([*self.lines(), *self.notes])
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.label}: {self.headline()}>"
@@ -85,7 +101,7 @@ class Result:
         """
         rows, title = self.rows(), f"{self.label}: {self.title}"
         if not rows:
-            return form(f"{title}: {self.headline()}", [])
+            return form("; ".join([f"{title}: {self.headline()}", *self.notes]), [])
         names = list(rows[0])
         are_text = [all(isinstance(row[name], str) for row in rows) for name in names]
         left = are_text.index(False) if False in are_text else len(names)
@@ -93,9 +109,73 @@ class Result:
         block = Block(
             "", tuple(Row(row[:left], tuple(Entry(text) for text in row[left:])) for row in texts)
         )
-        return form(
-            title, [Table("", self.headline(), tuple(names[:left]), tuple(names[left:]), (block,))]
-        )
+        heads = tuple(names[:left]), tuple(names[left:])
+        return form(title, [Table("", self.headline(), *heads, (block,), notes=self.notes)])
+
+
+class FitResult(Result):
+    """What an estimator makes of readings, and what is to be said of both."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def observed(self) -> ObservedReadings: ...
+
+    @property
+    def converged(self) -> bool:
+        """Whether there is an estimate."""
+        return True
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What a user of the estimate has to know."""
+        return ()
+
+    @property
+    def complaint(self) -> str:
+        """Why the estimate is of no use or leaves open what it should not; empty where all is
+        well.
+        """
+        return ""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """How far the readings are those that were planned, in words."""
+        return self.observed.remarks
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What of the readings is unlikely to be meant, and the cautions."""
+        return (*self.observed.doubts, *self.cautions)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        warnings = (f"warning: {warning}" for warning in self.warnings)
+        return (*self.remarks, *warnings, *filter(None, [self.complaint]))
+
+    def said(self) -> dict[str, Any]:
+        """What is to be said beside the figures, as plain data."""
+        return {
+            "planned_but_not_read": list(self.observed.missing),
+            "read_but_not_planned": list(self.observed.unplanned),
+            "warnings": list(self.warnings),
+            "complaint": self.complaint or None,
+        }
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The residuals as magnified vectors where the balls were read.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else, or there are no residuals to be drawn.
+        """
+        raise ValueError("residuals are drawn by the full estimator and reversal only")
+
+    def __repr__(self) -> str:
+        count = len(self.warnings)
+        words = f"; {count} warning{'s' if count > 1 else ''}>" if count else ">"
+        return super().__repr__().removesuffix(">") + words
 
 
 def _shown(value: Any) -> str:

@@ -14,6 +14,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .files import write_file
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -200,5 +202,5 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
         # file.
         whole = io.BytesIO()
         figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
-    path.write_bytes(whole.getvalue())
+    write_file(path, whole.getvalue())
     return figure

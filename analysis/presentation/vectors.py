@@ -54,11 +54,17 @@ def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
     return round_number(LONGEST * extent / longest)
 
 
-def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | None = None) -> Figure:
+def draw_vectors(
+    groups: tuple[Vectors, ...],
+    title: str,
+    path: str | Path | None = None,
+    edges: Array | None = None,
+) -> Figure:
     """Residual vectors as a picture, each from the place that was read, with a bar of known length
     below.
 
-    It is written to the path, if there is one.
+    It is written to the path, if there is one. With `edges` (k, 2, 2) the paper shows space, and
+    they are those of the volume.
 
     :raises ImportError: matplotlib is missing.
     :raises ValueError: the name ends in none of the kinds of pictures.
@@ -68,6 +74,7 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | Non
     extent = float(np.ptp(places, axis=0).max())
     times = magnification(groups, extent)
     drawn = np.concatenate([places, *(g.places + times * g.residuals for g in groups)])
+    drawn = drawn if edges is None else np.concatenate([drawn, edges.reshape(-1, 2)])
     lower, upper = drawn.min(axis=0), drawn.max(axis=0)
     named = _named(groups)
     pad = (0.1 if named else 0.06) * extent
@@ -80,10 +87,15 @@ def draw_vectors(groups: tuple[Vectors, ...], title: str, path: str | Path | Non
         axes = placed_axes(figure, MARGIN, below, width, height)
         axes.set_xlim(1e3 * (lower[0] - pad), 1e3 * (upper[0] + pad))
         axes.set_ylim(1e3 * (lower[1] - pad), 1e3 * (upper[1] + pad))
-        axes.set_xlabel("x, mm")
-        axes.set_ylabel("y, mm")
-        axes.grid(True)
-        axes.set_axisbelow(True)
+        if edges is None:
+            axes.set_xlabel("x, mm")
+            axes.set_ylabel("y, mm")
+            axes.grid(True)
+            axes.set_axisbelow(True)
+        else:
+            axes.set_axis_off()
+            for edge in 1e3 * edges:
+                axes.plot(*edge.T, color=MUTED, linewidth=0.8)
         axes.set_title("\n".join(heading), loc="left")
         for k, group in enumerate(groups):
             colour, marker = _style(k)

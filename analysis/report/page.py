@@ -15,6 +15,7 @@ import numpy as np
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.settings import listing
 
 from ..presentation.formatting import number, percent, uncertainty_words
@@ -28,7 +29,7 @@ from ..uncertainty.quantities import DESCRIPTIONS
 from .cells import NoExperimentError, experiments
 from .heatmaps import heat_maps
 from .plots import plot_svg
-from .results import ReportedSweep, best_and_worst, cell_list, criterion, one_line
+from .results import ReportedSweep, best_and_worst, cell_list, criterion
 from .series import Plot, plots
 from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
@@ -86,7 +87,7 @@ def page(
     )
     drawn = plots(results)
     context: dict[str, Any] = {
-        "title": one_line(results.title),
+        "title": in_one_line(results.title),
         "summary": _summary(results),
         "style": Markup(package.joinpath("page.css").read_text(encoding="utf-8")),
         "facts": _facts(results),
@@ -131,8 +132,8 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     stored = results.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     facts = [
-        ("Sweep file", one_line(stored["source"])),
-        ("Experiment", one_line(stored["base"]) + (f": {one_line(base)}" if base else "")),
+        ("Sweep file", in_one_line(stored["source"])),
+        ("Experiment", in_one_line(stored["base"]) + (f": {in_one_line(base)}" if base else "")),
     ]
     for axis in results.axes:
         labels = list(axis.labels)
@@ -166,7 +167,7 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
 def _unreadable(results: ReportedSweep) -> str:
     """Which cells could not be read, and why the first of them."""
     cells = sorted(results.found.unreadable)
-    return f"{cell_list(cells)} ({one_line(results.found.unreadable[cells[0]])})"
+    return f"{cell_list(cells)} ({in_one_line(results.found.unreadable[cells[0]])})"
 
 
 def _plots(drawn: list[Plot], report: Report) -> list[tuple[str, list[Drawing]]]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import QUANTITY, exact_number
 from numpy.typing import NDArray
 
@@ -140,9 +141,9 @@ def read_results(store: Store, sweep: int | None) -> ReportedSweep:
 
 
 def _axis(stored: dict[str, Any]) -> ReportAxis:
-    labels = tuple(one_line(label) for label in stored["labels"])
+    labels = tuple(map(in_one_line, stored["labels"]))
     if not stored["unit"]:
-        return ReportAxis(one_line(stored["name"]), stored["column"], labels, (), "")
+        return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, (), "")
     # The unit as it was written, where all values have the same; otherwise metres or radians.
     found = [QUANTITY.fullmatch(label.strip()) for label in labels]
     units = {(one[2] or "").strip() for one in found if one is not None}
@@ -151,7 +152,7 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
     if len(units) == 1 and all(found):
         unit = units.pop()
         numbers = tuple(float(exact_number(one[1])) for one in found if one is not None)
-    return ReportAxis(one_line(stored["name"]), stored["column"], labels, numbers, unit)
+    return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, numbers, unit)
 
 
 def partly_open(results: ReportedSweep, symbol: str) -> NDArray[np.bool_]:
@@ -162,11 +163,6 @@ def partly_open(results: ReportedSweep, symbol: str) -> NDArray[np.bool_]:
     if column not in results.frame:
         return np.zeros(len(results.frame), bool)
     return results.figure(column) > 0
-
-
-def one_line(text: object) -> str:
-    """A text without line breaks and other control characters."""
-    return " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())
 
 
 def criterion(results: ReportedSweep) -> tuple[str, str] | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -266,6 +266,20 @@ def parameter_estimates(
         for one, value, uncertainty in told
         if one.kind != "task"
     )
+
+
+def estimate_rows(estimates: Sequence[ParameterEstimate]) -> list[dict[str, Any]]:
+    """One row of a table for each estimate."""
+    return [
+        {
+            "parameter": one.name,
+            "kind": one.kind,
+            "value": one.value,
+            "standard uncertainty": one.standard_uncertainty,
+            "unit": one.unit,
+        }
+        for one in estimates
+    ]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

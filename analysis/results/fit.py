@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import Solution, linearised_fit
+from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import far_outside
+from ballplate.simulator.readings.reading_files import ObservedReadings, far_outside
 
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
 from ..presentation.formatting import SHOWN, aligned, finite, number, to_uncertainty
-from ..presentation.result import Result
+from ..presentation.result import FitResult
+from ..presentation.scene import box_edges, projection
 from ..presentation.vectors import Vectors, draw_vectors
 from ..rank.verdict import Verdict
-from ..uncertainty.summaries import Quantity
+from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
 from .estimates import (
@@ -31,7 +30,7 @@ from .estimates import (
     EstimatedFunctions,
     ParameterEstimate,
     correct,
-    estimated_functions,
+    estimate_rows,
     labels,
 )
 from .parts import (
@@ -62,22 +61,21 @@ SHOWN_RESIDUALS = 3
 
 
 @dataclass(frozen=True, repr=False)
-class Fit(Result):
+class Fit(FitResult):
     """An estimate from readings; without quantities and estimates, and the design judged as drawn,
     if it has failed.
 
-    `x` (readings, d) are the scale readings in metres. `sigma` multiplies all stated uncertainties:
+    `observed` has the design and its readings. `sigma` multiplies all stated uncertainties:
     estimated from the residuals as the root of S^2 over the degrees of freedom, or 1 where the file
     says that they are given. `adjustments` are those of a three-dimensional metric. `diagnosis` is
     what the residuals make suspect, which nothing else here heeds, or `untested` says why there is
-    none; `marks` tell where readings stand. With `monomials` the machine's parameters are the
-    coefficients of t, t^2, ... on [0, 1].
+    none. `estimated` is
+    everything that was estimated as functions of the parameters, without `sigma`.
     """
 
     label: str
     title: str
-    design: Design
-    x: Array
+    observed: ObservedReadings
     solution: Solution
     verdict: Verdict
     sigma: float
@@ -88,11 +86,19 @@ class Fit(Result):
     largest: tuple[Residual, ...]
     plates: tuple[PlateCoordinates, ...] = ()
     adjustments: tuple[Adjustment, ...] = ()
-    tasks: tuple[TaskUncertainty, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
-    marks: tuple[Mark, ...] = ()
-    monomials: bool = False
     untested: str = ""
+    estimated: EstimatedFunctions | None = None
+
+    @property
+    def design(self) -> Design:
+        """The design as it was read."""
+        return self.observed.design
+
+    @property
+    def tasks(self) -> tuple[TaskUncertainty, ...]:
+        """The measuring tasks one by one."""
+        return tasks_of(self.quantities)
 
     def headline(self) -> str:
         if not self.converged:
@@ -126,7 +132,7 @@ class Fit(Result):
             return lines
         lines += ["", *self._residual_table()]
         if self.diagnosis:
-            lines += diagnosis_lines(self.diagnosis, self.marks)
+            lines += diagnosis_lines(self.diagnosis, self.observed.marks)
         lines += ["", *uncertainty_table(self.quantities), ""]
         lines += [*task_table(self.tasks), ""] if self.tasks else []
         rows = [["parameter", "value", "standard uncertainty", "unit"]]
@@ -152,7 +158,7 @@ class Fit(Result):
     def to_dict(self) -> dict[str, Any]:
         suspected: dict[str, Any] = {}
         if self.diagnosis:
-            suspected = {"suspected": diagnosis_data(self.diagnosis, self.marks)}
+            suspected = {"suspected": diagnosis_data(self.diagnosis, self.observed.marks)}
         return {
             "experiment": self.label,
             "title": self.title,
@@ -189,37 +195,29 @@ class Fit(Result):
                 else {}
             ),
             **({"adjustments": adjustment_data(self.adjustments)} if self.adjustments else {}),
+            **self.said(),
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each parameter."""
-        return [
-            {
-                "parameter": one.name,
-                "kind": one.kind,
-                "value": one.value,
-                "standard uncertainty": one.standard_uncertainty,
-                "unit": one.unit,
-            }
-            for one in self.estimates
-        ]
+        return estimate_rows(self.estimates)
 
     @property
     def converged(self) -> bool:
         return self.solution.status == "converged"
 
-    @cached_property
+    @property
     def functions(self) -> EstimatedFunctions:
         """Everything estimated and the measuring tasks, as functions of the parameters; without
         sigma.
 
         :raises ValueError: the estimate has not converged.
         """
-        if not self.converged:
+        if self.estimated is None:
             raise ValueError(
                 f"the estimate has {self.solution.status}; nothing is known of its uncertainty"
             )
-        return estimated_functions(linearised_fit(self.design, self.solution), self.monomials)
+        return self.estimated
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
@@ -289,15 +287,18 @@ class Fit(Result):
         return correct(self.functions.at, given, probes, self.sigma)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
-        """Residuals of a two-dimensional fit that has converged, for each position."""
+        """Residuals of a fit that has converged, for each position; in three dimensions as they are
+        seen from the front and above.
+        """
         design = self.design
-        readings, residuals, _ = reading_residuals(design, self.solution, self.x)
-        places = self.x[design.plate_readings]
+        view, _ = projection(design.dimension)
+        readings, residuals, _ = reading_residuals(design, self.solution, self.observed.x)
+        places = self.observed.x[design.plate_readings]
         return tuple(
             Vectors(
                 design.positions.names[k],
-                places[mine],
-                residuals[mine],
+                places[mine] @ view.T,
+                residuals[mine] @ view.T,
                 tuple(design.balls.names[ball] for ball in readings.ball[mine]),
             )
             for k in np.unique(readings.position)
@@ -305,27 +306,36 @@ class Fit(Result):
         )
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Residuals of a two-dimensional fit as magnified vectors where the balls were read.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, the fit has three dimensions, or has
-            not converged.
-        """
-        if self.design.dimension != 2 or not self.converged:
-            why = "has three dimensions" if self.converged else f"has {self.solution.status}"
-            raise ValueError(
-                f"residuals are drawn of fits in two dimensions that have converged; this one {why}"
+        design, vectors = self.design, self.residual_vectors() if self.converged else ()
+        if not vectors:
+            why = (
+                "no ball of a plate was read"
+                if self.converged
+                else f"the estimate has {self.solution.status}"
             )
-        return draw_vectors(self.residual_vectors(), self.title, path)
+            raise ValueError(f"there are no residuals to be drawn: {why}")
+        if design.dimension == 2:
+            return draw_vectors(vectors, self.title, path)
+        view, towards = projection(3)
+        volume = design.machine.volume
+        edges, _ = box_edges(volume.lower, volume.upper, towards)
+        return draw_vectors(vectors, self.title, path, edges @ view.T)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """What is to be said of sigma where it comes from few degrees of freedom, and of what was
-        not tested.
+    def cautions(self) -> tuple[str, ...]:
+        """What is to be said of residuals that are too large, of sigma where it comes from few
+        degrees of freedom, and of what was not tested.
         """
         found = []
+        if self.too_large:
+            times = self.solution.factor.sum_of_squares / self.degrees_of_freedom
+            cure = (
+                "no single mistake explains that: try a richer error model or larger uncertainties,"
+                " and think of drifts"
+            )
+            if self.diagnosis.suspects or self.diagnosis.scatter:
+                cure = "look at what is suspected"
+            found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
             found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
@@ -335,6 +345,15 @@ class Fit(Result):
                 " them tested"
             )
         return tuple(filter(None, found))
+
+    @property
+    def complaint(self) -> str:
+        if self.converged:
+            return self.verdict.complaint
+        return (
+            f"the estimate has {self.solution.status} and nothing is made of it: see the record of"
+            " iterations, and look for wrong units, balls or probes among the readings"
+        )
 
     @property
     def too_large(self) -> bool:

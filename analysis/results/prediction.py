@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from ballplate.simulator.design.arrays import Design
 from ..presentation.result import Result
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
-from ..uncertainty.summaries import Quantity
+from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .parts import (
     quantities_data,
@@ -34,13 +35,25 @@ if TYPE_CHECKING:
     from ..montecarlo.experiments import Trials
 
 
+@dataclass(frozen=True)
+class Advice:
+    """What a check was asked for besides the rank: which goals are `missed`, and goals and
+    suggested changes as `lines` of text and as plain `data`.
+    """
+
+    missed: tuple[str, ...]
+    lines: tuple[str, ...]
+    data: Mapping[str, Any]
+
+
 @dataclass(frozen=True, repr=False)
 class Prediction(Result):
     """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they
     were asked for.
 
     `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if
-    that was asked for and is determined. `monte_carlo` has replicates, if they were asked for.
+    that was asked for and is determined. `monte_carlo` has replicates, and `advice` what a check
+    was asked for besides the rank, if they were asked for.
     """
 
     label: str
@@ -48,16 +61,23 @@ class Prediction(Result):
     design: Design
     verdict: Verdict
     quantities: dict[str, Quantity]
-    tasks: tuple[TaskUncertainty, ...] = ()
     lengths: Quantity | None = None
     scale: Scale | None = None
     monte_carlo: Trials | None = None
+    advice: Advice | None = None
+
+    @property
+    def tasks(self) -> tuple[TaskUncertainty, ...]:
+        """The measuring tasks one by one."""
+        return tasks_of(self.quantities)
 
     def headline(self) -> str:
-        return ", ".join([rank_words(self.verdict), *length_headline(self.quantities)])
+        count = 0 if self.advice is None else len(self.advice.missed)
+        missed = [f"{count} goal{'s' if count > 1 else ''} missed"] if count else []
+        return ", ".join([rank_words(self.verdict), *length_headline(self.quantities), *missed])
 
     def lines(self) -> list[str]:
-        lines = self.table_lines()
+        lines = [*self.table_lines(), *(() if self.advice is None else self.advice.lines)]
         if self.monte_carlo is None:
             return lines
         from ..montecarlo.comparison_tables import trials_lines
@@ -89,6 +109,7 @@ class Prediction(Result):
             ),
             **({"tasks": task_data(self.tasks)} if self.tasks else {}),
             "scale": scale_data(self.scale),
+            **({} if self.advice is None else self.advice.data),
         }
         if self.monte_carlo is None:
             return found
@@ -110,10 +131,27 @@ class Prediction(Result):
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each of U1 to U6."""
+        """One row for each of U1 to U6; where these were not asked for, one with the rank and
+        U6.
+        """
+        if self.quantities:
+            return [
+                {"symbol": symbol, **quantity_row(quantity)}
+                for symbol, quantity in self.quantities.items()
+            ]
+        judged, lengths = self.verdict, self.lengths
         return [
-            {"symbol": symbol, **quantity_row(quantity)}
-            for symbol, quantity in self.quantities.items()
+            {
+                "rank": rank_words(judged),
+                "parameters": judged.parameters,
+                "observations": judged.observations,
+                "rank deficiency": judged.deficiency,
+                "as expected": judged.as_expected,
+                "weakly determined": len(judged.weak),
+                "U6 average": math.nan if lengths is None else lengths.average,
+                "U6 maximum": math.nan if lengths is None else lengths.maximum,
+                "unit": "m",
+            }
         ]
 
 

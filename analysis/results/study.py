@@ -18,8 +18,8 @@ from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 
 from ..rank.verdict import verdict
 from ..uncertainty.scale import scale_of
-from ..uncertainty.summaries import Quantity, uncertainties
-from ..uncertainty.tasks import TaskUncertainty, task_uncertainties
+from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
+from ..uncertainty.tasks import TaskUncertainty
 from .adjustments import Adjustment, adjustments
 from .prediction import Prediction
 
@@ -31,13 +31,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlannedUncertainty:
-    """Uncertainties alone, for searches that judge many designs: rank deficiency, quantities and
-    tasks.
+    """Uncertainties alone, for searches that judge many designs: rank deficiency and quantities,
+    the measuring tasks among them.
     """
 
     deficiency: int
     quantities: dict[str, Quantity]
-    tasks: tuple[TaskUncertainty, ...]
+
+    @property
+    def tasks(self) -> tuple[TaskUncertainty, ...]:
+        return tasks_of(self.quantities)
 
 
 def check(
@@ -57,7 +60,7 @@ def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
     """What `predict` finds, less the explanation of the rank, which takes most of its time."""
     at = linearise(lay_out(experiment))
     found = uncertainties(at, target=experiment.target_uncertainty)
-    return PlannedUncertainty(at.deficiency, found, task_uncertainties(at))
+    return PlannedUncertainty(at.deficiency, found)
 
 
 @single_threaded
@@ -67,16 +70,14 @@ def _predict(
     at, target = linearise(design), experiment.target_uncertainty
     judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities: dict[str, Quantity] = {}
-    tasks: tuple[TaskUncertainty, ...] = ()
     if with_quantities:
         quantities = uncertainties(at, target=target)
-        tasks = task_uncertainties(at)
         lengths = quantities.get("U6")
     else:
         lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
     scale = scale_of(experiment, at) if with_scale else None
     return Prediction(
-        experiment.label, experiment.title, design, judged, quantities, tasks, lengths, scale
+        experiment.label, experiment.title, design, judged, quantities, lengths, scale
     )
 
 
@@ -106,33 +107,31 @@ def fit(
     if solution.status != "converged":
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
-        return Fit(*names, design, observed.x, solution, judged, 1.0, False, 0, {}, (), ())
+        return Fit(*names, observed, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     freedom = design.observations - design.parameter_count + judged.deficiency
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
     untested = too_many_entries(design)
+    functions = estimated_functions(at, monomials)
     return Fit(
         experiment.label,
         experiment.title,
-        design,
-        observed.x,
+        observed,
         solution,
         judged,
         scale,
         estimated,
         freedom,
         uncertainties(at, scale, experiment.target_uncertainty),
-        parameter_estimates(estimated_functions(at, monomials), scale),
+        parameter_estimates(functions, scale),
         largest_residuals(design, solution, observed.x),
         plate_coordinates(experiment, at, scale),
         _adjustments(at, scale, freedom if estimated else np.inf),
-        task_uncertainties(at, scale),
         Diagnosis() if untested else diagnosis(at, observed.x, freedom, estimated),
-        observed.marks,
-        monomials,
         untested,
+        functions,
     )
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 
+from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
+
 from ..montecarlo.accumulator import Accumulator
 from .fingerprint import METHOD, method_of
 from .model import Sweep
@@ -38,6 +40,15 @@ class Summary:
     def left(self) -> int:
         return self.cells - self.done - self.failed
 
+    @property
+    def step(self) -> ProgressStep:
+        """The same as a step, for whoever shows how far it has come."""
+        told = [f"{self.blocks} blocks of data sets"] if self.blocks else []
+        told += [f"{self.failed} failed"] if self.failed else []
+        return ProgressStep(
+            "cells", self.done + self.failed, self.cells, ", ".join(told), self.before
+        )
+
 
 @dataclass
 class _Run:
@@ -64,7 +75,7 @@ def run_sweep(
     runner: Runner,
     retry_failed: bool = False,
     fail_fast: bool = False,
-    report: Callable[[Summary], None] = lambda summary: None,
+    report: Report = unreported,
 ) -> Summary:
     """Do what is left of sweep `number` of a store; each row is on disk before it is reported.
 
@@ -83,7 +94,7 @@ def run_sweep(
     left = [k for k in range(run.cells) if run.status(k) not in done_with]
     run.before = run.cells - len(left)
     summary = run.summary() if not retry_failed else Summary(run.cells, run.before, run.before, 0)
-    report(summary)
+    report(summary.step)
     failed: set[int] = set()
     for cells in _groups(left, blocks_of(sweep)):
         for tasks in _waves(run, cells, blocks_of(sweep)):
@@ -99,7 +110,7 @@ def run_sweep(
                 more = int(row.status == "failed" and not was_failed)
                 counted = summary.failed + more, summary.blocks + (row.block > 0)
                 summary = Summary(run.cells, run.before, done, *counted)
-                report(summary)
+                report(summary.step)
                 if row.status == "failed" and fail_fast:
                     return run.summary()
     return run.summary()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.inputs.messages import in_one_line
 from filelock import FileLock, Timeout
 
@@ -25,6 +26,7 @@ from .store import (
     mend,
     of_other_methods,
     open_store,
+    results,
     statuses,
     unread,
 )
@@ -35,6 +37,9 @@ if TYPE_CHECKING:
 
 # Changes between two sweeps that are listed.
 MOST_CHANGES = 20
+
+# Reasons of failures that are told.
+MOST_REASONS = 10
 
 
 class OtherSweepError(Exception):
@@ -56,7 +61,8 @@ class Entered:
 class SweepResult(Result):
     """A sweep as far as it is computed: a row of the store for each cell.
 
-    `remarks` say what the store held that could not be used, and is computed anew.
+    `remarks` say what the store held that could not be used, and is computed anew, and
+    `shortcomings` why cells have failed, and that versions differ.
     """
 
     label: str
@@ -65,6 +71,11 @@ class SweepResult(Result):
     summary: Summary
     table: pandas.DataFrame
     remarks: tuple[str, ...] = ()
+    shortcomings: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.shortcomings
 
     def headline(self) -> str:
         one = self.summary
@@ -83,6 +94,7 @@ class SweepResult(Result):
             "title": self.title,
             "store": str(self.store),
             **counts,
+            "shortcomings": list(self.shortcomings),
             "rows": self.rows(),
         }
 
@@ -167,7 +179,7 @@ def compute_sweep(
     runner: AbstractContextManager[Runner],
     retry_failed: bool = False,
     fail_fast: bool = False,
-    report: Callable[[Summary], None] = lambda summary: None,
+    report: Report = unreported,
 ) -> Summary:
     """Compute what is left of a sweep that is entered.
 
@@ -180,9 +192,37 @@ def compute_sweep(
     return summary
 
 
+def shortcomings(store: Store, number: int, cells: int) -> tuple[str, ...]:
+    """What is to be said of the rows of a sweep: that versions differ, and why cells have
+    failed.
+    """
+    found, told = results(store, number, cells), []
+    versions = set(zip(*found.versions.values(), strict=True))
+    if len(versions) > 1:
+        text = f"the rows were computed with {len(versions)} different sets of versions"
+        told.append(in_one_line(f"{store.path}: {text}"))
+    reasons: dict[str, list[int]] = {}
+    rows = zip(found.cells.tolist(), found.statuses, found.reasons, strict=True)
+    for cell, status, reason in rows:
+        if status == "failed":
+            reasons.setdefault(reason, []).append(cell)
+    for reason, failed in list(reasons.items())[:MOST_REASONS]:
+        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        told.append(f"cell {failed[0]}{more} failed: {reason}")
+    if len(reasons) > MOST_REASONS:
+        told.append(f"and {len(reasons) - MOST_REASONS} reasons more; see ballplate export")
+    return tuple(told)
+
+
 def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) -> SweepResult:
     """The rows of a sweep in its store."""
     table = frame(store, entered.number)
     return SweepResult(
-        sweep.source.stem, sweep.title, Path(store.path), summary, table, entered.remarks
+        sweep.source.stem,
+        sweep.title,
+        Path(store.path),
+        summary,
+        table,
+        entered.remarks,
+        shortcomings(store, entered.number, summary.cells),
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs.messages import in_lines
 from ballplate.simulator.machines.protocol import Array
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 
@@ -87,15 +87,6 @@ def digest_of(*values: object) -> bytes:
     return found.digest()
 
 
-def plain(text: str) -> str:
-    r"""A text of several lines whose other control characters are written by their numbers.
-
-    >>> plain("one\n\x1b[31mtwo")
-    'one\n\\x1b[31mtwo'
-    """
-    return text if text.isprintable() else "\n".join(map(in_one_line, text.split("\n")))
-
-
 def _refuse(name: str) -> None:
     raise ValueError(f"{name} is no number of JSON")
 
@@ -140,7 +131,7 @@ def checked_definition(number: object, text: object, digest: object) -> dict[str
             raise UnreadableError(
                 f"the axis {axis.name} has {len(axis.labels)} labels and {len(axis.values)} values"
             )
-    columns = [plain(axis.column) for axis in kept.axes]
+    columns = [in_lines(axis.column) for axis in kept.axes]
     if len(set(columns)) < len(columns) or any(map(is_reserved, columns)):
         raise UnreadableError("the axes have no columns of their own")
     counts = [len(axis.labels) for axis in kept.axes]
@@ -152,17 +143,17 @@ def checked_definition(number: object, text: object, digest: object) -> dict[str
     axes = [
         {
             **axis.model_dump(),
-            "name": plain(axis.name),
-            "column": plain(axis.column),
-            "labels": [plain(label) for label in axis.labels],
+            "name": in_lines(axis.name),
+            "column": in_lines(axis.column),
+            "labels": [in_lines(label) for label in axis.labels],
         }
         for axis in kept.axes
     ]
     return {
         **found,
-        **{name: plain(found[name]) for name in ("title",)},
+        **{name: in_lines(found[name]) for name in ("title",)},
         "axes": axes,
-        "record": [plain(name) for name in kept.record],
+        "record": [in_lines(name) for name in kept.record],
     }
 
 
@@ -219,7 +210,7 @@ class Texts:
                 found = _VERSIONS.validate_python(json_of(self.raw[number]))
             except (UnreadableError, ValidationError):
                 raise UnreadableError("the versions that it was computed with are none") from None
-            self.versions[number] = {plain(name): plain(text) for name, text in found.items()}
+            self.versions[number] = {in_lines(name): in_lines(text) for name, text in found.items()}
         return self.versions[number]
 
 
@@ -279,16 +270,25 @@ def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> St
     except (UnreadableError, ValidationError):
         raise UnreadableError("what was told of it cannot be read") from None
     return StoredRow(
-        number, key, status, plain(reason), seed, seconds, names, versions, figures, _plain(found)
+        number,
+        key,
+        status,
+        in_lines(reason),
+        seed,
+        seconds,
+        names,
+        versions,
+        figures,
+        _plain(found),
     )
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
-        return {plain(name): _plain(item) for name, item in value.items()}
+        return {in_lines(name): _plain(item) for name, item in value.items()}
     if isinstance(value, list):
         return [_plain(item) for item in value]
-    return plain(value) if isinstance(value, str) else value
+    return in_lines(value) if isinstance(value, str) else value
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from ballplate.simulator.computing.rounding import first_largest
@@ -26,6 +26,7 @@ from ballplate.simulator.machines.protocol import Array
 
 from .pairs import PairSummary, PairTile, all_pairs, pairs_of
 from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points
+from .tasks import TaskUncertainty, task_uncertainties
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Quantity:
     the maximum stands. `within_target` is the share of distances whose uncertainty,
     `coverage_factor` times the standard one, is within the target uncertainty, those undetermined
     counted as not; None where no target is compared with. `places` tell where in the volume the
-    evaluation points are that `largest` names.
+    evaluation points are that `largest` names. `named` are distances with names one by one.
     """
 
     symbol: str
@@ -50,6 +51,7 @@ class Quantity:
     within_target: float | None = None
     coverage_factor: float = 1.0
     places: tuple[str, ...] = ()
+    named: tuple[TaskUncertainty, ...] = field(default=(), repr=False)
 
     @property
     def description(self) -> str:
@@ -110,6 +112,11 @@ def uncertainties(
     return found
 
 
+def tasks_of(quantities: Mapping[str, Quantity]) -> tuple[TaskUncertainty, ...]:
+    """The measuring tasks one by one; none without any."""
+    return quantities["tasks"].named if "tasks" in quantities else ()
+
+
 def _of_parameters(
     at: Linearisation, symbol: str, given: Parameters, sigma: float
 ) -> dict[str, Quantity]:
@@ -144,17 +151,14 @@ def _of_coordinates(
 
 def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Quantity:
     """Distances that have names, each compared with its own target."""
-    values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
-    found = summarise(symbol, values, "m", given.names.__getitem__)
-    judged = [
-        target.coverage_factor * value <= float(target.stated.at(length))
-        for target, length, value in zip(given.targets, tile.lengths, values, strict=False)
-        if target is not None
-    ]
+    named = task_uncertainties(given, tile, sigma)
+    values = np.array([one.standard_uncertainty for one in named])
+    found = replace(summarise(symbol, values, "m", given.names.__getitem__), named=named)
+    judged = [one.is_within for one in named if one.is_within is not None]
     if not judged:
         return found
-    factor = 1.0 if given.targets[0] is None else given.targets[0].coverage_factor
-    return replace(found, within_target=sum(judged) / len(judged), coverage_factor=factor)
+    share = sum(judged) / len(judged)
+    return replace(found, within_target=share, coverage_factor=named[0].coverage_factor)
 
 
 def _of_pairs(

@@ -8,11 +8,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.estimation.functions import displacements
-from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.estimation.functions import Distances
 
-from .pairs import pairs_of
-from .quantities import task_distances
+from .pairs import PairTile
 
 # Coverage factor of expanded uncertainties.
 COVERAGE = 2.0
@@ -59,17 +57,13 @@ def expansion(coverage_factor: float) -> float:
     return coverage_factor if coverage_factor > 1.0 else COVERAGE
 
 
-def task_uncertainties(at: Linearisation, sigma: float = 1.0) -> tuple[TaskUncertainty, ...]:
-    """Standard uncertainties of the design's tasks, as U6 is that of all pairs of points; none
-    without tasks.
+def task_uncertainties(
+    given: Distances, tile: PairTile, sigma: float = 1.0
+) -> tuple[TaskUncertainty, ...]:
+    """Standard uncertainties of distances that have names, which are the pairs of a tile.
 
     `sigma` multiplies all stated uncertainties.
     """
-    if not at.design.tasks.names:
-        return ()
-    given = task_distances(at.design)
-    assert given.pairs is not None
-    tile = pairs_of(displacements(at, given.places), given.pairs)
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
     told = zip(given.names, tile.lengths.tolist(), values.tolist(), given.targets, strict=True)
     return tuple(

@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import TypeVar
 
 Item = TypeVar("Item")
 
-Report = Callable[[str, int, int], None]
-"""Is told what is counted in a step, how many of them are done, and of how many."""
+
+@dataclass(frozen=True)
+class ProgressStep:
+    """How far a step has come: what is counted in it, how many of them are done, and of how many.
+
+    `before` of them were done in an earlier run; `remark` is what else there is to say.
+
+    >>> print(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"))
+    512 of 2048 data sets, accurate to 1.5 %
+    """
+
+    what: str
+    done: int
+    wanted: int
+    remark: str = ""
+    before: int = 0
+
+    def __str__(self) -> str:
+        remark = f", {self.remark}" if self.remark else ""
+        return f"{self.done} of {self.wanted} {self.what}{remark}"
 
 
-def unreported(what: str, done: int, wanted: int) -> None:
+Report = Callable[[ProgressStep], object]
+"""Is told of each step that has come further."""
+
+
+def unreported(step: ProgressStep) -> None:
     """Show nothing."""
 
 
@@ -19,12 +42,12 @@ def counted(items: Iterable[Item], what: str, wanted: int, report: Report) -> It
     """The items as they come, each reported as done when the next is asked for.
 
     >>> list(counted("ab", "letters", 2, print))
-    letters 0 2
-    letters 1 2
-    letters 2 2
+    0 of 2 letters
+    1 of 2 letters
+    2 of 2 letters
     ['a', 'b']
     """
-    report(what, 0, wanted)
+    report(ProgressStep(what, 0, wanted))
     for done, item in enumerate(items, start=1):
         yield item
-        report(what, done, wanted)
+        report(ProgressStep(what, done, wanted))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -340,6 +341,27 @@ class Experiment:
     def __repr__(self) -> str:
         return f"<Experiment {self.label}: {self.title}>"
 
+    def _repr_html_(self) -> str:
+        volume = self.machine.volume
+        edges = zip(volume.lower.tolist(), volume.upper.tolist(), strict=True)
+        sides = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in edges)
+        repeatability = {f"{1e6 * value:.4g}" for value in self.machine.repeatability.tolist()}
+        rows = [
+            ("volume", f"{sides} mm"),
+            ("repeatability", f"{', '.join(sorted(repeatability))} um"),
+            ("error model", self.error_model.kind),
+            *(
+                (f"artefact {name}", f"{len(one.names)} balls")
+                for name, one in self.layouts.items()
+            ),
+            *((f"position {one.name}", _words_of(one)) for one in self.positions),
+            ("calibrations", str(len(self.calibration))),
+            ("measuring tasks", ", ".join(one.name for one in self.evaluation.tasks) or "none"),
+        ]
+        cells = (f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in rows)
+        title = escape(f"{self.label}: {self.title}")
+        return f"<p><strong>{title}</strong></p>\n<table>{''.join(cells)}</table>\n"
+
     def place(self, steps: Steps) -> Mark:
         """Where a path stands; what nobody has written, where the experiment itself does."""
         return self.mark if written(self.tree, *steps) is None else mark_of(self.tree, steps)
@@ -364,3 +386,13 @@ class Experiment:
         return self.builder(
             changed_tree(self.tree, str(self.source), {**(changes or {}), **sections})
         )
+
+
+def _words_of(position: Position) -> str:
+    """What is read in a position, in words."""
+    groups = (
+        f"{len(group.balls)} balls with {', '.join(group.probes)}"
+        + (f", {group.repeats} times" if group.repeats > 1 else "")
+        for group in position.readings
+    )
+    return f"{position.artefact}: {'; '.join(groups)}"

@@ -73,6 +73,15 @@ def in_one_line(text: str) -> str:
     return UNPRINTABLE.sub(_by_number, text)
 
 
+def in_lines(text: str) -> str:
+    r"""Write characters that are no part of a text of several lines by their numbers.
+
+    >>> in_lines("one\n\x1b[31mtwo")
+    'one\n\\x1b[31mtwo'
+    """
+    return text if text.isprintable() else "\n".join(map(in_one_line, text.split("\n")))
+
+
 def format_path(steps: Iterable[Step]) -> str:
     """Write a path as in messages and in overrides of variants.
 

@@ -33,8 +33,10 @@ from ..inputs.quantities import QuantityError, length_text, parse_angle, parse_l
 from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, read_table
+from ..inputs.yamltree import GivenText
 from ..machines.protocol import Array, ErrorModel, Unit
 from .generate import true_priors
+from .simulated import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"
@@ -183,19 +185,45 @@ def drawn_values(
     return np.asarray(np.array(true, float) + uncertainty * generator.standard_normal(len(true)))
 
 
-def write_certificate(stream: TextIO, experiment: Experiment, comment: str) -> None:
-    """Write all values that an experiment states, with all digits, below a line of comment."""
-    stream.write(f"# {comment}\n")
-    writer = CsvWriter(stream)
-    writer.writerow(COLUMNS)
+def certificate_rows(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:
+    """All values that an experiment states, with all digits, as rows of `COLUMNS`."""
     for one in certified_values(experiment):
         text = (
             length_text(one.value) if one.unit == "m" else f"{one.value!r} {UNIT_NAMES[one.unit]}"
         )
-        writer.writerow([one.item, one.first, one.second, text])
+        yield one.item, one.first, one.second, text
 
 
-def read_certificate(path: Path, experiment: Experiment) -> Experiment:
+def write_certificate(stream: TextIO, experiment: Experiment, comment: str) -> None:
+    """Write all values that an experiment states, below a line of comment."""
+    stream.write(f"# {comment}\n")
+    writer = CsvWriter(stream)
+    writer.writerow(COLUMNS)
+    writer.writerows(certificate_rows(experiment))
+
+
+def with_drawn_values(experiment: Experiment, found: Simulated) -> Experiment:
+    """An experiment with values of its certificates, priors and probe offsets that go with readings
+    that have just been simulated.
+    """
+    values = drawn_values(experiment, found.design, found.truth, found.model, found.generator)
+    return with_values(experiment, values)
+
+
+def ensure_certified(experiment: Experiment) -> None:
+    """Refuse an experiment that states no value with an uncertainty.
+
+    :raises ExperimentError: it does not.
+    """
+    if not certified_values(experiment):
+        text = (
+            "there is no certificate, prior or probe offset with an uncertainty; leave"
+            " --certificate out"
+        )
+        raise ExperimentError([Message(str(experiment.source), 0, 0, "", text)])
+
+
+def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experiment:
     """An experiment with the certificate values of a file in place of its own.
 
     :raises ExperimentError: a wrong table; a value that the experiment does not have, or has

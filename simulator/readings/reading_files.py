@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -21,7 +22,11 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow, column_names, read_table
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .gross_error_messages import refuse_gross_errors
+from .gross_error_messages import (
+    doubts_about_lengths,
+    doubts_about_volume,
+    refuse_gross_errors,
+)
 
 AXES = ("x", "y", "z")
 
@@ -45,18 +50,39 @@ class ObservedReadings:
     unplanned: tuple[str, ...]
     marks: tuple[Mark, ...] = ()
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """How far they are those that were planned, in words; nothing where they are."""
+        both = (("planned but not read", self.missing), ("read but not planned", self.unplanned))
+        return tuple(f"{what} ({len(names)}): {listing(names)}" for what, names in both if names)
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What of them is possible, and unlikely to be meant: lengths and places."""
+        of_volume = doubts_about_volume(self.design, self.x, self.marks)
+        return (*doubts_about_lengths(self.design, self.x), *of_volume)
+
+
+def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
+    """Readings in millimetres as the columns of their file: position, ball, probe, x_mm, y_mm and
+    z_mm.
+    """
+    names = {
+        "position": [design.positions.names[k] for k in readings.position],
+        "ball": [design.balls.names[k] for k in readings.ball],
+        "probe": [design.probes.names[k] for k in readings.probe],
+    }
+    lengths = zip(AXES[: design.dimension], (1e3 * x).T.tolist(), strict=True)
+    return names | {f"{axis}_mm": column for axis, column in lengths}
+
 
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
-    """Write readings in millimetres with all digits: position, ball, probe, x_mm, y_mm and z_mm."""
+    """Write the columns of readings with all digits."""
     writer = CsvWriter(stream)
-    writer.writerow(
-        ["position", "ball", "probe", *(f"{axis}_mm" for axis in AXES[: design.dimension])]
-    )
-    positions, balls, probes = design.positions.names, design.balls.names, design.probes.names
-    for ball, position, probe, row in zip(
-        readings.ball, readings.position, readings.probe, (1e3 * x).tolist(), strict=True
-    ):
-        writer.writerow([positions[position], balls[ball], probes[probe], *map(repr, row)])
+    columns = reading_columns(design, readings, x)
+    writer.writerow(list(columns))
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow([*row[:3], *map(repr, row[3:])])
 
 
 def read_readings(

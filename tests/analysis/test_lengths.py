@@ -251,10 +251,10 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     file = str(tmp_path / "design.yaml")
     for options, told in (
         ([], "the file states no target_uncertainty"),
-        (["--target", "3"], '--target: "3" has no unit'),
+        (["--target", "3"], 'target: "3" has no unit'),
         (
             ["--target", "1 um", "--grid", "3,3"],
-            "--grid has 2 numbers, but the experiment has 3 dimensions",
+            "the grid has 2 numbers, but the experiment has 3 dimensions",
         ),
         (["--target", "1 um", "--grid", "20"], "a grid of 8000 points is too fine"),
         (

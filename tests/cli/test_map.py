@@ -230,7 +230,7 @@ def test_a_picture_for_other_programs(scales: Path, tmp_path: Path) -> None:
 
 
 def test_magnification_is_round() -> None:
-    from ballplate.report.volumetric_plots import magnification_of
+    from ballplate.error_maps.volumetric_plots import magnification_of
 
     built = Volumetric(load_machine(ARM))
     found = built.errors(built.grid((3, 3, 3)))
@@ -285,7 +285,7 @@ def test_wrong_usage(
             "EC0Y is the squareness of Y to X, a single number: -45.00 urad at the reference point",
         ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
-        (("--points", "10"), "--points is for --line; leave it out"),
+        (("--points", "10"), "points go with a line; leave them out"),
         (("--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
         (

@@ -16,6 +16,7 @@ import ballplate as bp
 import pytest
 from ballplate.cli import main
 from ballplate.cli.progress import progress
+from ballplate.simulator.computing.steps import ProgressStep
 
 from tests.sweeps.support import hearing_interruptions
 
@@ -183,10 +184,10 @@ def test_the_bar_fits_the_terminal(width: int, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setenv("COLUMNS", str(width))
     with progress(Namespace(quiet=False, verbose=False)) as shown:
-        shown.show("data sets", 0, 2048)
+        shown.show(ProgressStep("data sets", 0, 2048))
         assert shown.bar is not None
         shown.bar.start_t -= 20
-        shown.show("data sets", 512, 2048, "accurate to 1.5 %")
+        shown.show(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"))
         shown.bar.refresh()
         assert all(len(line) < width for line in terminal.lines)
         drawn = terminal.lines[-1]
@@ -210,8 +211,8 @@ def test_each_step_has_a_bar_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setenv("COLUMNS", "80")
     threads = threading.active_count()
     with progress(Namespace(quiet=False, verbose=False)) as shown:
-        shown.show("candidates", 0, 3)
-        shown.show("starts of the search", 0, 25)
+        shown.show(ProgressStep("candidates", 0, 3))
+        shown.show(ProgressStep("starts of the search", 0, 25))
         assert threading.active_count() == threads
     told = [line.strip() for line in terminal.lines if line.strip()]
     assert "0/3 candidates" in told[0] and "0/25 starts of the search" in told[-1]
@@ -224,7 +225,7 @@ def test_lines_without_a_terminal_come_now_and_then(
     monkeypatch.setattr(time, "monotonic", lambda: now)
     with progress(Namespace(quiet=False, verbose=False)) as shown:
         for done in range(41):
-            shown.show("data sets", done, 80)
+            shown.show(ProgressStep("data sets", done, 80))
             now += 0.5
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
@@ -240,13 +241,13 @@ def test_every_step_of_a_plan_tells_how_much_there_is(tmp_path: Path) -> None:
     )
     file = tmp_path / "pool.yaml"
     file.write_text(Path(QUICKSTART).read_text() + f"\n{given}, probes: [down]}}\n")
-    told: list[tuple[str, int, int]] = []
-    bp.plan(file, positions=7, curve=True, report=lambda *step: told.append(step))
+    told: list[ProgressStep] = []
+    bp.plan(file, positions=7, curve=True, report=told.append)
     steps = {
-        what: [one for one in told if one[0] == what]
-        for what in dict.fromkeys(one[0] for one in told)
+        what: [one for one in told if one.what == what]
+        for what in dict.fromkeys(one.what for one in told)
     }
     assert {"candidates", "gains", "budgets of the curve"} < set(steps)
     for what, reports in steps.items():
-        wanted = reports[-1][2]
-        assert reports == [(what, done, wanted) for done in range(wanted + 1)]
+        wanted = reports[-1].wanted
+        assert reports == [ProgressStep(what, done, wanted) for done in range(wanted + 1)]

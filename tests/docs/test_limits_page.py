@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import lengths as lengths_command
-from ballplate.cli import spline
+from ballplate.error_maps import curve_options
 from ballplate.error_maps import error_curve as curve
 from ballplate.error_maps import length_map as lengths
 from ballplate.error_maps import volumetric_errors as volumetric
@@ -74,7 +74,7 @@ LIMITS = {
     "`lengths` |": (lengths.MOST_POINTS,),
     "`lengths --pairs`": (lengths_command.MOST_PAIRS,),
     "`map`": (volumetric.MOST_POINTS,),
-    "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, spline.MOST_ORDER),
+    "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, curve_options.MOST_ORDER),
 }
 
 

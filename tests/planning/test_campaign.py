@@ -21,6 +21,7 @@ from ballplate.planning.offer import offer
 from ballplate.planning.search import SelectionProblem
 from ballplate.results.study import predict
 from ballplate.simulator.computing.internal_error import InternalError
+from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
@@ -268,7 +269,7 @@ def test_hours_buy_certificates_too(tmp_path: Path) -> None:
     found = campaign(first(path), Request("U5", Budget(seconds=6 * HOUR)))
     assert {"sides", "flatness"} & {candidate.name for candidate in found.chosen}
     assert found.spent.seconds <= 6 * HOUR
-    full = found.plan.quantities["U5"]
+    full = found.prediction.quantities["U5"]
     assert found.value == pytest.approx(full.average, rel=1e-9)
 
 
@@ -321,12 +322,12 @@ def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
 
 
 def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
-    steps: list[tuple[str, int, int]] = []
+    steps: list[ProgressStep] = []
     request = Request("U6", Budget(positions=4))
-    campaign(load(drawn, planning=True)[0], request, report=lambda *step: steps.append(step))
-    searched = [(done, wanted) for what, done, wanted in steps if what == "starts of the search"]
+    campaign(load(drawn, planning=True)[0], request, report=steps.append)
+    searched = [(step.done, step.wanted) for step in steps if step.what == "starts of the search"]
     assert len(searched) > 1
     assert searched == [
         (done, searched[0][1]) for done in range(searched[0][0], searched[0][1] + 1)
     ]
-    assert all(0 <= done <= wanted for _, done, wanted in steps)
+    assert all(0 <= step.done <= step.wanted for step in steps)

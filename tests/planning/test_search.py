@@ -202,7 +202,7 @@ def test_the_number_of_workers_changes_nothing() -> None:
     one, two = (campaign(small(), request, workers=workers) for workers in (1, 2))
     assert [c.name for c in one.chosen] == [c.name for c in two.chosen]
     assert (one.value, one.bound) == (two.value, two.bound)
-    assert one.plan.quantities["U6"].average == pytest.approx(one.value, rel=1e-9)
+    assert one.prediction.quantities["U6"].average == pytest.approx(one.value, rel=1e-9)
 
 
 def test_gains_are_what_a_selection_is_without_and_with() -> None:

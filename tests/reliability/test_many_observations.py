@@ -52,11 +52,11 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     rows, columns = entries(observed.design)
     monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
     tested = fit(experiment, observed)
-    assert tested.untested == "" and tested.doubts == ()
+    assert tested.untested == "" and tested.cautions == ()
     monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
     found = fit(experiment, observed)
     assert (
-        f"at most {rows - 1} are possible" in found.doubts[0]
-        and "fit the means of repeated" in found.doubts[0]
+        f"at most {rows - 1} are possible" in found.cautions[0]
+        and "fit the means of repeated" in found.cautions[0]
     )
     assert found.estimates == tested.estimates and not found.diagnosis

@@ -55,7 +55,7 @@ def test_vectors_begin_where_balls_were_read(planar: Fit) -> None:
     axes = planar.plot().axes[0]
     markers = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
     drawn = np.array(sorted(np.concatenate(markers).tolist()))
-    np.testing.assert_allclose(drawn, sorted((1e3 * planar.x).tolist()))
+    np.testing.assert_allclose(drawn, sorted((1e3 * planar.observed.x).tolist()))
 
 
 def test_a_notebook_shows_a_figure(planar: Fit) -> None:
@@ -74,7 +74,7 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
     pool = {"candidates": [PLACES | {"probes": ["down"]}]}
     campaign = bp.plan(bp.quickstart().with_(pool=pool), positions=7)
     assert repr(campaign).startswith("<Campaign of quickstart: 7 of ") and len(repr(campaign)) < 100
-    assert bp.run(campaign.chosen_experiment).quantities == campaign.plan.quantities
+    assert bp.run(campaign.chosen_experiment).quantities == campaign.prediction.quantities
     figure = campaign.plot(str(tmp_path / "plan.png"))
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
     drawn = {text.get_text() for axes in figure.axes for text in axes.texts}
@@ -83,8 +83,9 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
 
 def test_what_cannot_be_drawn_is_refused(planar: Fit, tmp_path: Path) -> None:
     experiment = bp.quickstart()
-    with pytest.raises(ValueError, match="two dimensions.*has three"):
-        bp.fit(experiment, bp.simulate(experiment)).plot()
+    other = bp.fit(experiment, bp.simulate(experiment), estimator="distances")
+    with pytest.raises(ValueError, match="by the full estimator and reversal only"):
+        other.plot()
     with pytest.raises(ValueError, match=r"should end in one of \.svg"):
         planar.plot(tmp_path / "picture.jpg")
 

@@ -69,19 +69,5 @@ def test_fit_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert drawn.count("<!-- 13 -->") == (2 if estimator == "full" else 1)
     assert main(["fit", *REAL, "--plot", str(tmp_path / "none" / "a.svg")]) == 3
     assert "cannot be written" in capsys.readouterr().err
-    for wrong in (["designs/quickstart.yaml"], [str(FOLDER / "real.yaml"), "--estimator", "kruth"]):
-        assert (
-            main(
-                [
-                    "fit",
-                    wrong[0],
-                    REAL[1],
-                    *REAL[2:4][: 2 * (len(wrong) > 1)],
-                    *wrong[1:],
-                    "--plot",
-                    "a.svg",
-                ]
-            )
-            == 2
-        )
-        assert "--plot draws residuals" in capsys.readouterr().err
+    assert main(["fit", *REAL, "--estimator", "kruth", "--plot", "a.svg"]) == 2
+    assert "--plot draws residuals" in capsys.readouterr().err

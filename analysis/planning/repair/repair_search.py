@@ -43,7 +43,7 @@ MOST_VERIFIED = 8
 
 @dataclass(frozen=True, eq=False)
 class Repair:
-    """Changes that leave nothing undetermined, with the plan of the changed design.
+    """Changes that leave nothing undetermined, with the prediction of the changed design.
 
     `removes` are the numbers, from 0, of the undetermined directions that are gone. `weak` counts
     directions still weakly determined, of which `worst` is what one standard deviation along the
@@ -59,7 +59,7 @@ class Repair:
     worst: float
     smallest: float
     is_faint: bool
-    plan: Prediction | None
+    prediction: Prediction | None
     edits: tuple[Edit, ...]
 
 
@@ -364,7 +364,7 @@ class _Search:
         return self.before.open_errors @ independent_mixture(self.base.at)
 
     def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
-        """A repair with the plan of the changed design."""
+        """A repair with the prediction of the changed design."""
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)
         after = self.judge(changes)

@@ -62,7 +62,7 @@ def _worth(repair: Repair, judged: Verdict) -> str:
         words += ", and nothing is weakly determined"
     if repair.removes:
         words += f"; removes {_directions(repair, judged)}"
-    u6 = None if repair.plan is None else repair.plan.quantities.get("U6")
+    u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
     if u6 is not None:
         words += f"; average U6 {number(1e6 * u6.average)} um"
     return f"{words}; smallest singular value {repair.smallest:.3g}"
@@ -156,7 +156,7 @@ def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
 
 
 def _data(repair: Repair) -> dict[str, Any]:
-    u6 = None if repair.plan is None else repair.plan.quantities.get("U6")
+    u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
     return {
         "changes": [
             {"kind": KINDS[change.kind], "text": change.words} for change in repair.changes

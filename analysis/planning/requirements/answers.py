@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from ...presentation.formatting import aligned
+from ...presentation.panels import TriedValues, draw_tried
 from ...presentation.result import Result
 from .goals import Goal, Judgement
 from .unknowns import UnknownName
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -19,7 +26,8 @@ class Answer:
     was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
     unknown cannot be `varied`. `words` and `value`, in metres or a number, are the value needed, or
     without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
-    gives. `remarks` tell of the range.
+    gives. `remarks` tell of the range. `tried` are the values that were looked at, with how far
+    from the goal each is and whether it meets it.
     """
 
     name: UnknownName
@@ -32,6 +40,7 @@ class Answer:
     outcome: str = ""
     beside: str = ""
     remarks: tuple[str, ...] = ()
+    tried: tuple[tuple[float, float, bool], ...] = field(default=(), repr=False)
 
     @property
     def is_met(self) -> bool:
@@ -61,6 +70,34 @@ class Reach(Result):
     def rows(self) -> list[dict[str, Any]]:
         """One row for each unknown."""
         return [{"unknown": name, **answer} for name, answer in self.to_dict()["answers"].items()]
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """How far from the goal the values are that were tried of each unknown.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else, or there is nothing to be drawn.
+        """
+        panels = [_panel(one) for one in self.answers if one.tried]
+        if not panels:
+            raise ValueError("no value was tried of any unknown, so that there is nothing to draw")
+        goal, limit = self.goal, 1.0
+        axis = "largest of targets" if goal.kind == "tasks" else f"{goal.symbol} over the goal"
+        if goal.kind == "lengths":
+            axis, limit = "share not within", 1.0 - goal.share
+        return draw_tried(panels, axis, limit, f"{self.title}: values tried for {goal}", path)
+
+
+def _panel(answer: Answer) -> TriedValues:
+    """What was tried of an unknown, lengths in micrometres and sizes of plates in millimetres."""
+    unit, factor = {
+        "repeatability": ("um", 1e6),
+        "certificate": ("um", 1e6),
+        "size": ("mm", 1e3),
+    }.get(answer.name, ("", 1.0))
+    values, distances, is_met = (np.array(column) for column in zip(*answer.tried, strict=True))
+    return TriedValues(answer.title, unit, factor * values, distances, is_met)
 
 
 def _lines(reach: Reach) -> list[str]:

@@ -154,6 +154,20 @@ class _Trials:
             return Tried(words, None, 0, f"{first.path}: {first.text}")
         return Tried(words, judge(self.searched.goal, found), found.deficiency, "")
 
+    @property
+    def tried(self) -> tuple[tuple[float, float, bool], ...]:
+        """Values that have one, in ascending order, with how far from the goal each is and whether
+        it meets it.
+        """
+        judged = ((self.one.value(step), tried.judgement) for step, tried in self.known.items())
+        return tuple(
+            sorted(
+                (value, found.distance, found.is_met)
+                for value, found in judged
+                if value is not None and found is not None and np.isfinite(found.distance)
+            )
+        )
+
     def judgement(self, step: int) -> Judgement:
         """How the goal is met with a value with which the file is right."""
         found = self.at(step).judgement
@@ -186,7 +200,8 @@ def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficienc
         )
         return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
-    return _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
+    found = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
+    return replace(found, tried=trials.tried)
 
 
 def _without_value(one: Unknown, status: Literal["undetermined", "varied"], remark: str) -> Answer:

@@ -12,7 +12,6 @@ from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.volumetric import meaning, symbol
 
-from ..error_maps.volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 from ..presentation.formatting import SHOWN, number
 from ..presentation.scene import box_edges, projection
 from ..presentation.svg import (
@@ -29,9 +28,11 @@ from ..presentation.svg import (
     round_number,
     save,
 )
+from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 52.0
 
@@ -63,10 +64,11 @@ def draw_grid(
     errors: VolumetricErrors,
     diagonals: LengthErrors,
     counts: tuple[int, int, int],
-    magnified: int | None,
-    path: Path,
-) -> None:
-    """Write a picture of the grid's outside, nominal and displaced.
+    magnified: float | None = None,
+    path: str | Path | None = None,
+) -> Figure:
+    """A picture of the grid's outside, nominal and displaced, which is written to the path if there
+    is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -114,7 +116,7 @@ def draw_grid(
         figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
         axes.set_xlim(low[0] - 0.16 * size, high[0] + 0.12 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
-        save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
+        return save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
 
 
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
@@ -161,9 +163,9 @@ def _axis_names(axes: Axes, nominal: Array, view: Array, size: float) -> None:
             )
 
 
-def draw_line(errors: VolumetricErrors, path: Path) -> None:
-    """Write a picture of the errors along a line: components, resultant, and twice the random part
-    about them.
+def draw_line(errors: VolumetricErrors, path: str | Path | None = None) -> Figure:
+    """A picture of the errors along a line: components, resultant, and twice the random part about
+    them; it is written to the path, if there is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -205,11 +207,12 @@ def draw_line(errors: VolumetricErrors, path: Path) -> None:
             f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
             f" {positions[worst]:.6g} mm"
         )
-        save(figure, path, f"Volumetric errors {along}: {told}")
+        return save(figure, path, f"Volumetric errors {along}: {told}")
 
 
-def draw_along(along: AlongAxis, path: Path) -> None:
-    """Write a picture of a parametric error along its axis, as stated and at the reference point.
+def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
+    """A picture of a parametric error along its axis, as stated and at the reference point; it is
+    written to the path, if there is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -251,7 +254,7 @@ def draw_along(along: AlongAxis, path: Path) -> None:
             )
         _band_in_legend(axes, bool(deviation.any()))
         _finish(axes, f"{name[2].lower()}, mm", unit)
-        save(figure, path, f"{name}, {meaning(name)}{band}")
+        return save(figure, path, f"{name}, {meaning(name)}{band}")
 
 
 def _band(

@@ -9,8 +9,6 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.splines.read import CurvePoints
 
-from ..error_maps.curve_tables import derivative_unit, shown
-from ..error_maps.error_curve import ErrorCurve, whole_profile
 from ..presentation.svg import (
     INK,
     MUTED,
@@ -22,9 +20,12 @@ from ..presentation.svg import (
     round_number,
     save,
 )
+from .curve_tables import derivative_unit, shown
+from .error_curve import ErrorCurve, whole_profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Points: of the drawings.
 WIDTH, HEIGHT = 460.0, 300.0
@@ -32,8 +33,9 @@ WIDTH, HEIGHT = 460.0, 300.0
 LONGEST = 0.18
 
 
-def plot(curve: ErrorCurve, path: Path) -> None:
-    """Draw points, curve, its expanded uncertainty, knots and boundaries to a file.
+def draw_curve(curve: ErrorCurve, path: str | Path | None = None) -> Figure:
+    """Points, curve, its expanded uncertainty, knots and boundaries as a picture, which is written
+    to the path if there is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -93,7 +95,7 @@ def plot(curve: ErrorCurve, path: Path) -> None:
         axes.set_ylabel(f"{y.words}, {micro(y.unit)}")
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", ncols=3, borderaxespad=0.3)
-        save(figure, path, words(curve))
+        return save(figure, path, words(curve))
 
 
 def words(curve: ErrorCurve) -> str:
@@ -111,11 +113,14 @@ def words(curve: ErrorCurve) -> str:
     )
 
 
-def whiskers(
-    curve: ErrorCurve, points: CurvePoints, path: Path, magnification: float | None = None
-) -> None:
-    """Draw the errors of all points of the file as bars normal to the profile, those of the fit in
-    front, to a file.
+def draw_whiskers(
+    curve: ErrorCurve,
+    points: CurvePoints,
+    path: str | Path | None = None,
+    magnification: float | None = None,
+) -> Figure:
+    """The errors of all points of the file as bars normal to the profile, those of the fit in
+    front; the picture is written to the path, if there is one.
 
     :raises SplineError: neighbouring points that stand at the same place.
     :raises OSError: the file cannot be written.
@@ -170,7 +175,7 @@ def whiskers(
         worst = int(np.argmax(comparable(np.abs(points.y))))
         told = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
         largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"
-        save(figure, path, f"{told}, magnified {magnification:g} times; {largest_told}")
+        return save(figure, path, f"{told}, magnified {magnification:g} times; {largest_told}")
 
 
 def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.ndarray:

@@ -1,0 +1,197 @@
+"""What is asked for of an error curve, as texts with units, and what comes of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ballplate.simulator.inputs.quantities import (
+    UNITS,
+    QuantityError,
+    metres_or_radians,
+    parse_angle,
+    parse_length,
+    parse_ratio,
+)
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.splines.read import Column, CurvePoints
+
+from .error_curve import EVERY, CurveSettings, Hold, Place
+
+# A polynomial through so many points keeps seven digits; with each further order it loses nearly
+# one.
+MOST_ORDER = 16
+
+
+class OptionError(ValueError):
+    """An option's value cannot be used."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked for, as the options of `ballplate spline` have it; texts have units.
+
+    `at` has places, the word value or slope, and what it is there.
+    """
+
+    every: int | None = None
+    knots: str | None = None
+    order: int = 4
+    start: str = "start"
+    end: str = "end"
+    boundary: Sequence[str] = ()
+    straight: Sequence[int] = ()
+    start_value: str | None = None
+    start_slope: str | None = None
+    end_value: str | None = None
+    end_slope: str | None = None
+    at: Sequence[tuple[str, str, str]] = ()
+    periodic: bool = False
+    period: str | None = None
+    uncertainty: str | None = None
+    evaluate: str | None = None
+
+
+# Kinds of what is asked for that is no text.
+KINDS = {"every": int, "order": int, "periodic": bool}
+LISTS = ("boundary", "straight", "at")
+
+
+def ensure_asked(given: Mapping[str, object]) -> None:
+    """Refuse what cannot be asked for of a curve.
+
+    :raises TypeError: an unknown name, or another kind of value.
+    """
+    names = [one.name for one in fields(Asked)]
+    for name, value in given.items():
+        if name not in names:
+            raise TypeError(f'"{name}" is unknown; {hint(name, names)}')
+        kind = KINDS.get(name, str)
+        if name in LISTS:
+            if isinstance(value, str) or not isinstance(value, Sequence):
+                raise TypeError(f"{name}={value!r}; give a list")
+        elif value is not None and not isinstance(value, kind):
+            words = {int: "a whole number", bool: "True or False", str: "a text with a unit"}
+            raise TypeError(f"{name}={value!r}; give {words[kind]}")
+
+
+def curve_settings(options: Asked, points: CurvePoints) -> CurveSettings:
+    """What the options ask for.
+
+    :raises OptionError: a value that is no length, angle or slope.
+    """
+    x, y = points.x_column, points.y_column
+    holds = []
+    for end in ("start", "end"):
+        for derivative, what in enumerate(("value", "slope")):
+            text = getattr(options, f"{end}_{what}")
+            if text is not None:
+                holds.append(
+                    Hold(end, derivative, _value(f"--{end}-{what}", text, derivative, x, y))
+                )
+    for place, what, text in options.at:
+        if what not in ("value", "slope"):
+            raise OptionError(
+                f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0'
+            )
+        derivative = ("value", "slope").index(what)
+        holds.append(
+            Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y))
+        )
+    knots = None
+    if options.knots is not None:
+        knots = (
+            ()
+            if options.knots.strip() == "none"
+            else tuple(sorted(listed("--knots", options.knots, x)))
+        )
+    if not 2 <= options.order <= MOST_ORDER:
+        raise OptionError(f"--order should be 2 to {MOST_ORDER}; 4 is a cubic spline")
+    period = None
+    if options.period is not None:
+        period = positive(options.period, x, "--period")
+    elif options.periodic:
+        if x.kind == "length":
+            raise OptionError(
+                '--periodic: the abscissa is a length; state the period, as in --period "10 mm"'
+            )
+        period = positive("360 deg", x)
+    if options.start.strip() == "end" or options.end.strip() == "start":
+        raise OptionError(
+            "the curve starts at its start and ends at its end; give --start and --end other places"
+        )
+    return CurveSettings(
+        order=options.order,
+        every=options.every or EVERY,
+        knots=knots,
+        start=_place("--start", options.start, x),
+        end=_place("--end", options.end, x),
+        boundaries=tuple(_place("--boundary", text, x) for text in options.boundary),
+        straight=tuple(options.straight),
+        holds=tuple(holds),
+        period=period,
+    )
+
+
+def _parser(kind: str) -> Callable[[object], float]:
+    return parse_length if kind == "length" else parse_angle
+
+
+def _quantity(option: str, text: str, kind: str) -> float:
+    if text.strip() in ("0", "-0", "0.0"):
+        return 0.0
+    try:
+        return _parser(kind)(text)
+    except QuantityError as error:
+        raise OptionError(f"{option}: {error}") from None
+
+
+def positive(text: str, column: Column, option: str = "--uncertainty") -> float:
+    found = _quantity(option, text, column.kind)
+    if found <= 0:
+        raise OptionError(f'{option}: "{text}" must be above zero')
+    return found
+
+
+def listed(option: str, text: str, column: Column) -> list[float]:
+    return [_quantity(option, part, column.kind) for part in text.split(",")]
+
+
+def _place(option: str, text: str, column: Column) -> Place:
+    plain = text.strip()
+    if plain in ("start", "end"):
+        return "start" if plain == "start" else "end"
+    parts = plain.split(",")
+    if len(parts) > 2 or len(parts) == 2 and column.kind != "length":
+        raise OptionError(
+            f'{option}: "{text}" should be one abscissa, or two nominal co-ordinates on a profile'
+        )
+    if len(parts) == 2:
+        return _quantity(option, parts[0], "length"), _quantity(option, parts[1], "length")
+    return _quantity(option, plain, column.kind)
+
+
+def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> float:
+    """A value of the error, or a slope as a unit of the error over one of the abscissa."""
+    if derivative == 0:
+        return _quantity(option, text, y.kind)
+    plain = text.strip().replace("µ", "u").replace("μ", "u")
+    if plain in ("0", "-0", "0.0"):
+        return 0.0
+    if re.match("[+-]?[0-9]+,[0-9]", plain):
+        raise OptionError(
+            f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
+        )
+    found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
+    units: Any = UNITS
+    with suppress(QuantityError):
+        if found and found[2] in units[y.kind] and found[3] in units[x.kind]:
+            return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
+        if x.kind == y.kind == "length":
+            return parse_ratio(plain)
+    raise OptionError(
+        f'{option}: "{text}" is not a slope; write for example "2 {y.unit}/{x.unit}", or 0'
+    )

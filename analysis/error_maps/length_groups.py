@@ -1,0 +1,98 @@
+"""Lengths throughout the volume in groups: by place, by length and by direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.quantities import LengthFunction, format_length
+from ballplate.simulator.machines.protocol import Array, Integers
+
+
+@dataclass(frozen=True)
+class LengthMapSettings:
+    """What lengths are looked at: `grid` points along each axis, with a probe, and how they are
+    compared.
+
+    `with_repeatability`: whether the scatter of the two readings along the length adds to its
+    uncertainty. The `target` is meant for `target_factor` times the standard uncertainty.
+    """
+
+    grid: tuple[int, ...]
+    probe: str
+    target: LengthFunction
+    coverage_factor: float = 2.0
+    with_repeatability: bool = False
+    target_factor: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class LengthGroups:
+    """Lengths in g groups; all arrays (g,), uncertainties in metres, NaN where no length is
+    determined.
+
+    `count` of them there are, `undetermined` of these are open; `average` and `maximum` are
+    standard uncertainties, `average_ratio` and `maximum_ratio` those to the target; `within` and
+    `within_expanded` count the lengths whose standard and expanded uncertainties are no larger than
+    the target, `within_target` those with the uncertainty that the target is meant for.
+    """
+
+    count: Integers
+    undetermined: Integers
+    average: Array
+    maximum: Array
+    average_ratio: Array
+    maximum_ratio: Array
+    within: Integers
+    within_expanded: Integers
+    within_target: Integers
+
+    def share(self, expanded: bool = False) -> Array:
+        """Shares of lengths within the target (g,), undetermined ones counted as not; NaN of an
+        empty group.
+        """
+        within = self.within_expanded if expanded else self.within
+        return np.asarray(np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GroupedLengths:
+    """Lengths between all points of a grid, grouped.
+
+    `points` (n, d) are scale readings, metres, the last axis changing fastest. `by_point` has a
+    group for each point, of the lengths that start or end there; `by_length` those between
+    neighbouring `edges` (c + 1,); `by_direction` those of `directions`; `whole` a single one.
+    `worst` are the indices of the length with the largest ratio, and `open_pairs` (up to three, 2)
+    of some that are undetermined. `expected` is the rank deficiency that the file expects.
+    """
+
+    label: str
+    title: str
+    design: Design
+    deficiency: int
+    expected: int | None
+    settings: LengthMapSettings
+    points: Array
+    edges: Array
+    directions: tuple[str, ...]
+    by_point: LengthGroups
+    by_length: LengthGroups
+    by_direction: LengthGroups
+    whole: LengthGroups
+    worst: tuple[int, int] | None
+    open_pairs: tuple[tuple[int, int], ...]
+
+    @property
+    def is_met(self) -> bool:
+        """Whether all lengths are within the target, by the uncertainty that it is meant for."""
+        return bool(self.whole.within_target[0] == self.whole.count[0])
+
+
+def target_words(target: LengthFunction) -> str:
+    """The target as it is written in a file.
+
+    >>> target_words(LengthFunction(5e-7, 1e-6))
+    '0.5 um + L/1000000'
+    """
+    return format_length(target.constant) + (f" + L/{1 / target.slope:.9g}" if target.slope else "")

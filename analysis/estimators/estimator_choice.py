@@ -1,0 +1,80 @@
+"""The estimators of readings by name, and what each of them takes beside the readings.
+
+What computes is loaded where it is used, so that the names are at hand at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.readings.reading_files import ObservedReadings
+
+    from ..presentation.result import FitResult
+
+EstimatorName = Literal[
+    "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"
+]
+PairSet = Literal["corner sides", "corner diagonals", "corners", "neighbours", "braced", "all"]
+
+ESTIMATORS: tuple[EstimatorName, ...] = get_args(EstimatorName)
+OF_DISTANCES = ("distances", "cresto", "kruth")
+OF_LENGTHS = ("length-equations", "sphere-then-metric")
+DRAWN = ("full", "reversal")
+"""Those that draw their residuals."""
+PAIR_SETS: tuple[PairSet, ...] = get_args(PairSet)
+
+# Which estimators take what; everything else all of them do.
+TAKE: dict[str, tuple[str, ...]] = {
+    "scale": ("reversal",),
+    "offsets": ("reversal",),
+    "pairs": OF_DISTANCES,
+    "across_probes": OF_DISTANCES,
+    "monomials": ("full", *OF_DISTANCES),
+}
+
+
+def takers(estimator: str, given: Collection[str]) -> tuple[str, str] | None:
+    """The first of what is given that the estimator does not take, with those that do, in words.
+
+    >>> takers("full", ["monomials", "pairs"])
+    ('pairs', 'distances, cresto or kruth')
+    """
+    for name, estimators in TAKE.items():
+        if name in given and estimator not in estimators:
+            return name, " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
+    return None
+
+
+def fit_readings(
+    experiment: Experiment,
+    observed: ObservedReadings,
+    estimator: EstimatorName = "full",
+    sigma: Literal["estimated", "given"] | None = None,
+    monomials: bool = False,
+    pairs: PairSet | None = None,
+    across_probes: bool = False,
+    scale: Any = None,
+    offsets: bool = True,
+) -> FitResult:
+    """What an estimator makes of an experiment's readings.
+
+    :raises ExperimentError: it cannot estimate this experiment.
+    """
+    if estimator == "reversal":
+        from .reversal_fits import fit_reversal
+
+        return fit_reversal(experiment, observed, scale, offsets, sigma)
+    if estimator == "length-equations" or estimator == "sphere-then-metric":
+        from .length_fits import fit_lengths
+
+        return fit_lengths(experiment, observed, estimator, sigma)
+    if estimator == "full":
+        from ..results.study import fit
+
+        return fit(experiment, observed, sigma, monomials)
+    from .distances import fit_alternative
+
+    return fit_alternative(experiment, observed, estimator, pairs, across_probes, monomials)

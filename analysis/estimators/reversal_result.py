@@ -1,0 +1,293 @@
+"""A reversal and the full estimate beside it, as they show themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ballplate.simulator.estimation.reversal import Reversal
+from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes
+from ballplate.simulator.machines.metric import Scale
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.reading_files import ObservedReadings
+
+from ..presentation.formatting import SHOWN, aligned, number, to_uncertainty
+from ..presentation.result import FitResult
+from ..presentation.vectors import Vectors, draw_vectors
+from ..results.estimates import ParameterEstimate
+from ..results.fit import Fit
+from ..results.parts import MOST_BALLS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# The first-order equations may change a result by this many of its standard uncertainties before a
+# warning is due.
+NOTICEABLE = 0.5
+# With more than this many they are of no use.
+USELESS = 5.0
+
+# Chance that offsets are missed although there are none.
+ERRS = 1e-3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReversalFit(FitResult):
+    """The reversal, and the full estimate of the same readings.
+
+    `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
+    first; `places` (n, 2) are the readings in the first. `names` and `coordinates` (n, 2) are the
+    balls by the reversal in the plate's own `axes`. `full` is the estimate by multiple redundancy
+    with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless
+    `scale` is "none") and offsets as the reversal defines them, with standard uncertainties.
+    `without_offsets` is the chance of a ratio of sums of squares such as found if there were none;
+    NaN where they are parameters.
+    """
+
+    label: str
+    title: str
+    scale: Scale
+    offsets: bool
+    first: str
+    second: str
+    places: Array
+    found: Reversal
+    estimates: tuple[ParameterEstimate, ...]
+    axes: PlateAxes
+    names: tuple[str, ...]
+    coordinates: Array
+    full: Fit
+    redundant: tuple[ParameterEstimate, ...]
+    without_offsets: float
+
+    @property
+    def turn(self) -> float:
+        """The turn in radians that multiple redundancy finds, or the reversal where that finds
+        none.
+        """
+        betas = [
+            one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)
+        ]
+        return np.pi / 2.0 + (betas[0] if betas else self.found.exact_beta)
+
+    @property
+    def distortion(self) -> float:
+        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's
+        own axes.
+        """
+        exact, _ = in_plate_axes(self.found.exact_coordinates, self.axes)
+        return float(np.abs(self.coordinates - exact).max())
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Readings in the first position less what those in the second predict."""
+        label = f"{self.first}, less what {self.second} predicts"
+        return (Vectors(label, self.places, self.found.residuals, self.names),)
+
+    @property
+    def observed(self) -> ObservedReadings:
+        """The readings of both."""
+        return self.full.observed
+
+    @property
+    def complaint(self) -> str:
+        if not self.full.converged:
+            return f"the estimate by multiple redundancy has {self.full.solution.status}"
+        return self.full.verdict.complaint or (
+            self._neglected() if self.found.bias > USELESS else ""
+        )
+
+    def headline(self) -> str:
+        values = (f"{one.name} {1e6 * one.value:.4g} {SHOWN[one.unit]}" for one in self.estimates)
+        return f"reversal, {', '.join(values)}"
+
+    def lines(self) -> list[str]:
+        return _lines(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return _data(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each parameter, that of multiple redundancy beside it."""
+        redundant = {one.name: one for one in self.redundant}
+        rows = []
+        for one in self.estimates:
+            other = redundant.get(one.name)
+            rows.append(
+                {
+                    "parameter": one.name,
+                    "reversal": one.value,
+                    "multiple redundancy": np.nan if other is None else other.value,
+                    "its standard uncertainty": (
+                        np.nan if other is None else other.standard_uncertainty
+                    ),
+                    "unit": one.unit,
+                }
+            )
+        return rows
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        return draw_vectors(self.residual_vectors(), self.title, path)
+
+    def _neglected(self) -> str:
+        """What the first-order equations change by what they neglect."""
+        away = np.degrees(abs(self.turn - np.pi / 2.0))
+        told = f"{away:.4g} degrees" if away >= 1.0 else f"{3600.0 * away:.3g} arcsec"
+        offset = float(np.abs(self.found.offset - self.found.exact_offset).max())
+        shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
+        return (
+            f"the turn is {told} from 90 degrees, too far for equations of the first order: what"
+            " they neglect changes co-ordinates of balls by up to"
+            f" {_length(self.distortion)}{shift}, and results by up to {number(self.found.bias, 2)}"
+            " of their standard uncertainties; turn the plate closer to 90 degrees, or take the"
+            " results of multiple redundancy"
+        )
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        told = []
+        if NOTICEABLE < self.found.bias <= USELESS:
+            told.append(self._neglected())
+        if self.without_offsets < ERRS:
+            told.append(
+                "the residuals are those of an offset between the positions; fit without"
+                " --no-offsets"
+            )
+        if self.full.converged and self.full.too_large:
+            told.append(
+                "the residuals are larger than the stated repeatability explains; standard"
+                " uncertainties of multiple "
+                + (
+                    "redundancy are scaled by them"
+                    if self.full.sigma_is_estimated
+                    else "redundancy are too small"
+                )
+            )
+        return tuple(told)
+
+
+def _lines(fit: ReversalFit) -> list[str]:
+    """A reversal as lines of text: parameters and co-ordinates, those of multiple redundancy beside
+    them.
+    """
+    found, full = fit.found, fit.full
+    turn = number(float(np.degrees(fit.turn)), 8)
+    count = "five parameters" if fit.offsets else "three parameters, no offsets"
+    scale = "none (fitted, but not applied)" if fit.scale == "none" else fit.scale
+    lines = [
+        f"{fit.label}: {fit.title}",
+        f"reversal, {count}, scale difference: {scale}",
+        (
+            f'{len(fit.names)} balls; "{fit.second}" is turned by {turn} degrees, clockwise, from'
+            f' "{fit.first}"'
+        ),
+        (
+            f"sigma = {number(1e6 * found.sigma)} um with {found.degrees_of_freedom} degrees of"
+            " freedom, of the difference of two readings; of a single one"
+            f" {number(1e6 * found.single)} um"
+        ),
+        (
+            "what the first-order equations neglect changes no result by more than"
+            f" {number(found.bias, 2)} standard uncertainties"
+        ),
+        (
+            f"multiple redundancy: {full.solution.status}; sigma = {number(full.sigma)} times the"
+            " stated uncertainties"
+            f" ({'estimated from the residuals' if full.sigma_is_estimated else 'as given'})"
+        ),
+        "",
+    ]
+    redundant = {e.name: e for e in fit.redundant}
+    rows = [["parameter", "reversal", "multiple redundancy", "its standard uncertainty", "unit"]]
+    for one in fit.estimates:
+        other = redundant.get(one.name)
+        u = np.nan if other is None else 1e6 * other.standard_uncertainty
+        digits = 1e6 * found.sigma if np.isnan(u) else u
+        beside = (
+            ["-", "-"] if other is None else [to_uncertainty(1e6 * other.value, u), number(u, 3)]
+        )
+        rows.append([one.name, to_uncertainty(1e6 * one.value, digits), *beside, SHOWN[one.unit]])
+    lines += aligned(rows, [False, True, True, True, False])
+    return [*lines, "", *_ball_lines(fit)]
+
+
+def _ball_lines(fit: ReversalFit) -> list[str]:
+    rows = [
+        [
+            "ball",
+            "x, mm",
+            "y, mm",
+            "multiple redundancy: x, mm",
+            "y, mm",
+            "standard uncertainty of x, um",
+            "of y, um",
+        ]
+    ]
+    plate = fit.full.plates[0] if fit.full.plates else None
+    nothing = np.full_like(fit.coordinates, np.nan)
+    others, us = (plate.coordinates, plate.standard_uncertainties) if plate else (nothing, nothing)
+    for name, here, there, u in zip(fit.names, fit.coordinates, others, us, strict=True):
+        cells = [
+            to_uncertainty(1e3 * value, 1e3 * size)
+            for values in (here, there)
+            for value, size in zip(values, u, strict=True)
+        ]
+        rows.append([name, *cells, *(number(1e6 * size, 3) for size in u)])
+    lines = [
+        f"co-ordinates of the balls in the plate's own axes ({axes_words(fit.axes, fit.names)})"
+    ]
+    lines += aligned(rows[: MOST_BALLS + 1], [False] + [True] * 6)
+    return lines + (
+        [f"({len(rows) - 1 - MOST_BALLS} balls more in --json)"]
+        if len(rows) - 1 > MOST_BALLS
+        else []
+    )
+
+
+def _data(fit: ReversalFit) -> dict[str, Any]:
+    """A reversal as plain data in metres and radians; `multiple_redundancy` has the full fit."""
+    found = fit.found
+    return {
+        "experiment": fit.label,
+        "title": fit.title,
+        "estimator": "reversal",
+        "scale": fit.scale,
+        "offsets": fit.offsets,
+        "positions": {"first": fit.first, "second": fit.second},
+        "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "neglected_standard_uncertainties": found.bias,
+        "neglected_coordinates": fit.distortion,
+        "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
+        "estimates": {e.name: {"value": e.value, "unit": e.unit} for e in fit.estimates},
+        "axes": {
+            "origin": fit.names[fit.axes.origin],
+            "xy"[fit.axes.axis]: fit.names[fit.axes.ball],
+        },
+        "balls": _by_ball(fit.names, fit.coordinates),
+        "residuals": _by_ball(fit.names, found.residuals),
+        "multiple_redundancy": {
+            "relation": {
+                e.name: {
+                    "value": None if np.isnan(e.value) else e.value,
+                    "standard_uncertainty": None if np.isnan(e.value) else e.standard_uncertainty,
+                    "unit": e.unit,
+                }
+                for e in fit.redundant
+            },
+            **fit.full.to_dict(),
+        },
+        **fit.said(),
+    }
+
+
+def _by_ball(names: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:
+    return {
+        name: {axis: {"value": value, "unit": "m"} for axis, value in zip("xy", row, strict=True)}
+        for name, row in zip(names, values.tolist(), strict=True)
+    }
+
+
+def _length(value: float) -> str:
+    return f"{number(1e3 * value, 2)} mm" if value >= 1e-3 else f"{number(1e6 * value, 2)} um"

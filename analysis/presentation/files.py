@@ -1,0 +1,19 @@
+"""Files that a result is asked to write."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+
+def write_file(path: str | Path, content: bytes) -> None:
+    """Write a file as a whole.
+
+    :raises OSError: it cannot be written; where its folder is missing the text says so.
+    """
+    path = Path(path)
+    try:
+        path.write_bytes(content)
+    except FileNotFoundError:
+        text = f"there is no folder {path.parent}; make it, or name another"
+        raise FileNotFoundError(errno.ENOENT, text, str(path)) from None

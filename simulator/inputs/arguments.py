@@ -1,0 +1,84 @@
+"""Arguments of functions, refused in words where they cannot be used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from ballplate.simulator.inputs.settings import hint
+
+
+def ensure_whole(least: int, most: int | None = None, **given: object) -> None:
+    """Refuse what is no whole number from `least` to `most`; None is none of its business.
+
+    :raises TypeError: no whole number.
+    :raises ValueError: too small or too large.
+
+    >>> ensure_whole(1, workers=0)
+    Traceback (most recent call last):
+    ...
+    ValueError: workers=0; give 1 at least
+    """
+    for name, value in given.items():
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            raise TypeError(f"{name}={value!r}; give a whole number")
+        if value < least:
+            raise ValueError(f"{name}={value}; give {least} at least")
+        if most is not None and value > most:
+            raise ValueError(f"{name}={value}; give {most} at most")
+
+
+def ensure_positive(what: str, most: float | None = None, **given: object) -> None:
+    """Refuse what is no number above 0, up to `most`; None is none of its business.
+
+    :raises TypeError: no number.
+    :raises ValueError: not above 0, or too large.
+
+    >>> ensure_positive("a ratio above 0 and at most 1", 1.0, until=5)
+    Traceback (most recent call last):
+    ...
+    ValueError: until=5; give a ratio above 0 and at most 1
+    """
+    for name, value in given.items():
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+            raise TypeError(f"{name}={value!r}; give {what}")
+        if not 0.0 < value <= (float("inf") if most is None else most):
+            raise ValueError(f"{name}={value}; give {what}")
+
+
+def ensure_one_of(known: Sequence[str], **given: object) -> None:
+    """Refuse names that are not known; None is none of its business.
+
+    :raises ValueError: an unknown name.
+    """
+    for name, value in given.items():
+        if value is not None and value not in known:
+            raise ValueError(f'{name}: "{value}" is unknown; {hint(str(value), known)}')
+
+
+def ensure_type(kind: type, what: str, **given: object) -> None:
+    """Refuse what is of another type; None is none of its business.
+
+    :raises TypeError: another type.
+
+    >>> ensure_type(str, "a text with a unit", target=0.5)
+    Traceback (most recent call last):
+    ...
+    TypeError: target=0.5; give a text with a unit
+    """
+    for name, value in given.items():
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name}={value!r}; give {what}")
+
+
+def ensure_report(report: object) -> None:
+    """Refuse what cannot be told of steps.
+
+    :raises TypeError: no function.
+    """
+    if not callable(report):
+        raise TypeError(f"report={report!r}; give a function that takes a step, such as print")
