@@ -22,6 +22,7 @@ from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.readings.generate import (
     NoReadingError,
     noisy_certificate,
@@ -182,7 +183,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         errors left open.
     """
     what, text = "artefacts", ""
-    if not len(design.lengths):
+    if not len(design.of(Lengths)):
         text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
     elif not has_all_errors(design):
         what, text = (
@@ -234,7 +235,12 @@ def fit_rival(
         for name, value, unit in zip(names, values, units, strict=True)
     )
     return RivalFit(
-        experiment.label, experiment.title, solution, len(chosen), len(design.lengths), estimates
+        experiment.label,
+        experiment.title,
+        solution,
+        len(chosen),
+        len(design.of(Lengths)),
+        estimates,
     )
 
 
@@ -295,7 +301,7 @@ def compare_estimators(
         estimator,
         trials,
         len(chosen),
-        len(design.lengths),
+        len(design.of(Lengths)),
         across_probes,
         points,
         np.array(rms),

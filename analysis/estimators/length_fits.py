@@ -22,6 +22,8 @@ from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.observations.lengths import Lengths
+from ballplate.simulator.observations.priors import Priors
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
@@ -65,7 +67,7 @@ def fit_lengths(
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
     """
     design = observed.design
-    if design.dimension != 3 or not len(design.lengths):
+    if design.dimension != 3 or not len(design.of(Lengths)):
         what = "machine.volume" if design.dimension != 3 else "artefacts"
         has = (
             "has two dimensions"
@@ -98,7 +100,7 @@ def fit_lengths(
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} takes no notice of plates and calibrated co-ordinates")
-    if len(design.priors):
+    if len(design.of(Priors)):
         remarks.append(f"{estimator} takes no notice of priors")
     if design.free_offsets is not None and design.free_offsets.any():
         remarks.append(
@@ -110,7 +112,7 @@ def fit_lengths(
             f"{estimator} has three scale errors and three squareness errors, whatever the file's"
             " error model"
         )
-    if design.lengths.free is not None and (design.lengths.free >= 0).all():
+    if not design.of(Lengths).is_known.any():
         remarks.append(
             "no length is known: scales are told against one another, and the overall scale stays"
             " open"

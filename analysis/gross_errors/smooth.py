@@ -10,13 +10,11 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, probe_offsets
-from ballplate.simulator.estimation.observations import (
-    length_directions,
-    reading_weights,
-    rotation_sensitivity,
-)
+from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.observations.lengths import Lengths, length_directions, length_whitening
+from ballplate.simulator.observations.readings import reading_weights, rotation_sensitivity
 from numpy.polynomial import legendre
 
 # Scale readings closer than this (m) count as the same place on a scale.
@@ -157,13 +155,14 @@ def _rows(design: Design, state: State, x: Array, displacement: Array) -> Array:
     """Biases (rows, k) of all observations by displacements (readings, d, k) of all readings."""
     chosen: Integers = design.plate_readings
     weight = reading_weights(design, design.readings.select(chosen))
-    d, k = design.dimension, displacement.shape[2]
+    k = displacement.shape[2]
     of_plates = (weight[:, :, None] * displacement[chosen]).reshape(-1, k)
-    given = design.lengths
+    given = design.of(Lengths)
     unit = length_directions(design, state, x)
     second = np.where(given.to_pivot[:, None, None], 0.0, displacement[np.maximum(given.second, 0)])
     along = np.einsum("md,mdk->mk", unit, displacement[given.first] - second)
-    of_lengths = design.length_whitening.whitened(along)
-    others = len(design.priors) + len(design.coordinates) + len(design.distances)
-    assert of_plates.shape[0] == d * len(chosen)
-    return np.concatenate([of_plates, of_lengths, np.zeros((others, k))])
+    found = np.zeros((row_count(design), k))
+    places = row_places(design)
+    found[places["reading"]] = of_plates
+    found[places["length"]] = design.once(length_whitening).whitened(along)
+    return found

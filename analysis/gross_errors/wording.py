@@ -12,6 +12,8 @@ from ballplate.simulator.estimation.parameters import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.lengths import Lengths
 
 from ..results.formatting import SHOWN, number
 from .names import common_ball, length_name, name, reading_name
@@ -124,19 +126,20 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     leave = f"check or leave out {lines}" if lines else "check or leave out the readings"
     if kind in ("reading", "end"):
         return f"{reading_name(design, subject)} read {_sizes(one, 'too high')}", leave
-    if kind == "length":
-        return f"{name(given, k)} read {size} too {long}", leave
-    if kind == "prior":
-        return f"{name(given, k)} stated {size} too {high}", "check it in the experiment file"
-    if kind == "coordinate":
-        return f"{name(given, k)} certified {size} too {high}", "check the certificate"
     if kind == "distance" and len(_significant(one)) > 1:
         common = common_ball(design, given.subject[one.columns])
         told = f"certified distances of ball {design.ball_label(common)}: {_from(common, one)}"
         return told, "check the certificate"
-    if kind in ("distance", "length value"):
-        what = length_name(design, subject, False) if kind == "length value" else name(given, k)
-        return f"{what} certified {size} too {long}", "check the certificate"
+    if kind == "length":
+        return f"{name(given, k)} read {size} too {long}", leave
+    if kind == "length value":
+        told = f"{length_name(design, subject, False)} certified {size} too {long}"
+        return told, "check the certificate"
+    for other in design.observations:
+        if other.word == kind:
+            words = other.words
+            too = words.more if one.value > 0 else words.less
+            return f"{name(given, k)} {words.verb} {size} too {too}", words.cure
     if kind == "scale":
         artefact = design.artefact_names[subject]
         told = f"all that is certified of {artefact} is {size} too {long}"
@@ -182,7 +185,7 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
 
 def _from(ball: int, one: Suspect) -> str:
     """Sizes by which the distances of a ball are wrong, those that are significant."""
-    given, ends = one.patterns.design.distances, one.patterns.design.ball_names
+    given, ends = one.patterns.design.of(Distances), one.patterns.design.ball_names
     parts = []
     for place in _significant(one):
         distance, value = int(one.patterns.subject[one.columns[place]]), float(one.values[place])
@@ -237,7 +240,7 @@ def _touched(one: Suspect) -> list[int]:
     if kind in ("reading", "end"):
         return [subject]
     if kind == "length":
-        ends = (int(design.lengths.first[subject]), int(design.lengths.second[subject]))
+        ends = (int(design.of(Lengths).first[subject]), int(design.of(Lengths).second[subject]))
         return [i for i in ends if i >= 0]
     if kind in ("ball", "moved"):
         order = position_order(design)[readings.position]

@@ -12,7 +12,6 @@ from operator import add
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.design.observations import Priors
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -25,6 +24,7 @@ from ballplate.simulator.montecarlo.reference import (
     Truth,
     reference,
 )
+from ballplate.simulator.observations.priors import Priors
 from ballplate.simulator.readings.generate import NoReadingError, on_true_machine
 
 from .figures import Outcome, outcome, power_of_difference, power_of_misfit
@@ -150,11 +150,8 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     design = shared.design
     # Neither model need contain the other: what the true one's functions add is the rank of both
     # together.
-    both = replace(
-        design,
-        model=JoinedModel(design.model, shared.truth.model),
-        priors=_widened(design, shared.truth),
-    )
+    joined = replace(design, model=JoinedModel(design.model, shared.truth.model))
+    both = joined.observed(_widened(design, shared.truth))
     more = both.parameter_count - linearise(both).deficiency - design.parameter_count
     if more == 0:
         return Optimism(power, None)
@@ -163,7 +160,7 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
 
 def _widened(design: Design, truth: Truth) -> Priors:
     """The design's priors for a model that has the true one's parameters besides."""
-    by_model = design.priors.by_model
+    by_model = design.of(Priors).by_model
     return replace(
-        design.priors, by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters))))
+        design.of(Priors), by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters))))
     )

@@ -14,13 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.estimation.observations import (
-    coordinate_rows,
-    distance_rows,
-    length_derivative,
-    prior_rows,
-    reading_blocks,
-)
 from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
 from ballplate.simulator.experiment.model import (
     Calibration,
@@ -31,6 +24,9 @@ from ballplate.simulator.experiment.model import (
 )
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.observations.lengths import Lengths, length_derivative, length_whitening
+from ballplate.simulator.observations.priors import no_priors
+from ballplate.simulator.observations.readings import reading_blocks
 
 # A micrometre: columns are scaled so that a unit step moves some point by up to this.
 STEP = 1e-6
@@ -43,16 +39,19 @@ AT_ONCE = 10_000
 class Rows:
     """Whitened rows of one candidate, columns in micrometres.
 
-    `by_ball` (m, d) is the derivative by the ball `ball` (m,), -1 where there is none, and its
-    negative that by the ball `other` (m,) of a distance; `by_shared` (m, s) that by shared
-    parameters; `by_pose` (m, q) that by the pose.
+    `by_ball` (m, k, d) are the derivatives by the `balls` (m, k) of each, none where k is 0;
+    `by_shared` (m, s) that by shared parameters; `by_pose` (m, q) that by the pose. With `frame`
+    they tell where balls are in the frame of their plate.
     """
 
-    ball: Integers
-    other: Integers
+    balls: Integers
     by_ball: Array
     by_shared: Array
     by_pose: Array
+    frame: bool = False
+
+    def __len__(self) -> int:
+        return len(self.by_shared)
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ class Drawn:
 
     @property
     def certificates(self) -> int:
-        return int(self.design.lengths.certificate.max(initial=-1)) + 1
+        return int(self.design.of(Lengths).certificate.max(initial=-1)) + 1
 
     @property
     def shared(self) -> int:
@@ -135,13 +134,12 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
                 yield lengths[k]
                 continue
             own = slice(end[k] - count[k] - start, end[k] - start)
-            ball = np.repeat(readings.ball[own], d)
+            balls = np.repeat(readings.ball[own], d)[:, None]
             yield Rows(
-                ball,
-                np.full(len(ball), -1),
-                STEP * blocks.by_ball[own].reshape(len(ball), d),
-                by_shared[own].reshape(len(ball), drawn.shared),
-                blocks.by_pose[own].reshape(len(ball), blocks.by_pose.shape[2]),
+                balls,
+                STEP * blocks.by_ball[own].reshape(len(balls), 1, d),
+                by_shared[own].reshape(len(balls), drawn.shared),
+                blocks.by_pose[own].reshape(len(balls), blocks.by_pose.shape[2]),
             )
         first = last
 
@@ -149,14 +147,14 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
 def _length_rows(drawn: Drawn) -> dict[int, Rows]:
     """Rows of the lengths of standards and gauges, by position."""
     design, layout = drawn.design, drawn.layout
-    if not len(design.lengths):
+    if not len(design.of(Lengths)):
         return {}
-    by_position = design.length_whitening.by_position(
-        design.lengths, length_derivative(design, layout, drawn.state, None)
+    by_position = design.once(length_whitening).by_position(
+        design.of(Lengths), length_derivative(design, drawn.state, None)
     )
     derivative = by_position.rows
     shared = np.concatenate([derivative[:, drawn.own], by_position.by_error], axis=1) * drawn.scale
-    place = design.readings.position[design.lengths.first[by_position.length]]
+    place = design.readings.position[design.of(Lengths).first[by_position.length]]
     found = {}
     for k in np.unique(place).tolist():
         chosen, columns = np.flatnonzero(place == k), layout.pose_columns[k]
@@ -169,14 +167,9 @@ def _length_rows(drawn: Drawn) -> dict[int, Rows]:
 
 def _of_shared(drawn: Drawn, shared: Array) -> Rows:
     """Rows (m, s) that no ball takes part in."""
-    none = np.full(len(shared), -1)
-    return Rows(
-        none,
-        none,
-        np.zeros((len(shared), drawn.design.dimension)),
-        shared,
-        np.zeros((len(shared), 0)),
-    )
+    m = len(shared)
+    none = np.zeros((m, 0, drawn.design.dimension))
+    return Rows(np.zeros((m, 0), np.int64), none, shared, np.zeros((m, 0)))
 
 
 def always(drawn: Drawn) -> list[Rows]:
@@ -184,14 +177,7 @@ def always(drawn: Drawn) -> list[Rows]:
     certificates.
     """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
-    found = [*_of_calibration(drawn, drawn.design), _of_shared(drawn, unit)]
-    if len(drawn.design.priors):
-        _, derivative = prior_rows(drawn.design, drawn.layout, drawn.state)
-        own = derivative[:, drawn.own]
-        shared = np.zeros((len(own), drawn.shared))
-        shared[:, : own.shape[1]] = own
-        found.append(_of_shared(drawn, shared * drawn.scale))
-    return found
+    return [*_of_observations(drawn, drawn.design), _of_shared(drawn, unit)]
 
 
 def calibration_rows(
@@ -207,7 +193,8 @@ def calibration_rows(
     if experiment.artefacts[item.artefact].role == "plate" and not isinstance(
         item, RadiusCalibration
     ):
-        return _of_calibration(drawn, lay_out(replace(experiment, calibration=(item,), priors=())))
+        design = lay_out(replace(experiment, calibration=(item,), priors=()))
+        return _of_observations(drawn, design.observed(no_priors()))
     named = [
         k
         for k, length in enumerate(drawn.design.length_names)
@@ -228,16 +215,25 @@ def calibration_rows(
     return [_of_shared(drawn, row * drawn.scale)]
 
 
-def _of_calibration(drawn: Drawn, design: Design) -> list[Rows]:
-    """Rows of calibrated distances and co-ordinates of a design with the same balls."""
-    given, distances = distance_rows(design, drawn.state), design.distances
-    coordinates = coordinate_rows(design, drawn.state)
-
-    def rows(ball: Integers, other: Integers, derivative: Array) -> Rows:
-        m = len(ball)
-        return Rows(ball, other, STEP * derivative, np.zeros((m, drawn.shared)), np.zeros((m, 0)))
-
-    return [
-        rows(distances.first, distances.second, given.derivative),
-        rows(design.coordinates.ball, np.full(len(design.coordinates), -1), coordinates.derivative),
-    ]
+def _of_observations(drawn: Drawn, design: Design) -> list[Rows]:
+    """Rows of all observations that are not formed of readings, of a design with the same balls and
+    parameters.
+    """
+    found = []
+    for one in design.observations:
+        if len(one) and not isinstance(one, Lengths):
+            rows = one.rows(design, drawn.state, None)
+            by_shared = np.zeros((len(one), drawn.shared))
+            if rows.by_shared is not None:
+                own = rows.by_shared[:, design.once(shared_layout).model.start :]
+                by_shared[:, : own.shape[1]] = own
+            found.append(
+                Rows(
+                    one.balls,
+                    STEP * rows.by_ball,
+                    by_shared * drawn.scale,
+                    np.zeros((len(one), 0)),
+                    len(one.fixing()[0]) > 0,
+                )
+            )
+    return found

@@ -172,7 +172,7 @@ def verdict(
     open_ = np.concatenate([at.shared_null, weak], axis=1)
     return Verdict(
         design.parameter_count,
-        design.observations,
+        design.observation_count,
         found.deficiency,
         expected,
         found.values,

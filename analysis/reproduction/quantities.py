@@ -10,11 +10,11 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, pose_size
 from ballplate.simulator.estimation.functions import Balls, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.observations import rotation_sensitivity
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.threads import single_threaded
+from ballplate.simulator.observations.readings import rotation_sensitivity
 from numpy.typing import NDArray
 
 from ..uncertainty.pairs import pairs_of

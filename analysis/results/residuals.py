@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import Readings
+from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.estimation.observations import (
-    length_deviations,
-    reading_blocks,
-    reading_weights,
-)
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.rounding import comparable
+from ballplate.simulator.observations.lengths import Lengths, length_deviations
+from ballplate.simulator.observations.readings import reading_blocks, reading_weights
 
 # Residuals that a fit names.
 LARGEST = 10
@@ -60,10 +56,10 @@ def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Res
     for place in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
         i, axis = divmod(place, design.dimension)
         k = place - residual.size
-        reading = int(chosen[i] if k < 0 else design.lengths.first[k])
+        reading = int(chosen[i] if k < 0 else design.of(Lengths).first[k])
         ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
         if k >= 0:
-            second = design.lengths.second[k]
+            second = design.of(Lengths).second[k]
             ball, words = (
                 (ball, "radius") if second < 0 else (f"{ball}-{_ball(design, second)}", "length")
             )

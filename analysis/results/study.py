@@ -103,7 +103,7 @@ def fit(
         return Fit(*names, design, observed.x, solution, judged, 1.0, False, 0, {}, (), ())
     at = linearised_fit(design, solution)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_accuracy)
-    freedom = design.observations - design.parameter_count + judged.deficiency
+    freedom = design.observation_count - design.parameter_count + judged.deficiency
     estimated = (sigma or experiment.sigma) == "estimated" and freedom > 0
     scale = float(np.sqrt(solution.factor.sum_of_squares / freedom)) if estimated else 1.0
     untested = too_many_entries(design)

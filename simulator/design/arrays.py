@@ -4,21 +4,59 @@ units.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..inputs.quantities import Target
-from ..machines.protocol import Array, ErrorModel, Integers
-from .joint_lengths import LengthWhitening, length_whitening
-from .observations import Coordinates, Distances, Lengths, Priors, Readings, no_priors
+from ..machines.protocol import Array, ErrorModel, Integers, Unit
+
+Made = TypeVar("Made")
+Kind = TypeVar("Kind", bound="Observations")
 
 
 def pose_size(dimension: int) -> int:
     """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
     return dimension * (dimension + 1) // 2
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Which ball is read in which position with which probe, and how often; all arrays (m,).
+
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None
+    where all have the machine's repeatability.
+    """
+
+    ball: Integers
+    position: Integers
+    probe: Integers
+    repeats: Integers
+    uncertainty: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.ball)
+
+    def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
+        """The readings at the given indices."""
+        uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
+        return Readings(
+            self.ball[chosen],
+            self.position[chosen],
+            self.probe[chosen],
+            self.repeats[chosen],
+            uncertainty,
+        )
+
+    def expanded(self) -> Readings:
+        """One row for each repeat."""
+        chosen = np.repeat(np.arange(len(self)), self.repeats)
+        return replace(self.select(chosen), repeats=np.ones(len(chosen), np.int64))
 
 
 @dataclass(frozen=True)
@@ -33,9 +71,10 @@ class Design:
     plates, whose balls and poses are parameters, and `is_gauge` which are Bryan gauges, whose
     pivots are: the origins of their positions. `free_offsets` (l, d) marks the probe offsets that
     are parameters, None where none is. `length_names` and `drawn_lengths` (in metres) are those of
-    length standards without certificates, which are parameters. `task_points` (t, 2, d) are what
-    the scales say at the ends of the lengths that the machine is to measure, `task_probes` (t, 2)
-    what measures there, and `task_targets` (t,) what uncertainties are to be within.
+    length standards without certificates, which are parameters. `observations` are all others than
+    readings of plates, one of each kind, in the order of their rows. `task_points` (t, 2, d) are
+    what the scales say at the ends of the lengths that the machine is to measure, `task_probes` (t,
+    2) what measures there, and `task_targets` (t,) what uncertainties are to be within.
     """
 
     model: ErrorModel
@@ -55,12 +94,9 @@ class Design:
     origins: Array
     held: NDArray[np.bool_]
     readings: Readings
-    distances: Distances
-    coordinates: Coordinates
-    lengths: Lengths
+    observations: tuple[Observations, ...]
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
     point_probe: int = 0
-    priors: Priors = field(default_factory=no_priors)
     free_offsets: NDArray[np.bool_] | None = None
     is_gauge: NDArray[np.bool_] | None = None
     length_names: tuple[str, ...] = ()
@@ -97,24 +133,41 @@ class Design:
         return np.sort(np.concatenate([of_plates, self.gauge_positions]))
 
     @cached_property
-    def length_whitening(self) -> LengthWhitening:
-        """What makes uncorrelated observations of unit variance of the lengths of standards."""
-        given, readings = self.lengths, self.readings
-        noise = reading_uncertainties(self, readings) / np.sqrt(readings.repeats)[:, None]
-        standard = self.ball_artefact[readings.ball[given.first]]
-        place = readings.position[given.first] * len(self.probe_names) + readings.probe[given.first]
-        return length_whitening(given, noise, standard, place)
+    def _made(self) -> dict[Callable[[Design], Any], Any]:
+        return {}
+
+    def once(self, make: Callable[[Design], Made]) -> Made:
+        """What `make` makes of the design, made when it is asked for first."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return cast(Made, self._made[make])
+
+    def of(self, kind: type[Kind]) -> Kind:
+        """The observations of a kind."""
+        return next(one for one in self.observations if isinstance(one, kind))
+
+    def observed(self, *changed: Observations) -> Design:
+        """The design with other observations of some kinds."""
+        by_kind = {type(one): one for one in changed}
+        return replace(
+            self, observations=tuple(by_kind.get(type(one), one) for one in self.observations)
+        )
+
+    @cached_property
+    def tied_balls(self) -> Integers:
+        """Indices of the balls of plates that observations tie to others."""
+        ends = [one.balls.ravel() for one in self.observations if one.balls.shape[1] > 1]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *ends]))
 
     @property
-    def observations(self) -> int:
+    def observation_count(self) -> int:
         """Number of scalar observations: co-ordinates of all readings of plates, and calibration
         items.
 
         Of lengths that are read together only those count that do not follow from the others.
         """
         count = int(self.readings.repeats[self.plate_readings].sum())
-        calibration = len(self.distances) + len(self.coordinates) + len(self.length_whitening)
-        return self.dimension * count + calibration + len(self.priors)
+        return self.dimension * count + sum(one.count(self) for one in self.observations)
 
     @property
     def parameter_count(self) -> int:
@@ -186,3 +239,152 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
     """True positions (m, d) of the balls that are read, T(y, t) in metres."""
     turned = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
     return np.asarray(turned + state.origins[readings.position])
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Whitened rows (m,) of observations at a state.
+
+    `residual` (m,), `by_shared` (m, s) the derivative by the shared parameters, None where these
+    have no part, and `by_ball` (m, k, d) that by the `balls` (m, k) of the observations.
+    """
+
+    residual: Array
+    by_shared: Array | None
+    by_ball: Array
+
+
+@dataclass(frozen=True)
+class Words:
+    """How a wrong one among observations is told: "certified 3 um too high; check the
+    certificate".
+    """
+
+    verb: str = "certified"
+    more: str = "high"
+    less: str = "low"
+    cure: str = "check the certificate"
+
+
+class Observations(ABC):
+    """All observations (m,) of one kind in a design; a frozen dataclass of arrays.
+
+    `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
+    too long by one ratio where its scale is wrong. `words` tell what is wrong with a wrong one.
+    """
+
+    word: ClassVar[str]
+    scales: ClassVar[bool] = False
+    words: ClassVar[Words] = Words()
+    value: Array
+    uncertainty: Array
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    @property
+    def balls(self) -> Integers:
+        """The balls (rows, k) that each row is about; k is 0 where no ball takes part.
+
+        Rows of one ball are eliminated with it; balls that rows tie together are kept to the end.
+        """
+        return np.zeros((len(self), 0), np.int64)
+
+    @property
+    def along(self) -> Integers:
+        """The axis (m,) that each is along, -1 without one."""
+        return np.full(len(self), -1)
+
+    def count(self, design: Design) -> int:
+        """Number of independent rows."""
+        return len(self)
+
+    @abstractmethod
+    def rows(self, design: Design, state: State, x: Array | None) -> Rows:
+        """Whitened rows at `state`, with scale readings `x` (readings, d) or error-free ones."""
+
+    @abstractmethod
+    def name(self, design: Design, k: int) -> str:
+        """What one of them is, as a metrologist would say it."""
+
+    @abstractmethod
+    def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
+        """Values (m,) where balls, poses and the machine are `truth`, whose error model is
+        `model`.
+        """
+
+    def unit(self, design: Design, k: int) -> Unit:
+        """The unit of a value."""
+        return "m"
+
+    def errors(self, generator: np.random.Generator, count: int) -> Array:
+        """Random errors (count, m) of the values."""
+        return self.uncertainty * generator.standard_normal((count, len(self)))
+
+    def weights(self, design: Design, state: State) -> Array:
+        """How heavy rows are, by the reciprocal of a length; what weighs nothing is left out."""
+        return 1.0 / self.uncertainty
+
+    def alike(self, design: Design, state: State) -> Self:
+        """The same observations with weights of about one each."""
+        return self.given(uncertainty=np.ones(len(self)))
+
+    def given(self, **changed: Array) -> Self:
+        """The same observations with other values or uncertainties (m,)."""
+        return cast(Self, replace(cast(Any, self), **changed))
+
+    def fixing(self) -> tuple[Integers, Integers]:
+        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter."""
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+
+    def started(self, design: Design, x: Array, state: State) -> State:
+        """Starting values with what these observations tell of them."""
+        return state
+
+    def reread(self, design: Design, place: Integers) -> Self:
+        """The same where the design's readings stand at other places (readings,)."""
+        return self
+
+    def add_misfit(self, rows: Rows, errors: Array, at: Replicates) -> None:
+        """Add what these contribute to S^2 of replicates and its gradient, with errors (b, m) of
+        their true values.
+
+        Linear about the `rows` at the start; what is not linear has a method of its own.
+        """
+        if not len(self):
+            return
+        residual = rows.residual - errors / self.uncertainty
+        if rows.by_shared is not None:
+            residual = residual + at.shared @ rows.by_shared.T
+        for ball, slope in zip(self.balls.T, rows.by_ball.swapaxes(0, 1), strict=True):
+            residual = residual + np.einsum("md,bdm->bm", slope, at.balls[:, :, ball])
+        at.squares[:] += (residual**2).sum(axis=1)
+        if rows.by_shared is not None:
+            at.by_shared[:] += residual @ rows.by_shared
+        at.pull(self.balls, residual[:, :, None, None] * rows.by_ball)
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """What b replicates differ by from the estimate `start` of readings without noise, which are of
+    the `truth`.
+
+    `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
+    S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
+    """
+
+    start: State
+    truth: State
+    balls: Array
+    shared: Array
+    squares: Array
+    by_ball: Array
+    by_shared: Array
+
+    def pull(self, balls: Integers, forces: Array) -> None:
+        """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""
+        # A ball may take part in several.
+        for ball, force in zip(balls.T, forces.transpose(2, 1, 0, 3), strict=True):
+            pulled = np.zeros((self.by_ball.shape[2], len(self.squares), force.shape[2]))
+            np.add.at(pulled, ball, force)
+            self.by_ball[:] += pulled.transpose(1, 2, 0)

@@ -18,9 +18,11 @@ from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
 from ..numerics.rounding import comparable
-from .arrays import Design, pose_size
-from .length_standards import standard_lengths
-from .observations import Coordinates, Distances, Priors, Readings
+from ..observations.coordinates import Coordinates
+from ..observations.distances import Distances
+from ..observations.length_standards import standard_lengths
+from ..observations.priors import Priors
+from .arrays import Design, Readings, pose_size
 
 # Evaluation points of an experiment that names none.
 DEFAULT_POINTS = 200
@@ -78,6 +80,7 @@ def lay_out(experiment: Experiment) -> Design:
         if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
             # A pivot has a place; how the bar turns about it is what the readings say.
             held[k] = np.arange(pose_size(d)) >= d
+    priors = _priors(experiment, held, len(model.parameters))
     return Design(
         model=model,
         lower=lower,
@@ -96,12 +99,9 @@ def lay_out(experiment: Experiment) -> Design:
         origins=origins,
         held=held,
         readings=readings,
-        distances=distances,
-        coordinates=coordinates,
-        lengths=lengths,
+        observations=(distances, coordinates, lengths, priors),
         points=points,
         point_probe=probe_index[experiment.evaluation.probe],
-        priors=_priors(experiment, held, len(model.parameters)),
         free_offsets=_free_offsets(experiment),
         is_gauge=np.array(
             [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..design.arrays import Design, State, probe_offsets
 from ..machines.protocol import Array, Integers
-from .observations import offset_sensitivity
+from ..observations.readings import offset_sensitivity
 from .parameters import SharedLayout
 
 

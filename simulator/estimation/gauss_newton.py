@@ -11,6 +11,7 @@ from ..design.arrays import Design, State, probe_offsets, unknown_lengths
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from ..numerics.threads import scipy_linalg, single_threaded
+from ..observations.lengths import Lengths
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle
@@ -78,7 +79,7 @@ def gauss_newton(
     failure to converge is a status, not an exception.
     """
     settings = settings or GaussNewtonSettings()
-    layout = shared_layout(design)
+    layout = design.once(shared_layout)
     state = start
     record: list[Iteration] = []
     length, previous = 0.0, np.inf
@@ -128,7 +129,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
-    if not drawn.deficiency or len(design.lengths):
+    if not drawn.deficiency or len(design.of(Lengths)):
         return gauss_newton(design, x, start, settings, drawn)
     solution = gauss_newton(design, x, start, settings)
     went_far = max(one.step for one in solution.iterations) > NEIGHBOURHOOD

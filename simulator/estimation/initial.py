@@ -54,31 +54,10 @@ def initial_state(design: Design, x: Array) -> State:
         rows = readings.position == k
         if rows.any():
             origins[k] = fit_sphere(x[rows] + design.probes[readings.probe[rows]], origins[k])[0]
-    return State(
-        balls,
-        rotations,
-        origins,
-        np.zeros(len(design.model.parameters)),
-        lengths=_measured_lengths(design, origins, x),
-    )
-
-
-def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
-    """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
-    given = design.lengths
-    if given.free is None or not len(design.length_names):
-        return None
-    seen = x + design.probes[design.readings.probe]
-    other = np.where(
-        given.to_pivot[:, None],
-        origins[design.readings.position[given.first]],
-        seen[np.maximum(given.second, 0)],
-    )
-    length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
-    found = design.drawn_lengths.copy()
-    for number in np.unique(given.free[given.free >= 0]):
-        found[number] = length[given.free == number].mean()
-    return found
+    state = State(balls, rotations, origins, np.zeros(len(design.model.parameters)))
+    for one in design.observations:
+        state = one.started(design, x, state)
+    return state
 
 
 def _mean_locations(design: Design, x: Array) -> Array:
@@ -154,10 +133,12 @@ def _into_frame(
         rotation, origin = poses[places.index(held[0])]
         turn = design.rotations[held[0]].T @ rotation
         return turn, design.rotations[held[0]].T @ (origin - design.origins[held[0]])
-    target = design.balls.copy()
-    given = design.coordinates
-    target[given.ball, given.axis] = given.value
-    certified = np.isin(members, given.ball)
+    target, certified = design.balls.copy(), np.zeros(len(members), bool)
+    for one in design.observations:
+        ball, axis = one.fixing()
+        if len(ball):
+            target[ball, axis] = one.value
+            certified |= np.isin(members, ball)
     known = ~np.isnan(shape[:, 0])
     chosen = certified & known
     if _strength(target[members[chosen]], design.dimension) == 0.0:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..design.arrays import Design
 from ..machines.protocol import Array
+from ..observations.lengths import Lengths
 from .spheres import FLAT, fit_sphere
 
 # Departures of the factor from one that are doubtful, and that no machine has; a length that is
@@ -51,8 +52,8 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
 
     Of unknown lengths the drawn ones, if they are off by more than 30 %.
     """
-    given, readings = design.lengths, design.readings
-    known = np.ones(len(given), bool) if given.free is None else given.free < 0
+    given, readings = design.of(Lengths), design.readings
+    known = given.is_known
     seen = x + design.probes[readings.probe]
     artefact = design.ball_artefact[readings.ball[given.first]]
     found = []
@@ -82,7 +83,7 @@ def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
     """Radii of the spheres through the readings over the stated one, without those that the
     readings hardly show.
     """
-    given = design.lengths
+    given = design.of(Lengths)
     position = design.readings.position[given.first[rows]]
     found = []
     for k in np.unique(position):

@@ -139,6 +139,6 @@ def linearise(
     `spectrum`.
     """
     state = nominal_state(design) if state is None else state
-    layout = shared_layout(design)
+    layout = design.once(shared_layout)
     factor = eliminate(design, layout, state, x)
     return Linearisation(design, layout, state, factor, spectrum(factor, drawn))

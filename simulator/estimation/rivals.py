@@ -37,9 +37,12 @@ import numpy as np
 from ..design.arrays import Design, nominal_state, reading_uncertainties
 from ..machines.protocol import Array, Integers
 from ..numerics.threads import single_threaded
+from ..observations.distances import Distances
+from ..observations.lengths import Lengths
+from ..observations.priors import Priors
 from .covariance import EXACT, MICROMETRE
 from .gauss_newton import GaussNewtonSettings, Iteration, Status
-from .observations import length_rows
+from .parameters import shared_layout
 
 RivalName = Literal["distances", "cresto", "kruth"]
 
@@ -179,7 +182,7 @@ def _points(design: Design, x: Array) -> _Points:
 
 
 def _measured(design: Design, points: _Points, pairs: Integers, across_probes: bool) -> _Measured:
-    given = design.distances
+    given = design.of(Distances)
     known = np.stack([given.first, given.second], axis=1)
     ends, of = np.unique(
         np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True
@@ -218,9 +221,12 @@ def _all_rows(
     jacobian = design.model.jacobian(points.x, a, p)
     by_model = np.einsum("md,mdn->mn", along, jacobian[measured.first] - jacobian[measured.second])
     found = [rows(measured, length, by_model)]
-    if len(design.lengths):
-        found.append(length_rows(design, replace(nominal_state(design), a=a), x))
-    priors = design.priors
+    if len(design.of(Lengths)):
+        of_lengths = design.of(Lengths).rows(design, replace(nominal_state(design), a=a), x)
+        assert of_lengths.by_shared is not None
+        by_shared = of_lengths.by_shared[:, design.once(shared_layout).model]
+        found.append((of_lengths.residual, by_shared))
+    priors = design.of(Priors)
     of_model = np.flatnonzero((priors.position < 0) & (priors.probe < 0))
     if len(of_model):
         weight, of_parameters = 1.0 / priors.uncertainty[of_model], priors.by_model[of_model]

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.observations import OFFSET_STEP, offset_sensitivity
 from ..machines.protocol import Array, ErrorModel, Integers
+from ..observations.readings import OFFSET_STEP, offset_sensitivity
 
 Single = NDArray[np.float32]
 

@@ -34,7 +34,7 @@ from ..inputs.settings import hint, listing
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import Row, read_table
 from ..machines.protocol import Array, ErrorModel, Unit
-from .generate import true_priors
+from ..observations.priors import Priors
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"
@@ -178,7 +178,7 @@ def drawn_values(
         else:
             true.append(float(np.sqrt((balls[0] ** 2).sum())))
     # Those of offsets come last in the design, and first here.
-    priors = true_priors(design, model, truth).value
+    priors = design.of(Priors).true_values(design, truth, model)
     true += [*priors[len(experiment.priors) :], *priors[: len(experiment.priors)]]
     if generator is None:
         return np.array(true, float)

@@ -27,6 +27,8 @@ from ..estimation.consensus import consensus_motion, distances
 from ..estimation.initial import initial_state
 from ..geometry.motions import fit_motion
 from ..machines.protocol import Array, Integers
+from ..observations.lengths import Lengths
+from ..observations.priors import Priors
 
 AGAINST_DRAWING = 0.3
 # Extent across a line, as a fraction of that along it, below which balls are in one line.
@@ -88,10 +90,8 @@ def find_misreadings(design: Design, x: Array) -> tuple[list[WrongPosition], lis
     """
     compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
     if len(compared) < len(design.readings):
-        of_others = replace(
-            design,
-            readings=design.readings.select(compared),
-            lengths=design.lengths.select(np.zeros(0, np.int64)),
+        of_others = replace(design, readings=design.readings.select(compared)).observed(
+            design.of(Lengths).select(np.zeros(0, np.int64))
         )
         positions, found = _misreadings(of_others, x[compared]) if len(compared) else ([], [])
         back = np.append(compared, -1)
@@ -263,9 +263,9 @@ def _offset_uncertainties(design: Design) -> Array:
     if design.free_offsets is None:
         return np.zeros(len(design.probes))
     variance = np.where(design.free_offsets, np.inf, 0.0)
-    known = np.flatnonzero(design.priors.probe >= 0)
-    probe, axis = design.priors.probe[known], design.priors.component[known]
-    variance[probe, axis] = design.priors.uncertainty[known] ** 2
+    known = np.flatnonzero(design.of(Priors).probe >= 0)
+    probe, axis = design.of(Priors).probe[known], design.of(Priors).component[known]
+    variance[probe, axis] = design.of(Priors).uncertainty[known] ** 2
     return np.asarray(np.sqrt(variance.sum(axis=1)))
 
 

@@ -16,6 +16,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
+from ballplate.simulator.observations.coordinates import Coordinates
+from ballplate.simulator.observations.distances import Distances
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
@@ -101,11 +103,12 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
             readings=replace(
                 readings, ball=new_ball[readings.ball], position=new_position[readings.position]
             ),
-            distances=replace(
-                design.distances,
-                first=new_ball[design.distances.second],
-                second=new_ball[design.distances.first],
-            ),
+        ).observed(
+            replace(
+                design.of(Distances),
+                first=new_ball[design.of(Distances).second],
+                second=new_ball[design.of(Distances).first],
+            )
         )
     )
     for symbol, quantity in expected.items():
@@ -117,13 +120,9 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
 def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
     design = small_design(1, calibration)
     expected, _, _ = judged(design)
-    scaled = replace(
-        design,
-        repeatability=factor * design.repeatability,
-        distances=replace(design.distances, uncertainty=factor * design.distances.uncertainty),
-        coordinates=replace(
-            design.coordinates, uncertainty=factor * design.coordinates.uncertainty
-        ),
+    scaled = replace(design, repeatability=factor * design.repeatability).observed(
+        replace(design.of(Distances), uncertainty=factor * design.of(Distances).uncertainty),
+        replace(design.of(Coordinates), uncertainty=factor * design.of(Coordinates).uncertainty),
     )
     by_statement, _, _ = judged(scaled)
     by_estimate, _, _ = judged(design, factor)
@@ -181,7 +180,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         assert solution.status == "converged"
         balls.append(solution.state.balls - truth.balls)
         model.append(solution.state.a - truth.a)
-        freedom = observed.observations - observed.parameter_count
+        freedom = observed.observation_count - observed.parameter_count
         ratio.append(solution.factor.sum_of_squares / freedom)
     # Mean square over all trials, relative to the variance; its spread for normal variables is
     # sqrt(2 / trials).
@@ -194,7 +193,7 @@ def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration:
         assert abs(squared.mean() - 1) < 3 * np.sqrt(2 / trials)
         bias = found.mean(axis=0) / stated * np.sqrt(trials)
         assert np.abs(bias).max() < 5
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     assert abs(np.mean(ratio) - 1) < 4 * np.sqrt(2 / (freedom * trials))
 
 

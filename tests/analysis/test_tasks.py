@@ -18,6 +18,7 @@ from ballplate.simulator.estimation.parameters import SharedLayout, shared_layou
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.observations.distances import Distances
 from ballplate.uncertainty.quantities import task_distances
 from ballplate.uncertainty.summaries import uncertainties
 
@@ -123,14 +124,15 @@ def test_undetermined_tasks_are_told_as_such() -> None:
     design = small_design()
     design = replace(
         design,
-        distances=replace(
-            design.distances, **{name: v[:0] for name, v in vars(design.distances).items()}
-        ),
         probes=np.zeros_like(design.probes),
         task_names=("edge", "none"),
         task_points=np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]]]),
         task_probes=np.zeros((2, 2), int),
         task_targets=(None, None),
+    ).observed(
+        replace(
+            design.of(Distances), **{name: v[:0] for name, v in vars(design.of(Distances)).items()}
+        )
     )
     quantity = judged(design)[0]["tasks"]
     assert (quantity.count, quantity.undetermined, quantity.within_target) == (2, 2, None)

@@ -7,14 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations import Lengths, Readings
+from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
 from ballplate.simulator.estimation.functions import Displacements, displacements, linear_functions
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.estimation.observations import expected_readings
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.observations.coordinates import Coordinates
+from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.lengths import Lengths
+from ballplate.simulator.observations.readings import expected_readings
 from ballplate.uncertainty.pairs import all_pairs
 from ballplate.uncertainty.quantities import QUANTITIES, evaluation_points
 from ballplate.uncertainty.summaries import point_pairs, uncertainties
@@ -108,12 +110,12 @@ def planar_distances() -> Design:
     """
     balls = grid(4) + np.array([0.0, 0.0, 0.02]) * (np.arange(16) % 3)[:, None]
     design = plate_design(balls, six_positions(), neighbours(grid(4)), coordinates=(0, 3, 12))
-    flat = np.full(len(design.distances), 2)
+    flat = np.full(len(design.of(Distances)), 2)
     flat[::3] = 3
-    first, second = design.distances.first, design.distances.second
+    first, second = design.of(Distances).first, design.of(Distances).second
     between = (balls[first] - balls[second]) * (np.arange(3) < flat[:, None])
     value = np.sqrt((between**2).sum(axis=1))
-    return replace(design, distances=replace(design.distances, dimensions=flat, value=value))
+    return design.observed(replace(design.of(Distances), dimensions=flat, value=value))
 
 
 def with_length_standard(design: Design, projected: bool) -> Design:
@@ -153,7 +155,8 @@ def with_length_standard(design: Design, projected: bool) -> Design:
         origins=np.concatenate([design.origins, places]),
         held=np.concatenate([design.held, np.zeros((count, 6), bool)]),
         readings=joined,
-        lengths=Lengths(
+    ).observed(
+        Lengths(
             first=index,
             second=index + 1,
             value=np.full(count, 2 * half),
@@ -162,7 +165,7 @@ def with_length_standard(design: Design, projected: bool) -> Design:
             direction=stated,
             with_repeatability=np.array([True, False, True]),
             certificate=np.array([0, 1, 0]),
-        ),
+        )
     )
 
 
@@ -207,8 +210,7 @@ def two_artefacts() -> Design:
             np.concatenate([first.probe, second.probe]),
             np.concatenate([first.repeats, second.repeats]),
         ),
-        coordinates=replace(extra.coordinates, ball=extra.coordinates.ball + balls),
-    )
+    ).observed(replace(extra.of(Coordinates), ball=extra.of(Coordinates).ball + balls))
 
 
 def deficient_grid_of_four() -> Design:

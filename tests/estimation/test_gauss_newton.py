@@ -14,6 +14,8 @@ from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.observations.coordinates import Coordinates
+from ballplate.simulator.observations.distances import Distances
 from ballplate.simulator.readings.generate import (
     exact_readings,
     noisy_certificate,
@@ -43,18 +45,16 @@ def exactly_calibrated(design: Design, truth: State) -> Design:
     """The design with the certificate of the true plate."""
     none = np.random.default_rng(0)
     certified = noisy_certificate(
-        replace(
-            design,
-            distances=replace(design.distances, uncertainty=0 * design.distances.uncertainty),
-            coordinates=replace(design.coordinates, uncertainty=0 * design.coordinates.uncertainty),
+        design.observed(
+            replace(design.of(Distances), uncertainty=0 * design.of(Distances).uncertainty),
+            replace(design.of(Coordinates), uncertainty=0 * design.of(Coordinates).uncertainty),
         ),
         truth,
         none,
     )
-    return replace(
-        design,
-        distances=replace(design.distances, value=certified.distances.value),
-        coordinates=replace(design.coordinates, value=certified.coordinates.value),
+    return design.observed(
+        replace(design.of(Distances), value=certified.of(Distances).value),
+        replace(design.of(Coordinates), value=certified.of(Coordinates).value),
     )
 
 

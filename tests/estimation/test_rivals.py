@@ -13,6 +13,7 @@ from ballplate.simulator.estimation.rivals import RivalName, rival_estimate
 from ballplate.simulator.geometry.artefacts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.observations.distances import Distances
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 
 from tests.estimation.test_gauss_newton import exactly_calibrated, truth_of
@@ -66,10 +67,10 @@ def objective(
     known = {
         tuple(sorted((int(i), int(j)))): (value, u)
         for i, j, value, u in zip(
-            design.distances.first,
-            design.distances.second,
-            design.distances.value,
-            design.distances.uncertainty,
+            design.of(Distances).first,
+            design.of(Distances).second,
+            design.of(Distances).value,
+            design.of(Distances).uncertainty,
             strict=True,
         )
     }
@@ -133,8 +134,8 @@ def test_the_objective_is_the_one_stated_and_at_its_minimum(
 @pytest.mark.parametrize("estimator", get_args(RivalName))
 def test_without_a_calibrated_distance_the_scale_is_open(estimator: RivalName) -> None:
     design = small()
-    design = replace(
-        design, distances=type(design.distances)(*(v[:0] for v in vars(design.distances).values()))
+    design = design.observed(
+        type(design.of(Distances))(*(v[:0] for v in vars(design.of(Distances)).values()))
     )
     truth = replace(truth_of(design), a=np.zeros(len(design.model.parameters)), balls=design.balls)
     readings, x = exact_readings(design, truth)

@@ -11,8 +11,10 @@ import mpmath
 import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import Coordinates, Distances, Priors
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.observations.coordinates import Coordinates
+from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.priors import Priors
 from ballplate.uncertainty.summaries import point_pairs
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -51,7 +53,7 @@ def design_of(positions: tuple[int, ...], certificate: str, repeatability: float
     n = len(design.model.parameters)
     none, empty = np.zeros(0, np.int64), np.zeros(0)
     priors = Priors((), none, none, none, np.zeros((0, n)), empty, empty)
-    return replace(design, priors=priors, points=np.random.default_rng(3).random((6, 3)))
+    return replace(design, points=np.random.default_rng(3).random((6, 3))).observed(priors)
 
 
 def with_known(design: Design, known: Known) -> Design:
@@ -83,39 +85,36 @@ def with_known(design: Design, known: Known) -> Design:
         return replace(design, readings=replace(readings, uncertainty=uncertainty))
     if known.kind == "distance":
         first, second = draw.choice(9, 2, replace=False).tolist()
-        old = design.distances
+        old = design.of(Distances)
         value = np.sqrt(((design.balls[first] - design.balls[second]) ** 2).sum())
-        return replace(
-            design,
-            distances=Distances(
+        return design.observed(
+            Distances(
                 np.append(old.first, first),
                 np.append(old.second, second),
                 np.append(old.dimensions, 3),
                 np.append(old.value, value),
                 np.append(old.uncertainty, u),
-            ),
+            )
         )
     ball, axis = int(draw.integers(0, 9)), int(draw.integers(0, 3))
-    given = design.coordinates
-    return replace(
-        design,
-        coordinates=Coordinates(
+    given = design.of(Coordinates)
+    return design.observed(
+        Coordinates(
             np.append(given.ball, ball),
             np.append(given.axis, axis),
             np.append(given.value, design.balls[ball, axis]),
             np.append(given.uncertainty, u),
-        ),
+        )
     )
 
 
 def _with_prior(
     design: Design, position: int, component: int, row: Real, uncertainty: float
 ) -> Design:
-    old = design.priors
+    old = design.of(Priors)
     value = design.origins[position, component] if position >= 0 and component < 3 else 0.0
-    return replace(
-        design,
-        priors=Priors(
+    return design.observed(
+        Priors(
             (*old.names, f"prior {len(old)}"),
             np.append(old.position, position),
             np.append(old.probe, -1),
@@ -123,26 +122,24 @@ def _with_prior(
             np.concatenate([old.by_model, row[None]]),
             np.append(old.value, value),
             np.append(old.uncertainty, uncertainty),
-        ),
+        )
     )
 
 
 def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     """The dense reference's problem, its rows without their uncertainties, and these."""
-    alike = replace(
-        design,
-        repeatability=np.ones(3),
-        distances=replace(design.distances, uncertainty=np.ones(len(design.distances))),
-        coordinates=replace(design.coordinates, uncertainty=np.ones(len(design.coordinates))),
+    alike = replace(design, repeatability=np.ones(3)).observed(
+        replace(design.of(Distances), uncertainty=np.ones(len(design.of(Distances)))),
+        replace(design.of(Coordinates), uncertainty=np.ones(len(design.of(Coordinates)))),
     )
     problem = dense.planned(alike, COEFFICIENTS, COEFFICIENTS)
     rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     uncertainty = design.readings.uncertainty
     if uncertainty is None:
         uncertainty = np.tile(design.repeatability, (len(design.readings), 1))
-    priors = np.zeros((len(design.priors), problem.parameters))
+    priors = np.zeros((len(design.of(Priors)), problem.parameters))
     start = problem.parameters - len(problem.a)
-    known = design.priors
+    known = design.of(Priors)
     # The other program's coefficients are others of the same polynomials.
     ours, theirs, at = design.model.reported().matrix, np.zeros((0, len(problem.a))), 0
     for function in problem.functions:
@@ -157,8 +154,8 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
             priors[k, 3 * len(problem.plate_balls) + problem.free_poses.index(pose)] = 1.0
     stated = [
         uncertainty.ravel(),
-        design.distances.uncertainty,
-        design.coordinates.uncertainty,
+        design.of(Distances).uncertainty,
+        design.of(Coordinates).uncertainty,
         known.uncertainty,
     ]
     return problem, np.concatenate([rows, priors]), np.concatenate(stated)

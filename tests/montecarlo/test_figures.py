@@ -19,16 +19,13 @@ from ballplate.montecarlo.targets import Target, sample_of_pairs, targets
 from ballplate.montecarlo.trials import run_trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.estimation.observations import (
-    distance_rows,
-    expected_readings,
-    reading_blocks,
-)
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.montecarlo.reference import Reference, reference
 from ballplate.simulator.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.readings import expected_readings, reading_blocks
 
 
 def shipped(path: str, name: str | None = None) -> Experiment:
@@ -260,10 +257,12 @@ def dense_columns(design: Design) -> np.ndarray:
         rows[i, :, d * ball : d * ball + d] = blocks.by_ball[i]
         rows[i][:, design.balls.size + place[place >= 0]] = blocks.by_pose[i][:, place >= 0]
         rows[i, :, design.balls.size + layout.model.start :] = blocks.by_model[i]
-    tied = distance_rows(design, state)
+    tied = design.of(Distances).rows(design, state, None)
     below = np.zeros((len(tied.residual), rows.shape[2]))
     for row, (one, other, along) in enumerate(
-        zip(design.distances.first, design.distances.second, tied.derivative, strict=True)
+        zip(
+            design.of(Distances).first, design.of(Distances).second, tied.by_ball[:, 0], strict=True
+        )
     ):
         below[row, d * one : d * one + d] = along
         below[row, d * other : d * other + d] = -along

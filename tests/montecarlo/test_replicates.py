@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, State, nominal_state
-from ballplate.simulator.design.observations import Coordinates, Lengths, Priors, Readings
+from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
 from ballplate.simulator.montecarlo.expansion import Direct, Expansion
 from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
 from ballplate.simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
+from ballplate.simulator.observations.coordinates import Coordinates
+from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.lengths import Lengths
+from ballplate.simulator.observations.priors import Priors
 
 from tests.reference.designs import corner_sides, grid, neighbours, plate_design, six_positions
 
@@ -86,7 +89,8 @@ def with_length_standard(projected: bool) -> Design:
             np.append(design.readings.probe, [0, 0, 0, 0]),
             np.append(design.readings.repeats, [2, 2, 3, 3]),
         ),
-        lengths=Lengths(
+    ).observed(
+        Lengths(
             np.array([m, m + 2]),
             np.array([m + 1, m + 3]),
             np.array([0.6, 0.6]),
@@ -95,7 +99,7 @@ def with_length_standard(projected: bool) -> Design:
             -direction,
             np.array([True, True]),
             np.array([0, 0]),
-        ),
+        )
     )
 
 
@@ -113,11 +117,8 @@ def with_unknown_probes(lengths: bool) -> Design:
     if lengths:
         # The ends of the standard with probes of unknown offset.
         readings = replace(readings, probe=np.append(readings.probe[:-4], [0, 1, 2, 3]))
-    return replace(
-        design,
-        readings=readings,
-        free_offsets=free,
-        priors=Priors(
+    return replace(design, readings=readings, free_offsets=free).observed(
+        Priors(
             (*(f"offset {k}" for k in range(12)), "origin", "function", "turn"),
             np.append(np.full(12, -1), [2, -1, 3]),
             np.append(offsets[:, 0], [-1, -1, -1]),
@@ -125,7 +126,7 @@ def with_unknown_probes(lengths: bool) -> Design:
             of_model,
             np.zeros(15),
             np.append(np.full(12, 1e-6), [1e-6, 1e-6, 1e-6]),
-        ),
+        )
     )
 
 
@@ -151,9 +152,10 @@ def plane() -> Design:
         origins=np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.3]]),
         held=np.zeros((3, 3), bool),
         readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
-        distances=small(pairs=False).distances,
-        coordinates=Coordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
         points=np.zeros((0, 2)),
+    ).observed(
+        small(pairs=False).of(Distances),
+        Coordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
     )
 
 
@@ -177,18 +179,20 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
             turn = sum(int((np.arange(len(design.balls))[g.ball] == ball).sum()) for g in earlier)
             row = own[design.readings.ball[own] == ball][turn]
             x[row] += drawn.moved[k, :, group.rows.start + place]
-    given = design.lengths
+    given = design.of(Lengths)
     for side, ends in enumerate((given.first, given.second)):
         x[ends] += drawn.ends[side][k].T
-    pairs, known = design.distances, design.coordinates
+    errors = {
+        one.word: of_one[k] for one, of_one in zip(design.observations, drawn.errors, strict=True)
+    }
+    pairs, known = design.of(Distances), design.of(Coordinates)
     counts = np.arange(design.dimension) < pairs.dimensions[:, None]
     apart = (real.balls[pairs.first] - real.balls[pairs.second]) * counts
-    observed = replace(
-        design,
-        distances=replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + drawn.distances[k]),
-        coordinates=replace(known, value=real.balls[known.ball, known.axis] + drawn.coordinates[k]),
-        lengths=replace(given, value=given.value + drawn.lengths[k]),
-        priors=replace(design.priors, value=design.priors.value + drawn.priors[k]),
+    observed = design.observed(
+        replace(pairs, value=np.sqrt((apart**2).sum(axis=1)) + errors["distance"]),
+        replace(known, value=real.balls[known.ball, known.axis] + errors["coordinate"]),
+        replace(given, value=given.value + errors["length"]),
+        replace(design.of(Priors), value=design.of(Priors).value + errors["prior"]),
     )
     solution = gauss_newton(observed, x, start)
     return solution.state, solution.factor.sum_of_squares
@@ -275,7 +279,7 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
 
 
 def test_a_deficient_design_has_no_replicates() -> None:
-    design = replace(small(), distances=small(pairs=False).distances)
+    design = small().observed(small(pairs=False).of(Distances))
     design = replace(design, probes=np.zeros_like(design.probes))
     with pytest.raises(NoReferenceError, match="deficient"):
         reference(design, truth(design))

@@ -266,7 +266,7 @@ def test_no_degrees_of_freedom_explain_reeves_sigma_of_the_real_readings() -> No
     it 16.8.
     """
     found = fitted("real", "without scale")
-    freedom = found.design.observations - found.design.parameter_count
+    freedom = found.design.observation_count - found.design.parameter_count
     assert freedom == 22 and {e.name: 1e6 * e.value for e in found.estimates}[
         "alpha"
     ] == pytest.approx(-0.66, abs=0.005)

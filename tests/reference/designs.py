@@ -8,10 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations import Coordinates, Distances, Lengths, Readings
+from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
+from ballplate.simulator.observations.coordinates import Coordinates
+from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.lengths import Lengths
+from ballplate.simulator.observations.priors import no_priors
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
@@ -164,17 +167,18 @@ def plate_design(
         origins=np.array([pose.origin for pose in positions]),
         held=held,
         readings=Readings(ball, position, probe, np.ones(len(ball), np.int64)),
-        distances=Distances(
-            first,
-            second,
-            np.full(len(first), 3),
-            np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
-            np.full(len(first), SIGMA),
+        observations=(
+            Distances(
+                first,
+                second,
+                np.full(len(first), 3),
+                np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
+                np.full(len(first), SIGMA),
+            ),
+            Coordinates(certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)),
+            no_lengths(),
+            no_priors(),
         ),
-        coordinates=Coordinates(
-            certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
-        ),
-        lengths=no_lengths(),
     )
 
 

@@ -19,6 +19,7 @@ from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.truth import true_machine
+from ballplate.simulator.observations.distances import Distances
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe, read_readings
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def certified(name: str) -> tuple[ObservedReadings, bool]:
 
 def diagnosed(design: Design, x: Real, estimated: bool) -> tuple[Solution, Diagnosis]:
     solution = estimate(design, x)
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     return solution, diagnosis(linearised_fit(design, solution), x, freedom, estimated)
 
 
@@ -130,10 +131,10 @@ def certified_wrongly(design: Design, ball: int, share: float) -> tuple[Design, 
     """The design with all certified distances of a ball too long by a share, and which these
     are.
     """
-    given = design.distances
+    given = design.of(Distances)
     mine = (given.first == ball) | (given.second == ball)
     value = given.value * np.where(mine, 1.0 + share, 1.0)
-    return replace(design, distances=replace(given, value=value)), np.flatnonzero(mine).tolist()
+    return design.observed(replace(given, value=value)), np.flatnonzero(mine).tolist()
 
 
 @pytest.mark.parametrize("ball", [0, 2, 6, 8])
@@ -143,7 +144,7 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
     (one,) = diagnosed(design, x, True)[1].suspects
     assert (one.patterns.kind[one.columns] == "distance").all()
     assert sorted(one.patterns.subject[one.columns].tolist()) == mine and len(mine) == 2
-    true = 5e-6 / (1.0 + 5e-6) * design.distances.value[one.patterns.subject[one.columns]]
+    true = 5e-6 / (1.0 + 5e-6) * design.of(Distances).value[one.patterns.subject[one.columns]]
     assert (abs(one.values - true) < 4.0 * one.standard_uncertainties).all()
     words = f"certified distances of ball {design.ball_label(ball)}: to "
     assert words in diagnosis_lines(Diagnosis((one,)))[0]
@@ -153,9 +154,9 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
 def test_one_wrong_distance_is_not_laid_to_all_of_a_ball(wrong: int, tmp_path: Path) -> None:
     for seed in range(4):
         right, x = drawn(tmp_path, 1.0, seed=seed)
-        value = right.distances.value.copy()
+        value = right.of(Distances).value.copy()
         value[wrong] += 10e-6
-        design = replace(right, distances=replace(right.distances, value=value))
+        design = right.observed(replace(right.of(Distances), value=value))
         (one,) = diagnosed(design, x, True)[1].suspects
         assert one.patterns.kind[one.pattern] == "distance" and len(one.columns) == 1
         assert one.patterns.subject[one.pattern] == wrong
@@ -174,7 +175,7 @@ def test_wrong_distances_of_the_opposite_ball_are_named_where_only_these_tell_th
 
 def is_explained(design: Design, solution: Solution) -> bool:
     """Whether the stated uncertainties explain the sum of squares."""
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     return bool(chi2.sf(solution.factor.sum_of_squares, freedom) > 0.01)
 
 
@@ -190,7 +191,7 @@ def test_scatter_is_told_beside_the_model_in_the_size_of_all_residuals(
         and found.unexplained
         and not found.suspects
     )
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     size = float(np.sqrt(solution.factor.sum_of_squares / freedom))
     assert size > 5.0 and found.unexplained.times == pytest.approx(size, rel=1e-6)
     assert unexplained_words(found.unexplained).endswith("or larger uncertainties")

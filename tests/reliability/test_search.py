@@ -63,7 +63,7 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
             layout.offset_columns,
             layout.lengths,
         )
-        return whitened_residuals(design, layout, there, x)
+        return whitened_residuals(design, there, x)
 
     scale = np.concatenate([layout.scale, np.ones(len(balls) * design.dimension)])
     found = numeric(residuals, len(scale), scale, 1e-4) * scale
@@ -91,11 +91,11 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
 ) -> None:
     design, state, x = fitted(text, tmp_path)
     search = Search(
-        linearise(design, state, x), x, design.observations - design.parameter_count, True
+        linearise(design, state, x), x, design.observation_count - design.parameter_count, True
     )
     matrix = search.patterns.matrix.toarray()
     residual, taken = (
-        whitened_residuals(design, shared_layout(design), state, x),
+        whitened_residuals(design, state, x),
         jacobian(design, state, x),
     )
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
@@ -126,10 +126,10 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
 def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path) -> None:
     design, state, x = fitted(PLANE, tmp_path)
     search = Search(
-        linearise(design, state, x), x, design.observations - design.parameter_count, True
+        linearise(design, state, x), x, design.observation_count - design.parameter_count, True
     )
     residual, taken = (
-        whitened_residuals(design, shared_layout(design), state, x),
+        whitened_residuals(design, state, x),
         jacobian(design, state, x),
     )
     before, seen = left_by(taken, residual), set()
@@ -152,7 +152,9 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
 
 def test_scatter_is_hardly_ever_suspected_of_noise(tmp_path: Path) -> None:
     design, state, x = fitted(MIXED, tmp_path)
-    left = leftover(linearise(design, state, x), x, design.observations - design.parameter_count)
+    left = leftover(
+        linearise(design, state, x), x, design.observation_count - design.parameter_count
+    )
     every, generator, draws, level = scatters(design), np.random.default_rng(2), 2000, 0.01
     alarms = np.zeros(len(every))
     for _ in range(draws):
@@ -164,7 +166,7 @@ def test_scatter_is_hardly_ever_suspected_of_noise(tmp_path: Path) -> None:
 
 def test_weights_that_are_right_leave_no_scatter_over(tmp_path: Path) -> None:
     design, state, x = fitted(MIXED, tmp_path)
-    freedom = design.observations - design.parameter_count
+    freedom = design.observation_count - design.parameter_count
     one = next(one for one in scatters(design) if one.position == 2)
     generator, found = np.random.default_rng(3), []
     for stated in (1.0, 3.0):

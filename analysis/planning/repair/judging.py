@@ -95,7 +95,7 @@ def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | No
 
 def work(base: Examined) -> float:
     """Size of one judgement: observations times shared parameters."""
-    return float(base.at.design.observations * len(base.at.layout))
+    return float(base.at.design.observation_count * len(base.at.layout))
 
 
 def removed(before: Array, after: Array) -> tuple[int, ...]:

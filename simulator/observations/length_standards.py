@@ -8,10 +8,11 @@ from itertools import count
 
 import numpy as np
 
+from ..design.arrays import Readings
 from ..experiment.model import DistanceCalibration, Experiment, RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..machines.protocol import Array, Integers
-from .observations import Lengths, Readings
+from .lengths import Lengths
 
 
 @dataclass(frozen=True)
