@@ -259,7 +259,8 @@ def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers
 
 def _single_items(at: _Place) -> Iterator[Block]:
     """Certified values and priors: what is stated too large makes residuals smaller."""
-    for one in at.design.observations:
+    # What is known of the machine first, then of artefacts.
+    for one in reversed(at.design.observations):
         if not isinstance(one, Lengths):
             every = np.arange(len(one))
             entries = (at.places[one.word].start + every, every, -1.0 / one.uncertainty)

@@ -15,15 +15,10 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
-from ballplate.simulator.experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    Experiment,
-    Position,
-    RadiusCalibration,
-)
+from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.observations.calibration import Calibration
 from ballplate.simulator.observations.lengths import Lengths, length_derivative, length_whitening
 from ballplate.simulator.observations.priors import no_priors
 from ballplate.simulator.observations.readings import reading_blocks
@@ -190,9 +185,7 @@ def calibration_rows(
     :raises ExperimentError: it is of a length standard that has a certificate already, or more than
         one length.
     """
-    if experiment.artefacts[item.artefact].role == "plate" and not isinstance(
-        item, RadiusCalibration
-    ):
+    if experiment.artefacts[item.artefact].role == "plate":
         design = lay_out(replace(experiment, calibration=(item,), priors=()))
         return _of_observations(drawn, design.observed(no_priors()))
     named = [
@@ -200,18 +193,17 @@ def calibration_rows(
         for k, length in enumerate(drawn.design.length_names)
         if length.rpartition(": ")[0] == item.artefact
     ]
-    if len(named) != 1 or isinstance(item, CoordinateCalibration):
+    if len(named) != 1:
         text = (
             f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
             " its certificates"
         )
         raise ExperimentError([Message(str(experiment.source), 0, 0, "pool.calibration", text)])
-    if isinstance(item, RadiusCalibration):
-        uncertainty = item.standard_uncertainty
-    else:
-        uncertainty = float(item.standard_uncertainties[0])
+    stated = next(item.certified_values(experiment.layouts[item.artefact]))
     row = np.zeros((1, drawn.shared))
-    row[0, drawn.layout.lengths.start - drawn.own.start + named[0]] = 1.0 / uncertainty
+    row[0, drawn.layout.lengths.start - drawn.own.start + named[0]] = (
+        1.0 / stated.standard_uncertainty
+    )
     return [_of_shared(drawn, row * drawn.scale)]
 
 

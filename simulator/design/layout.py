@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ..experiment.model import (
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Prior,
-    RadiusCalibration,
-)
+from ..experiment.model import Experiment, Prior
 from ..geometry.artefacts import BryanGaugeSettings
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
 from ..numerics.rounding import comparable
-from ..observations.coordinates import Coordinates
-from ..observations.distances import Distances
+from ..observations.balls import BallObservations
+from ..observations.coordinates import Coordinates, no_coordinates
+from ..observations.distances import Distances, no_distances
 from ..observations.length_standards import standard_lengths
 from ..observations.priors import Priors
+from ..observations.radius import RadiusCalibration
 from .arrays import Design, Readings, pose_size
 
 # Evaluation points of an experiment that names none.
@@ -66,16 +64,16 @@ def lay_out(experiment: Experiment) -> Design:
     position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
-    distances = _distances(experiment, first_ball)
+    of_balls = _of_balls(experiment, first_ball)
+    distances, coordinates, *others = of_balls
     lengths, length_names, drawn = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
-    coordinates = _coordinates(experiment, first_ball)
     ball_artefact = np.repeat(np.arange(len(artefacts)), sizes)
     points, tasks = experiment.evaluation.points, experiment.evaluation.tasks
     if not len(points):
         points = random_points(lower, upper, DEFAULT_POINTS, DEFAULT_SEED)
-    held = _held(balls, ball_artefact, position_artefact, rotations, coordinates, d)
+    held = _held(balls, ball_artefact, position_artefact, rotations, of_balls, d)
     for k, place in enumerate(places):
         if isinstance(experiment.artefacts[place.artefact], BryanGaugeSettings):
             # A pivot has a place; how the bar turns about it is what the readings say.
@@ -99,7 +97,7 @@ def lay_out(experiment: Experiment) -> Design:
         origins=origins,
         held=held,
         readings=readings,
-        observations=(distances, coordinates, lengths, priors),
+        observations=(distances, coordinates, lengths, priors, *others),
         points=points,
         point_probe=probe_index[experiment.evaluation.probe],
         free_offsets=_free_offsets(experiment),
@@ -201,33 +199,19 @@ def _readings(
     return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
-def _coordinates(experiment: Experiment, first_ball: dict[str, int]) -> Coordinates:
-    ball, axis, value, uncertainty = [], [], [], []
+def _of_balls(
+    experiment: Experiment, first_ball: dict[str, int]
+) -> dict[type[BallObservations], BallObservations]:
+    """Observations of the balls of plates, by kind: what all items of a kind state."""
+    parts: dict[type[BallObservations], list[BallObservations]] = {
+        Distances: [no_distances()],
+        Coordinates: [no_coordinates()],
+    }
     for item in experiment.calibration:
-        if isinstance(item, CoordinateCalibration):
-            count = len(item.axes)
-            ball.append(np.repeat(first_ball[item.artefact] + item.balls, count))
-            axis.append(np.tile(np.array(item.axes, np.int64), len(item.balls)))
-            value.append(item.values.ravel())
-            uncertainty.append(np.tile(item.standard_uncertainties, len(item.balls)))
-    return Coordinates(_integers(ball), _integers(axis), _floats(value), _floats(uncertainty))
-
-
-def _distances(experiment: Experiment, first_ball: dict[str, int]) -> Distances:
-    """Calibrated distances between balls of plates."""
-    plates = [
-        (item, np.asarray(item.pairs + first_ball[item.artefact], np.int64))
-        for item in experiment.calibration
-        if isinstance(item, DistanceCalibration)
-        and experiment.artefacts[item.artefact].role == "plate"
-    ]
-    return Distances(
-        _integers([pairs[:, 0] for _, pairs in plates]),
-        _integers([pairs[:, 1] for _, pairs in plates]),
-        _integers([np.full(len(pairs), item.dimensions) for item, pairs in plates]),
-        _floats([item.values for item, _ in plates]),
-        _floats([item.standard_uncertainties for item, _ in plates]),
-    )
+        if experiment.artefacts[item.artefact].role == "plate":
+            one = item.observed(int(first_ball[item.artefact]))
+            parts.setdefault(type(one), []).append(one)
+    return [kind.joined(own) for kind, own in parts.items()]
 
 
 def _held(
@@ -235,7 +219,7 @@ def _held(
     ball_artefact: NDArray[np.int64],
     position_artefact: NDArray[np.int64],
     rotations: Array,
-    coordinates: Coordinates,
+    observations: Collection[BallObservations],
     d: int,
 ) -> NDArray[np.bool_]:
     """Which pose parameters are held (k, pose size).
@@ -246,15 +230,18 @@ def _held(
     about it open in every pose, a single ball every turn.
     """
     held = np.zeros((len(position_artefact), pose_size(d)), bool)
+    ball, axis = (
+        np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
+    )
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
         own = np.flatnonzero(ball_artefact == artefact)
         idle = _idle_turns(balls[own])
         for k in positions:
             held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
-        chosen = np.isin(coordinates.ball, own)
+        chosen = np.isin(ball, own)
         fixed = _motion_of_coordinates(
-            balls[coordinates.ball[chosen]] - balls[own].mean(axis=0), coordinates.axis[chosen], d
+            balls[ball[chosen]] - balls[own].mean(axis=0), axis[chosen], d
         )
         # Turns that no reading shows are dealt with already, in every position.
         free = _null_space(np.concatenate([fixed, idle.T]))
@@ -328,11 +315,3 @@ def _pivots(motions: Array, already: NDArray[np.bool_] | None = None) -> NDArray
         direction = left[row] / np.sqrt(left[row] @ left[row])
         left = left - np.outer(left @ direction, direction)
     return chosen
-
-
-def _integers(parts: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    return np.concatenate(parts).astype(np.int64) if parts else np.zeros(0, np.int64)
-
-
-def _floats(parts: list[Array]) -> Array:
-    return np.concatenate(parts).astype(float) if parts else np.zeros(0)

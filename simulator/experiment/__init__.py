@@ -3,17 +3,10 @@ them.
 """
 
 from ..inputs.messages import ExperimentError, Message
+from ..observations.coordinates import CoordinateCalibration
+from ..observations.distances import DistanceCalibration
 from .load import load
-from .model import (
-    CoordinateCalibration,
-    DistanceCalibration,
-    Evaluation,
-    Experiment,
-    Machine,
-    Position,
-    ReadingGroup,
-    Volume,
-)
+from .model import Evaluation, Experiment, Machine, Position, ReadingGroup, Volume
 from .schema import schema
 
 __all__ = [

@@ -29,20 +29,13 @@ from ..machines.settings import (
 )
 from ..machines.true_machine_settings import CurvesSettings, RandomSettings, TrueMachineFileSettings
 from ..machines.truth import TruthError, true_machine
+from ..observations.calibration import Calibration
+from ..observations.distances import DistanceCalibration
+from ..observations.radius import RadiusCalibration
 from .curves import read_curves
+from .lookup import References
 from .machine_file import load_machine
-from .model import (
-    SLIGHTLY,
-    Calibration,
-    DistanceCalibration,
-    Evaluation,
-    Floats,
-    Machine,
-    Position,
-    RadiusCalibration,
-    Volume,
-)
-from .references import References
+from .model import SLIGHTLY, Evaluation, Floats, Machine, Position, Volume
 from .structure import Sections
 
 TOLERANCE = 1e-9
@@ -406,21 +399,17 @@ def check_calibration_read(
     reported.
     """
     is_standard = references.artefacts[calibration.artefact].role == "length_standard"
-    if (
-        not is_standard
-        or isinstance(calibration, RadiusCalibration)
-        or len(positions) < position_count
-    ):
+    if not isinstance(calibration, DistanceCalibration) or not is_standard:
+        return
+    if len(positions) < position_count:
         return
     own = [position for position in positions.values() if position.artefact == calibration.artefact]
-    used = calibration.pairs if isinstance(calibration, DistanceCalibration) else calibration.balls
     layout = references.layouts[calibration.artefact]
-    unread = np.setdiff1d(used, read_balls(own))
+    unread = np.setdiff1d(calibration.pairs, read_balls(own))
     if own and len(unread):
         names = listing(layout.names[i] for i in unread)
-        key = "pairs" if isinstance(calibration, DistanceCalibration) else "balls"
         references.problems.add(
-            (*steps, key),
+            (*steps, "pairs"),
             f"no position reads {_balls(len(unread))} {names}; read them, or leave them out",
         )
 

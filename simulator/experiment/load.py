@@ -13,6 +13,7 @@ from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, written_count
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, read_tree
 from ..machines.settings import with_defaults
+from ..observations.calibration import Calibration
 from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import (
@@ -27,7 +28,7 @@ from .checks import (
     check_use,
 )
 from .machine import resolve_evaluation, resolve_machine, target_of
-from .model import Calibration, Experiment
+from .model import Experiment
 from .modules import refused_modules
 from .placements import resolve_position
 from .pool import placed_only
@@ -185,7 +186,9 @@ def _build(
     calibrations: dict[int, Calibration] = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
-        calibration = resolve_calibration(settings, ("calibration", i), references)
+        calibration = resolve_calibration(
+            settings, settings.artefact, ("calibration", i), references
+        )
         if calibration is not None:
             calibrations[i] = calibration
             check_calibration_read(

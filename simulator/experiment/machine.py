@@ -15,8 +15,8 @@ from ..inputs.quantities import LengthFunction, Target, format_length
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .checks import TOLERANCE, check_points
+from .lookup import References, frozen
 from .model import Evaluation, Floats, Machine, Task, Volume
-from .references import References, frozen
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 

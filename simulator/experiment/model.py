@@ -9,21 +9,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..geometry.artefacts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import Message, Steps, format_path
-from ..inputs.quantities import LengthFunction, Target
+from ..inputs.quantities import Target
 from ..inputs.yamltree import Mark, Node, mark_of, written
+from ..observations.calibration import Calibration
 from .changes import changed_tree
+from .lookup import Floats, Indices
 
 if TYPE_CHECKING:
     from ..machines.protocol import Unit
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 # Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
@@ -84,58 +80,6 @@ class Position:
     artefact: str
     pose: Pose
     readings: tuple[ReadingGroup, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class DistanceCalibration:
-    """Calibrated distances of an artefact.
-
-    ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
-    ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
-    the function ``standard_uncertainty`` at the nominal distances. ``form`` and ``repeatability``
-    matter for length standards only.
-    """
-
-    artefact: str
-    pairs: Indices
-    dimensions: Literal[2, 3]
-    values: Floats
-    certified: bool
-    standard_uncertainty: LengthFunction
-    standard_uncertainties: Floats
-    form: Literal["distance", "projection"]
-    repeatability: Literal["included", "ignored"]
-    kind: Literal["distances"] = "distances"
-
-
-@dataclass(frozen=True, eq=False)
-class CoordinateCalibration:
-    """Calibrated ball co-ordinates in the artefact's frame.
-
-    ``balls``: (k,) indices. ``axes``: the a calibrated axes, 0 to 2. ``values``: (k, a) metres,
-    nominal unless ``certified``. ``standard_uncertainties``: (a,) metres.
-    """
-
-    artefact: str
-    balls: Indices
-    axes: tuple[int, ...]
-    values: Floats
-    certified: bool
-    standard_uncertainties: Floats
-    kind: Literal["coordinates"] = "coordinates"
-
-
-@dataclass(frozen=True, eq=False)
-class RadiusCalibration:
-    """The calibrated radius of a Bryan gauge: ``value`` and ``standard_uncertainty`` in metres."""
-
-    artefact: str
-    value: float
-    standard_uncertainty: float
-    kind: Literal["radius"] = "radius"
-
-
-Calibration = DistanceCalibration | CoordinateCalibration | RadiusCalibration
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +251,7 @@ class Experiment:
         read = sum(
             len(group.ball_indices) for one in (*self.positions, *offered) for group in one.readings
         )
-        known = sum(len(one.values) for one in self.calibration if one.kind != "radius")
+        known = sum(one.size for one in self.calibration)
         balls = sum(len(layout.names) for layout in self.layouts.values())
         return balls + read + known + len(self.priors) + len(self.evaluation.points)
 

@@ -16,9 +16,9 @@ from ..geometry.positions import (
     nominal_pose,
 )
 from ..inputs.messages import Steps
+from .lookup import References, lengths_per_axis
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
-from .references import References, lengths_per_axis
 
 PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")

@@ -25,6 +25,7 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from ..inputs.quantities import format_length, length_text
 from ..inputs.yamltree import to_python, written
+from .lookup import References, lengths_per_axis
 from .model import Floats, Indices, Position, ReadingGroup, Volume
 from .placements import check_turns
 from .pool_sections import (
@@ -34,7 +35,6 @@ from .pool_sections import (
     RangeSettings,
     form_of_balls,
 )
-from .references import References, lengths_per_axis
 
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000

@@ -4,24 +4,22 @@ on the choice.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from ..geometry.artefacts import Name
 from ..geometry.positions import Axis
 from ..inputs.quantities import Duration, Length
 from ..inputs.settings import FORM, Settings
+from ..observations.kinds import CALIBRATIONS
 from .position_sections import (
     BallNames,
-    CoordinatesSettings,
     Count,
-    DistancesSettings,
     LengthPerAxis,
     PositionSettings,
     ProbeNames,
     QuarterTurns,
-    RadiusSettings,
     Text,
 )
 
@@ -263,22 +261,19 @@ class _Priced(Settings):
     )
 
 
-class PricedDistancesSettings(_Priced, DistancesSettings):
-    """Calibrated distances that can be had at a price."""
+def _priced(kind: type[Settings]) -> Any:
+    """Settings of a kind of calibration that can be had at a price."""
+    words = f"{(kind.__doc__ or '').rstrip('.')}, to be had at a price."
+    return create_model(f"Priced{kind.__name__}", __base__=(_Priced, kind), __doc__=words)
 
 
-class PricedCoordinatesSettings(_Priced, CoordinatesSettings):
-    """Calibrated co-ordinates that can be had at a price."""
-
-
-class PricedRadiusSettings(_Priced, RadiusSettings):
-    """The calibrated radius of a Bryan gauge that can be had at a price."""
-
-
-PricedSettings = Annotated[
-    PricedDistancesSettings | PricedCoordinatesSettings | PricedRadiusSettings,
-    Field(discriminator="kind"),
-]
+if TYPE_CHECKING:
+    PricedSettings = _Priced
+else:
+    PricedSettings = Annotated[
+        Union[tuple(_priced(kind) for kind in CALIBRATIONS)],  # noqa: UP007
+        Field(discriminator="kind"),
+    ]
 
 
 class SelectorSettings(Settings):

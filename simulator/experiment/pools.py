@@ -19,19 +19,12 @@ from ..inputs.problems import written_count, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
+from ..observations.calibration import Calibration
+from ..observations.radius import RadiusCalibration
 from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
-from .model import (
-    AtMost,
-    Calibration,
-    Candidate,
-    ChangeTimes,
-    Floats,
-    Machine,
-    Pool,
-    Position,
-    RadiusCalibration,
-)
+from .lookup import References, Tally, frozen
+from .model import AtMost, Candidate, ChangeTimes, Floats, Machine, Pool, Position
 from .placements import resolve_position
 from .pool_groups import Bounds, extent, generate, is_within, outline
 from .pool_sections import (
@@ -43,7 +36,6 @@ from .pool_sections import (
     TimesSettings,
     is_group,
 )
-from .references import References, Tally, frozen
 from .structure import Sections
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
@@ -223,7 +215,11 @@ def resolve_pool(
         settings = sections.get(*steps)
         if settings is None:
             references.check_written(steps)
-        item = resolve_calibration(settings, steps, references) if settings is not None else None
+        item = (
+            resolve_calibration(settings, settings.artefact, steps, references)
+            if settings is not None
+            else None
+        )
         if item is None:
             complete = False
             continue

@@ -10,7 +10,7 @@ from pydantic import Field, StringConstraints, Tag
 
 from ..geometry.artefacts import Coordinates, Name, PairSet
 from ..geometry.positions import Axis
-from ..inputs.quantities import Angle, Length, LengthFunction, PositiveLength
+from ..inputs.quantities import Angle, Length, PositiveLength
 from ..inputs.settings import FORM, Settings
 
 Text = Annotated[str, StringConstraints(min_length=1)]
@@ -160,97 +160,3 @@ class PositionSettings(Settings):
             "groups of readings, instead of probes, balls, repeats and standard_uncertainty"
         ),
     )
-
-
-class CertifiedDistance(Settings):
-    """A distance from a certificate."""
-
-    balls: tuple[Name, Name] = Field(description="the two balls")
-    distance: PositiveLength = Field(description="distance of their centres")
-
-
-CertifiedDistances = Annotated[tuple[CertifiedDistance, ...], Field(min_length=1)]
-
-
-class DistancesSettings(Settings):
-    """Calibrated distances between balls of an artefact."""
-
-    kind: Literal["distances"] = Field(description="calibrated distances between balls")
-    artefact: Name | None = Field(
-        None, description="name of the artefact; optional if there is exactly one"
-    )
-    pairs: PairSelection = Field(
-        description=(
-            "corner sides, corner diagonals, corners (both), neighbours, all, or a list of pairs of"
-            " balls"
-        )
-    )
-    dimensions: Literal[2, 3] | None = Field(
-        None, description="3 (default): distances in space; 2: in the artefact's plane"
-    )
-    standard_uncertainty: LengthFunction = Field(description="of each distance; may grow with it")
-    values: (
-        Annotated[
-            Annotated[Text, Tag("<one>")]
-            | Annotated[CertifiedDistances, Tag("<list>")]
-            | Annotated[CertifiedDistances, Tag("<mapping>")],
-            FORM,
-        ]
-        | None
-    ) = Field(
-        None,
-        description=(
-            "CSV file with columns ball_1, ball_2 and distance_mm, or a list of "
-            "{balls: [a, b], distance: …}; default: nominal distances"
-        ),
-    )
-    form: Literal["distance", "projection"] = Field(
-        "distance",
-        description="only for a length standard: distance, or projection on its nominal axis",
-    )
-    repeatability: Literal["included", "ignored"] = Field(
-        "included",
-        description=(
-            "only for a length standard: whether reading it has the machine's repeatability"
-        ),
-    )
-
-
-class CoordinatesSettings(Settings):
-    """Calibrated co-ordinates of balls in their artefact's frame."""
-
-    kind: Literal["coordinates"] = Field(description="calibrated co-ordinates of balls")
-    artefact: Name | None = Field(
-        None, description="name of the artefact; optional if there is exactly one"
-    )
-    balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
-    standard_uncertainty: Annotated[
-        Annotated[PositiveLength, Tag("<one>")]
-        | Annotated[SomeAxisLengthsSettings, Tag("<mapping>")]
-        | Annotated[PositiveLength, Tag("<list>")],
-        FORM,
-    ] = Field(description="of every co-ordinate, or per axis of the artefact: {x: …, y: …}")
-    values: Text | None = Field(
-        None,
-        description="CSV file with columns ball, x_mm, y_mm, z_mm; default: nominal co-ordinates",
-    )
-
-
-class RadiusSettings(Settings):
-    """The calibrated radius of a Bryan gauge."""
-
-    kind: Literal["radius"] = Field(description="calibrated radius of a Bryan gauge")
-    artefact: Name | None = Field(
-        None, description="name of the gauge; optional if there is exactly one artefact"
-    )
-    value: PositiveLength | None = Field(
-        None, description="the radius certified; default: as drawn"
-    )
-    standard_uncertainty: PositiveLength = Field(
-        description="of the radius, the same wherever the gauge stands"
-    )
-
-
-CalibrationSettings = Annotated[
-    DistancesSettings | CoordinatesSettings | RadiusSettings, Field(discriminator="kind")
-]

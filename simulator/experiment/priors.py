@@ -13,8 +13,8 @@ from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, dimension_of
+from .lookup import References
 from .model import Floats, Machine, Position, Prior
-from .references import References
 from .sections import PriorSettings
 from .structure import Sections
 

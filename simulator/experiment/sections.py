@@ -13,8 +13,9 @@ from ..inputs.quantities import Length, LengthFunction
 from ..inputs.settings import FORM, Settings
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
+from ..observations.kinds import CalibrationSettings
 from .pool_sections import PoolSettings
-from .position_sections import CalibrationSettings, Edges, LengthPerAxis, PositionSettings, Text
+from .position_sections import Edges, LengthPerAxis, PositionSettings, Text
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]

@@ -17,8 +17,9 @@ from ..inputs.problems import Problems
 from ..inputs.settings import describe, hint, nearest
 from ..inputs.wording import explain
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python, walk
+from ..observations.kinds import CalibrationSettings
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
-from .position_sections import CalibrationSettings, PositionSettings
+from .position_sections import PositionSettings
 from .sections import AnyProbe, ExperimentSettings, PriorSettings
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
 
 from ..design.arrays import Design, Observations, Replicates, Rows, State
 from ..machines.protocol import Array, ErrorModel
@@ -18,6 +22,12 @@ class BallObservations(Observations):
         """Values (..., m) where the balls of a design are at `balls` (..., n, d), and their
         derivatives (..., m, k, d) by the balls of each.
         """
+
+    @classmethod
+    def joined(cls, parts: Sequence[BallObservations]) -> Self:
+        """The observations of all parts together."""
+        columns = zip(*(vars(one).values() for one in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
 
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
         value, slope = self.values(state.balls)

@@ -9,9 +9,11 @@ from itertools import count
 import numpy as np
 
 from ..design.arrays import Readings
-from ..experiment.model import DistanceCalibration, Experiment, RadiusCalibration
+from ..experiment.model import Experiment
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..machines.protocol import Array, Integers
+from ..observations.distances import DistanceCalibration
+from ..observations.radius import RadiusCalibration
 from .lengths import Lengths
 
 

@@ -9,19 +9,13 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Indices,
-    Position,
-    ReadingGroup,
-    Volume,
-)
+from ballplate.simulator.experiment.model import Experiment, Indices, Position, ReadingGroup, Volume
 from ballplate.simulator.geometry.artefacts import ArtefactSettings, BallLayout, pairs
 from ballplate.simulator.geometry.positions import Pose, ball_coordinates
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.observations.calibration import Calibration
+from ballplate.simulator.observations.coordinates import CoordinateCalibration
+from ballplate.simulator.observations.distances import DistanceCalibration
 
 
 class Kind(IntEnum):

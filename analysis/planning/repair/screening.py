@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.layout import lay_out
-from ballplate.simulator.experiment.model import DistanceCalibration, Position
+from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.observations.distances import DistanceCalibration
 from ballplate.simulator.observations.readings import reading_blocks
 
 from .changes import Change

@@ -8,14 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.simulator.experiment.model import (
-    Calibration,
-    CoordinateCalibration,
-    DistanceCalibration,
-    Experiment,
-    Position,
-    ReadingGroup,
-)
+from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
@@ -24,6 +17,9 @@ from ballplate.simulator.geometry.positions import (
 )
 from ballplate.simulator.inputs.quantities import LengthFunction, format_length, parse_length
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.observations.calibration import Calibration
+from ballplate.simulator.observations.coordinates import CoordinateCalibration
+from ballplate.simulator.observations.distances import DistanceCalibration
 
 from .changes import ball_set, pair_set
 
@@ -200,7 +196,10 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
         by_axis = zip(item.axes, item.standard_uncertainties, strict=True)
         said["standard_uncertainty"] = {AXES[axis]: written_length(u) for axis, u in by_axis}
     else:
-        said["standard_uncertainty"] = written_length(item.standard_uncertainty)
+        stated = item.certified_values(layout)
+        said["standard_uncertainty"] = written_length(
+            min(one.standard_uncertainty for one in stated)
+        )
     return said
 
 
