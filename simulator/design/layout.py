@@ -199,9 +199,7 @@ def _readings(
     return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
-def _of_balls(
-    experiment: Experiment, first_ball: dict[str, int]
-) -> dict[type[BallObservations], BallObservations]:
+def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallObservations]:
     """Observations of the balls of plates, by kind: what all items of a kind state."""
     parts: dict[type[BallObservations], list[BallObservations]] = {
         Distances: [no_distances()],

@@ -41,7 +41,7 @@ class Lengths(LengthArrays, Observations):
         return Lengths(**values)
 
     def count(self, design: Design) -> int:
-        return len(design.once(length_whitening))
+        return len(design.once(length_whitening)) if len(self) else 0
 
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
         """As many rows as lengths that do not follow from others.
@@ -49,12 +49,11 @@ class Lengths(LengthArrays, Observations):
         The length between corrected points, or its projection, is compared with the known one (NPL
         Report CISE 15/98, section 3.2.2).
         """
-        white = design.once(length_whitening)
         if not len(self):
             none = np.zeros((0, len(design.once(shared_layout))))
             return Rows(np.zeros(0), none, np.zeros((0, 0, design.dimension)))
         residual, found = _length_residuals(design, state, x)
-        by_shared = white.whitened(
+        by_shared = design.once(length_whitening).whitened(
             _length_derivative(design, design.once(shared_layout), state, found)
         )
         return Rows(residual, by_shared, np.zeros((len(residual), 0, design.dimension)))
