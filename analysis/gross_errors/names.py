@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Integers
 from ballplate.simulator.observations.distances import Distances
 from ballplate.simulator.observations.lengths import length_name
@@ -26,22 +26,22 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
         ball, position = design.readings.ball[subject], design.readings.position[subject]
         return (
             f"dirt on ball {design.ball_label(int(ball))} in position"
-            f" {design.position_names[position]}, {letter}"
+            f" {design.positions.names[position]}, {letter}"
         )
     if kind == "moved":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
-        where = f"from position {design.position_names[position]} on"
+        where = f"from position {design.positions.names[position]} on"
         return f"ball {design.ball_label(int(ball))} displaced {where}, along {letter} of the plate"
     if kind in ("shift", "turn"):
         how = f"along {letter}" if kind == "shift" else f"turned about {letter}"
-        return f"position {design.position_names[subject]} slipped {slip_place(given, k)}, {how}"
+        return f"position {design.positions.names[subject]} slipped {slip_place(given, k)}, {how}"
     if kind == "probe":
-        return f"offset {letter} of probe {design.probe_names[subject]}"
+        return f"offset {letter} of probe {design.probes.names[subject]}"
     if kind == "length value":
         return f"certified {length_name(design, subject, of_reading=False)}"
     if kind == "scale":
-        return f"scale of the certificate of {design.artefact_names[subject]}"
-    return f"expansion in position {design.position_names[subject]}"
+        return f"scale of the certificate of {design.artefacts.names[subject]}"
+    return f"expansion in position {design.positions.names[subject]}"
 
 
 def common_ball(design: Design, distances: Integers) -> int:
@@ -57,7 +57,7 @@ def slip_place(given: Patterns, k: int) -> str:
     probe = design.readings.probe[rows]
     at = int(np.searchsorted(rows, start))
     if probe[at - 1] != probe[at] and probe[at - 1] not in probe[at:]:
-        return f"before probe {design.probe_names[probe[at]]}"
+        return f"before probe {design.probes.names[probe[at]]}"
     half = "half-way, " if at == len(rows) // 2 else ""
     return f"{half}before ball {design.ball_label(int(design.readings.ball[start]))}"
 
@@ -66,11 +66,13 @@ def reading_name(design: Design, reading: int, with_position: bool = True) -> st
     """A reading by ball and position, and by its probe where there are several."""
     readings = design.readings
     position = (
-        f" in position {design.position_names[readings.position[reading]]}" if with_position else ""
+        f" in position {design.positions.names[readings.position[reading]]}"
+        if with_position
+        else ""
     )
     probe = (
-        f" with {design.probe_names[readings.probe[reading]]}"
-        if len(design.probe_names) > 1
+        f" with {design.probes.names[readings.probe[reading]]}"
+        if len(design.probes.names) > 1
         else ""
     )
     return f"ball {design.ball_label(int(readings.ball[reading]))}{position}{probe}"

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, locations, probe_offsets
+from ballplate.simulator.design.arrays import Design, State, locations
 from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.observations.lengths import (
@@ -151,7 +151,7 @@ class _Place:
         self.unit, self.white = length_directions(design, state, x), design.once(length_whitening)
         turned = locations(design, state, self.readings) - state.origins[self.readings.position]
         self.arm = turned
-        self.has_plate = np.flatnonzero(design.is_plate[design.position_artefact])
+        self.has_plate = design.plate_positions
 
     def of_readings(
         self, rows: Integers, by_axis: Array, group: Integers | None = None
@@ -272,7 +272,7 @@ def _dirty_balls(at: _Place) -> Iterator[Block]:
     as its reading.
     """
     d = at.design.dimension
-    key = at.readings.ball * len(at.design.position_names) + at.readings.position
+    key = at.readings.ball * len(at.design.positions.names) + at.readings.position
     _, first, group, count = np.unique(
         key, return_index=True, return_inverse=True, return_counts=True
     )
@@ -317,7 +317,7 @@ def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
 
 def position_order(design: Design) -> Integers:
     """Place (positions,) of each position in the order in which the readings were taken."""
-    order = np.full(len(design.position_names), len(design.position_names))
+    order = np.full(len(design.positions.names), len(design.positions.names))
     found, first = np.unique(design.readings.position, return_index=True)
     order[found[np.argsort(first)]] = np.arange(len(found))
     return order
@@ -368,11 +368,11 @@ def _probes(at: _Place) -> Iterator[Block]:
     wrong.
     """
     design, state = at.design, at.state
-    d, offsets = design.dimension, probe_offsets(design, state)[design.readings.probe]
+    d, offsets = design.dimension, state.probes[design.readings.probe]
     given = design.of(Lengths)
     all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
     for probe in np.unique(design.readings.probe):
-        fixed = np.ones(d, bool) if design.free_offsets is None else ~design.free_offsets[probe]
+        fixed = np.ones(d, bool) if not design.probes.free.any() else ~design.probes.free[probe]
         if not fixed.any():
             continue
         rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[
@@ -406,10 +406,12 @@ def _scales(at: _Place) -> Iterator[Block]:
     """Certificates of an artefact of which all values are too long by one ratio."""
     design = at.design
     lengths = design.of(Lengths)
-    of_length = design.ball_artefact[design.readings.ball[lengths.first]]
+    of_length = design.balls.artefact[design.readings.ball[lengths.first]]
     scaled = [one for one in design.observations if one.scales]
-    for artefact in range(len(design.artefact_names)):
-        mine = [np.flatnonzero(design.ball_artefact[one.balls[:, 0]] == artefact) for one in scaled]
+    for artefact in range(len(design.artefacts.names)):
+        mine = [
+            np.flatnonzero(design.balls.artefact[one.balls[:, 0]] == artefact) for one in scaled
+        ]
         of_lengths = lengths.is_known & (of_length == artefact)
         if sum(map(len, mine)) + len(np.unique(lengths.certificate[of_lengths])) < 2:
             continue
@@ -430,7 +432,7 @@ def _expansions(at: _Place) -> Iterator[Block]:
     design = at.design
     values = length_values(design, at.state)
     of_lengths = design.readings.position[design.of(Lengths).first]
-    for k in range(len(design.position_names)):
+    for k in range(len(design.positions.names)):
         rows = np.flatnonzero(at.readings.position == k)
         if not len(rows) and not (of_lengths == k).any():
             continue

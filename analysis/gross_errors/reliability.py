@@ -12,7 +12,7 @@ from typing import Any, TextIO
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Functions, function_name
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.numerics.rounding import comparable
@@ -140,7 +140,7 @@ class Reliability(Result):
 
     def size(self, k: int) -> float:
         """About how far, in metres, a unit of a bias moves what it is about."""
-        extent = float(np.ptp(self.design.balls, axis=0).max(initial=0.0))
+        extent = float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0))
         return 1.0 if self.patterns.unit(k) == "m" else max(extent, 1e-3)
 
 
@@ -229,7 +229,7 @@ def _positions(result: Reliability) -> list[str]:
         )
         rows.append(
             [
-                design.position_names[k],
+                design.positions.names[k],
                 str(len(own) // design.dimension),
                 number(result.left[own].min(), 3),
                 number(result.left[own].mean(), 3),
@@ -370,9 +370,9 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
         )
     if result.deficiency:
         lines.append("(functions that the observations leave undetermined are left out)")
-    if len(result.design.points) > MOST_PLACES:
+    if len(result.design.evaluation.points) > MOST_PLACES:
         lines.append(
-            f"(effects on U6 are those on {MOST_PLACES} of {len(result.design.points)} evaluation"
+            f"(effects on U6 are those on {MOST_PLACES} of {len(result.design.evaluation.points)} evaluation"
             " points)"
         )
     return ["", *lines] if lines else []
@@ -481,8 +481,8 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
             i = int(given.subject[k])
             readings = design.readings
             position, probe = (
-                design.position_names[readings.position[i]],
-                design.probe_names[readings.probe[i]],
+                design.positions.names[readings.position[i]],
+                design.probes.names[readings.probe[i]],
             )
             names = [
                 position,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.estimation.parameters import AXIS_NAMES
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Integers
@@ -76,8 +76,8 @@ def unexplained_words(one: Unexplained) -> str:
 
 def _scatter_place(one: MoreScatter) -> str:
     if one.of.position >= 0:
-        return f"in position {one.design.position_names[one.of.position]}"
-    return f"with probe {one.design.probe_names[one.of.probe]}"
+        return f"in position {one.design.positions.names[one.of.position]}"
+    return f"with probe {one.design.probes.names[one.of.probe]}"
 
 
 def _significance(one: Suspect | MoreScatter | Unexplained) -> str:
@@ -141,18 +141,20 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
             too = words.more if one.value > 0 else words.less
             return f"{name(given, k)} {words.verb} {size} too {too}", words.cure
     if kind == "scale":
-        artefact = design.artefact_names[subject]
+        artefact = design.artefacts.names[subject]
         told = f"all that is certified of {artefact} is {size} too {long}"
         return told, "check the certificate, and the temperature of the artefact and of the scales"
     if kind == "probe":
-        told = f"offset {letter} of probe {design.probe_names[subject]} stated {size} too {high}"
+        told = f"offset {letter} of probe {design.probes.names[subject]} stated {size} too {high}"
         if len(one.columns) > 1:
-            told = f"offset of probe {design.probe_names[subject]} stated {_sizes(one, 'too high')}"
+            told = (
+                f"offset of probe {design.probes.names[subject]} stated {_sizes(one, 'too high')}"
+            )
         return told, "qualify the probe again, or let its offset be estimated"
-    place = design.position_names[subject] if kind in ("shift", "turn", "expansion") else ""
+    place = design.positions.names[subject] if kind in ("shift", "turn", "expansion") else ""
     if kind in ("ball", "moved"):
         ball = design.ball_label(int(design.readings.ball[subject]))
-        place = design.position_names[design.readings.position[subject]]
+        place = design.positions.names[design.readings.position[subject]]
         if kind == "ball":
             told = f"ball {ball} in position {place} read {_sizes(one, 'too high')} each time"
             return told, f"clean the ball, and {leave}"
@@ -164,7 +166,7 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
             told,
             "look whether it is loose, dirty or another one; from there on it is a ball of its own",
         )
-    artefact = design.artefact_names[design.position_artefact[subject]]
+    artefact = design.artefacts.names[design.positions.artefact[subject]]
     if kind in ("shift", "turn"):
         return (
             (
@@ -179,13 +181,13 @@ def _what(one: Suspect, marks: Sequence[Mark]) -> tuple[str, str]:
     ):
         larger = "larger" if value > 0 else "smaller"
         told = f"{with_uncertainty(1e6 * abs(value), 1e6 * uncertainty)} {SHOWN[one.unit]} {larger}"
-        parts.append(f"{told} in position {design.position_names[given.subject[column]]}")
+        parts.append(f"{told} in position {design.positions.names[given.subject[column]]}")
     return f"{artefact} {' and '.join(parts)}", "check the temperature there"
 
 
 def _from(ball: int, one: Suspect) -> str:
     """Sizes by which the distances of a ball are wrong, those that are significant."""
-    given, ends = one.patterns.design.of(Distances), one.patterns.design.ball_names
+    given, ends = one.patterns.design.of(Distances), one.patterns.design.balls.names
     parts = []
     for place in _significant(one):
         distance, value = int(one.patterns.subject[one.columns[place]]), float(one.values[place])

@@ -72,7 +72,7 @@ class Trials:
 def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
     """The design, and the artefacts as drawn on the true machine."""
     design = lay_out(experiment)
-    lower, upper = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    lower, upper = design.machine.volume.corners
     on_truth, state = on_true_machine(
         design, true_machine(experiment.true_machine, design.model, lower, upper)
     )

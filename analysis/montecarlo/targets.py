@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import probe_offsets, unknown_lengths
 from ballplate.simulator.estimation.functions import (
     Balls,
     Coordinates,
@@ -146,9 +145,9 @@ def _parameters(symbol: str, shared: Reference, at: Linearisation, functions: Pa
     # Parameters of another true model are no errors of these, which then have no part in the
     # functions.
     a = start.a - real.a if shared.truth.model == design.model else start.a
-    offsets = probe_offsets(design, start) - probe_offsets(design, real)
+    offsets = start.probes - real.probes
     steps = np.zeros((1, len(layout)))
-    steps[:, layout.lengths] = unknown_lengths(design, start) - unknown_lengths(design, real)
+    steps[:, layout.lengths] = start.lengths - real.lengths
     origins, balls = start.origins - real.origins, np.zeros((1, 0, 0))
     error = Deviations(balls, turned[None], origins[None], a[None], offsets[None], steps)
 

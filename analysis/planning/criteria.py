@@ -448,8 +448,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         for given in kind.functions(drawn.design, drawn.layout):
             assert isinstance(given, Distances)
             if isinstance(given.places, Balls):
-                plate = drawn.design.artefact_names[
-                    drawn.design.ball_artefact[given.places.index[0]]
+                plate = drawn.design.artefacts.names[
+                    drawn.design.balls.artefact[given.places.index[0]]
                 ]
                 placing = information.placing(plate)
                 if not placing:

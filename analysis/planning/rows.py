@@ -105,7 +105,7 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
     """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
-    count = np.bincount(place, minlength=len(design.position_names))
+    count = np.bincount(place, minlength=len(design.positions.names))
     end = np.cumsum(count)
     chosen = design.plate_readings[np.argsort(place, kind="stable")]
     lengths = _length_rows(drawn)
@@ -190,7 +190,7 @@ def calibration_rows(
         return _of_observations(drawn, design.observed(no_priors()))
     named = [
         k
-        for k, length in enumerate(drawn.design.length_names)
+        for k, length in enumerate(drawn.design.unknown_lengths.names)
         if length.rpartition(": ")[0] == item.artefact
     ]
     if len(named) != 1:

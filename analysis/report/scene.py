@@ -54,10 +54,10 @@ class Scene:
 def scene(design: Design) -> Scene:
     """The scene of a design; one in two dimensions is seen from above."""
     view, towards = projection(design.dimension)
-    edges, hidden = box_edges(design.lower, design.upper, towards)
+    edges, hidden = box_edges(design.machine.volume.lower, design.machine.volume.upper, towards)
     where = locations(design, nominal_state(design), design.readings)
     places = []
-    for k, name in enumerate(design.position_names):
+    for k, name in enumerate(design.positions.names):
         mine = np.flatnonzero(design.readings.position == k)
         if not len(mine):
             continue
@@ -67,13 +67,15 @@ def scene(design: Design) -> Scene:
         used = np.unique(design.readings.probe[mine])
         # All styli at the ball nearest to the middle, where they hide least.
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
-        styli = np.stack([np.stack([middle, middle - design.probes[probe]]) for probe in used])
+        styli = np.stack(
+            [np.stack([middle, middle - design.probes.offsets[probe]]) for probe in used]
+        )
         places.append(
             Place(
                 k + 1,
                 name,
-                design.artefact_names[design.position_artefact[k]],
-                tuple(design.probe_names[probe] for probe in used),
+                design.artefacts.names[design.positions.artefact[k]],
+                tuple(design.probes.names[probe] for probe in used),
                 hull(balls @ view.T),
                 balls[kept] @ view.T,
                 styli @ view.T,
@@ -84,7 +86,7 @@ def scene(design: Design) -> Scene:
     places.sort(key=lambda place: -place.depth)
     tips = tuple(
         (name, view @ offset)
-        for name, offset in zip(design.probe_names, design.probes, strict=True)
+        for name, offset in zip(design.probes.names, design.probes.offsets, strict=True)
     )
     return Scene(edges @ view.T, hidden, tuple(places), _axes(design, view), tips)
 
@@ -119,7 +121,7 @@ def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[n
 
 def _axes(design: Design, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
     """Axes along the edges that stand outermost on the paper: x and y below, z on the left."""
-    lower, upper = design.lower, design.upper
+    lower, upper = design.machine.volume.lower, design.machine.volume.upper
     starts = [lower.copy() for _ in range(design.dimension)]
     if design.dimension == 3:
         # The vertical edge at the left, the lower one at the right.

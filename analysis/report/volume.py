@@ -52,12 +52,18 @@ def error_map(experiment: Experiment) -> ErrorMap:
     machine error.
     """
     design = lay_out(experiment)
-    x, y = (np.linspace(design.lower[k], design.upper[k], POINTS) for k in (0, 1))
+    x, y = (
+        np.linspace(design.machine.volume.lower[k], design.machine.volume.upper[k], POINTS)
+        for k in (0, 1)
+    )
     levels: list[tuple[str, float | None]] = [("", None)]
     grid = np.stack(np.meshgrid(y, x, indexing="ij")[::-1], axis=-1)[None]
     if design.dimension == 3:
         heights = [
-            float(design.lower[2] + share * (design.upper[2] - design.lower[2]))
+            float(
+                design.machine.volume.lower[2]
+                + share * (design.machine.volume.upper[2] - design.machine.volume.lower[2])
+            )
             for _, share in LEVELS
         ]
         levels = [(name, height) for (name, _), height in zip(LEVELS, heights, strict=True)]

@@ -7,10 +7,11 @@ last digits printed.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, pose_size
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Balls, displacements
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.parameters import SharedLayout
+from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, TRANSLATIONS, KinematicModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.numerics.threads import single_threaded
@@ -52,7 +53,7 @@ def pose_rows(design: Design, layout: SharedLayout) -> Array:
     rows = np.eye(len(layout))[layout.poses]
     for k in design.posed_positions:
         columns = layout.pose_columns[k]
-        by_rotation = rotation_sensitivity(-design.origins[k][None])[0]
+        by_rotation = rotation_sensitivity(-design.positions.origins[k][None])[0]
         for axis in np.flatnonzero(columns[:d] >= 0):
             for turn in range(pose_size(d) - d):
                 if columns[d + turn] >= 0:
@@ -93,8 +94,8 @@ def first_ball_lengths(at: Linearisation) -> tuple[Array, list[str]]:
     """
     design = at.design
     values, names = [], []
-    for artefact in np.flatnonzero(design.is_plate):
-        own = np.flatnonzero(design.ball_artefact == artefact)
+    for artefact in design.artefacts.plates:
+        own = design.balls.of(artefact)
         pairs = np.stack([np.zeros(len(own) - 1, np.int64), np.arange(1, len(own))], axis=1)
         tile = pairs_of(displacements(at, Balls(own)), pairs)
         values.append(np.where(tile.is_open, np.nan, tile.uncertainties))

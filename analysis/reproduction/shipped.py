@@ -84,7 +84,7 @@ def fitted_exactly(experiment: Experiment) -> Fit:
     given.
     """
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     machine = true_machine(experiment.true_machine, design.model, *corners)
     _, x = exact_readings(*on_true_machine(design, machine))
     return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
@@ -92,5 +92,5 @@ def fitted_exactly(experiment: Experiment) -> Fit:
 
 def sums_of_squares(found: Fit) -> list[float]:
     """S^2 of each iteration in square metres, with weight 1 for a reading."""
-    scale = float(found.design.repeatability[0]) ** 2
+    scale = float(found.design.machine.repeatability[0]) ** 2
     return [scale * iteration.sum_of_squares for iteration in found.solution.iterations]

@@ -54,14 +54,16 @@ class QuantityKind:
 
 def evaluation_points(design: Design) -> Points:
     """The evaluation points as places, with the probe that they are evaluated with."""
-    return Points(design.points, np.full(len(design.points), design.point_probe))
+    return Points(
+        design.evaluation.points, np.full(len(design.evaluation.points), design.evaluation.probe)
+    )
 
 
 def task_distances(design: Design) -> Distances:
     """The lengths of the measuring tasks."""
-    ends = Points(design.task_points.reshape(-1, design.dimension), design.task_probes.ravel())
-    pairs = np.arange(2 * len(design.task_names)).reshape(-1, 2)
-    return Distances(ends, pairs, design.task_names, design.task_targets)
+    ends = Points(design.tasks.points.reshape(-1, design.dimension), design.tasks.probes.ravel())
+    pairs = np.arange(2 * len(design.tasks.names)).reshape(-1, 2)
+    return Distances(ends, pairs, design.tasks.names, design.tasks.targets)
 
 
 def _shared(layout: SharedLayout, columns: slice) -> tuple[Functions, ...]:
@@ -90,8 +92,8 @@ def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
 
 def _plates(design: Design) -> tuple[Balls, ...]:
     """The balls of each plate."""
-    plates = np.flatnonzero(design.is_plate)
-    return tuple(Balls(np.flatnonzero(design.ball_artefact == plate)) for plate in plates)
+    plates = design.artefacts.plates
+    return tuple(Balls(design.balls.of(plate)) for plate in plates)
 
 
 QUANTITIES: dict[str, QuantityKind] = {
@@ -129,7 +131,7 @@ QUANTITIES: dict[str, QuantityKind] = {
     "U4": QuantityKind(
         "error function at the evaluation points",
         lambda design, layout: (
-            (Coordinates(evaluation_points(design)),) if len(design.points) else ()
+            (Coordinates(evaluation_points(design)),) if len(design.evaluation.points) else ()
         ),
         effect="error function",
     ),
@@ -146,7 +148,7 @@ QUANTITIES: dict[str, QuantityKind] = {
     "U6": QuantityKind(
         "distances between corrected points",
         lambda design, layout: (
-            (Distances(evaluation_points(design)),) if len(design.points) > 1 else ()
+            (Distances(evaluation_points(design)),) if len(design.evaluation.points) > 1 else ()
         ),
         are_lengths=True,
         effect="distances between corrected points",
@@ -155,7 +157,7 @@ QUANTITIES: dict[str, QuantityKind] = {
     ),
     "tasks": QuantityKind(
         "lengths of measuring tasks",
-        lambda design, layout: (task_distances(design),) if design.task_names else (),
+        lambda design, layout: (task_distances(design),) if design.tasks.names else (),
         are_lengths=True,
         in_replicates=False,
         is_recorded=False,

@@ -108,28 +108,32 @@ class Design:
 
     @property
     def dimension(self) -> int:
-        return len(self.repeatability)
+        return len(self.machine.repeatability)
 
     @cached_property
     def plate_readings(self) -> Integers:
         """Indices of the readings of plates, whose balls and poses are parameters."""
-        return np.flatnonzero(self.is_plate[self.ball_artefact[self.readings.ball]])
+        return np.flatnonzero(self.artefacts.is_plate[self.balls.artefact[self.readings.ball]])
 
     @cached_property
     def plate_balls(self) -> Integers:
         """Indices of the balls that are parameters."""
-        return np.flatnonzero(self.is_plate[self.ball_artefact])
+        return np.flatnonzero(self.artefacts.is_plate[self.balls.artefact])
 
     @cached_property
     def gauge_positions(self) -> Integers:
         """Indices of the positions of Bryan gauges."""
-        gauges = np.zeros_like(self.is_plate) if self.is_gauge is None else self.is_gauge
-        return np.flatnonzero(gauges[self.position_artefact])
+        gauges = (
+            np.zeros_like(self.artefacts.is_plate)
+            if self.artefacts.is_gauge is None
+            else self.artefacts.is_gauge
+        )
+        return np.flatnonzero(gauges[self.positions.artefact])
 
     @cached_property
     def posed_positions(self) -> Integers:
         """Indices of the positions whose poses, or pivots, are parameters."""
-        of_plates = np.flatnonzero(self.is_plate[self.position_artefact])
+        of_plates = self.plate_positions
         return np.sort(np.concatenate([of_plates, self.gauge_positions]))
 
     @cached_property
@@ -174,9 +178,9 @@ class Design:
         """Number of free parameters: balls, poses less what is held, machine errors, probe offsets,
         unknown lengths.
         """
-        poses = int((~self.held[self.posed_positions]).sum())
-        offsets = 0 if self.free_offsets is None else int(self.free_offsets.sum())
-        lengths = len(self.length_names)
+        poses = int((~self.positions.held[self.posed_positions]).sum())
+        offsets = 0 if not self.probes.free.any() else int(self.probes.free.sum())
+        lengths = len(self.unknown_lengths.names)
         return (
             self.dimension * len(self.plate_balls)
             + poses
@@ -187,9 +191,9 @@ class Design:
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
-        if len(self.artefact_names) == 1:
-            return self.ball_names[ball]
-        return f"{self.artefact_names[self.ball_artefact[ball]]}/{self.ball_names[ball]}"
+        if len(self.artefacts.names) == 1:
+            return self.balls.names[ball]
+        return f"{self.artefacts.names[self.balls.artefact[ball]]}/{self.balls.names[ball]}"
 
 
 @dataclass(frozen=True)
@@ -211,12 +215,12 @@ class State:
 
 def unknown_lengths(design: Design, state: State) -> Array:
     """Lengths of standards without certificates at `state`, in metres."""
-    return design.drawn_lengths if state.lengths is None else state.lengths
+    return design.unknown_lengths.drawn if state.lengths is None else state.lengths
 
 
 def probe_offsets(design: Design, state: State) -> Array:
     """Offsets (l, d) of all probes at `state`."""
-    return design.probes if state.probes is None else state.probes
+    return design.probes.offsets if state.probes is None else state.probes
 
 
 def reading_uncertainties(design: Design, readings: Readings) -> Array:
@@ -225,13 +229,16 @@ def reading_uncertainties(design: Design, readings: Readings) -> Array:
     """
     if readings.uncertainty is not None:
         return readings.uncertainty
-    return np.broadcast_to(design.repeatability, (len(readings), design.dimension))
+    return np.broadcast_to(design.machine.repeatability, (len(readings), design.dimension))
 
 
 def nominal_state(design: Design) -> State:
     """The design as drawn, on a machine without errors."""
     return State(
-        design.balls, design.rotations, design.origins, np.zeros(len(design.model.parameters))
+        design.balls.places,
+        design.positions.rotations,
+        design.positions.origins,
+        np.zeros(len(design.model.parameters)),
     )
 
 

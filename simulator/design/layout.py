@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..experiment.model import Experiment, Prior
 from ..geometry.artefacts import BryanGaugeSettings
+from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
@@ -20,7 +21,7 @@ from ..observations.distances import Distances, no_distances
 from ..observations.length_standards import standard_lengths
 from ..observations.priors import Priors
 from ..observations.radius import RadiusCalibration
-from .arrays import Design, Readings, pose_size
+from .arrays import Design, Readings
 
 # Evaluation points of an experiment that names none.
 DEFAULT_POINTS = 200

@@ -268,7 +268,7 @@ def _eliminate_graded(
 
 def _places(design: Design, kept: Integers) -> Integers:
     """Place (n,) of each ball among those kept."""
-    place_of = np.zeros(len(design.ball_names), np.int64)
+    place_of = np.zeros(len(design.balls.names), np.int64)
     place_of[kept] = np.arange(len(kept))
     return place_of
 
@@ -360,12 +360,12 @@ def _batches(
     readings = design.readings
     chosen = design.plate_readings
     chosen = chosen[np.argsort(readings.ball[chosen], kind="stable")]
-    count = np.bincount(readings.ball[chosen], minlength=len(design.ball_names))
+    count = np.bincount(readings.ball[chosen], minlength=len(design.balls.names))
     start = np.cumsum(count) - count
     certified = np.concatenate([np.zeros(0, np.int64), *(ball for ball, _ in known)])
     slope = np.concatenate([np.zeros((0, d)), *(one.by_ball[:, 0] for _, one in known)])
     by_ball_first = np.argsort(certified, kind="stable")
-    extra = np.bincount(certified, minlength=len(design.ball_names))
+    extra = np.bincount(certified, minlength=len(design.balls.names))
     extra_start = np.cumsum(extra) - extra
     # Where no shared parameter has a part, columns of zeros are not formed.
     is_mixed = any(one.by_shared is not None for _, one in known)

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..design.arrays import Design, State
+from ..geometry.motions import AXIS_NAMES
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, Integers, Unit
 from .corrections import corrected_points, correction_rows
 from .covariance import MICROMETRE, blank
 from .linearisation import LinearFunctions, Linearisation
-from .parameters import AXIS_NAMES, SharedLayout
+from .parameters import SharedLayout
 
 # Places whose derivatives by all shared parameters are formed at once.
 PLACES_AT_ONCE = 1000
@@ -224,7 +225,7 @@ def _derivatives(at: Linearisation, state: State, functions: Functions) -> Linea
         by_balls = np.zeros((n, d, 0))
     else:
         by_shared = np.zeros((n, d, len(at.layout)))
-        by_balls = np.zeros((n, d, len(design.balls), d))
+        by_balls = np.zeros((n, d, len(design.balls.places), d))
         by_balls[np.arange(n)[:, None], np.arange(d), places.index[:, None], np.arange(d)] = 1.0
     by_all = np.concatenate([by_shared, by_balls.reshape(n, d, -1)], axis=2)
     if isinstance(functions, Coordinates):

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..design.arrays import Design, State, probe_offsets, unknown_lengths
+from ..design.arrays import Design, State
 from ..geometry.motions import rotation_from_vector
 from ..machines.protocol import Array
 from ..numerics.threads import scipy_linalg, single_threaded
@@ -162,7 +162,7 @@ def linearised_fit(design: Design, solution: Solution) -> Linearisation:
 def newton_step(design: Design, factor: Factor, found: Spectrum) -> tuple[Array, Array]:
     """The least-squares step: shared parameters (s,) and balls (n, d)."""
     shared = _shared_step(factor, found)
-    balls = np.zeros((len(design.ball_names), design.dimension))
+    balls = np.zeros((len(design.balls.names), design.dimension))
     side = factor.ball_side + factor.ball_shared @ shared
     balls[factor.eliminated] = -solve_balls(factor, side[:, :, None])[:, :, 0]
     if len(factor.kept):
@@ -200,14 +200,14 @@ def moved(
     poses = np.where(pose_columns >= 0, shared[np.maximum(pose_columns, 0)], 0.0)
     turn = rotation_from_vector(poses[:, d:])
     probes = state.probes
-    if offset_columns is not None and design.free_offsets is not None:
+    if offset_columns is not None and design.probes.free.any():
         step = np.where(offset_columns >= 0, shared[np.maximum(offset_columns, 0)], 0.0)
-        probes = probe_offsets(design, state) + step
+        probes = state.probes + step
     return State(
         state.balls + balls,
         turn @ state.rotations,
         state.origins + poses[:, :d],
         state.a + shared[model],
         probes,
-        unknown_lengths(design, state) + shared[lengths] if lengths is not None else state.lengths,
+        state.lengths + shared[lengths] if lengths is not None else state.lengths,
     )

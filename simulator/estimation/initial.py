@@ -26,26 +26,28 @@ def initial_state(design: Design, x: Array) -> State:
     Where too few balls join a position to the others, the nominal geometry closes the gap.
     """
     d = design.dimension
-    balls = design.balls.copy()
-    rotations, origins = design.rotations.copy(), design.origins.copy()
+    balls = design.balls.places.copy()
+    rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
     seen = _mean_locations(design, x)
-    for artefact in np.flatnonzero(design.is_plate):
-        members = np.flatnonzero(design.ball_artefact == artefact)
-        places = [int(k) for k in np.flatnonzero(design.position_artefact == artefact)]
+    for artefact in design.artefacts.plates:
+        members = design.balls.of(artefact)
+        places = [int(k) for k in np.flatnonzero(design.positions.artefact == artefact)]
         if len(members) == 1:
             # A single ball has a place in each position and no turn.
             arm = np.einsum("kij,j->ki", rotations[places], balls[members[0]])
             there = seen[places, members[0]]
             origins[places] = np.where(np.isnan(there), origins[places], there - arm)
-            held = [k for k in places if design.held[k, :d].all()]
+            held = [k for k in places if design.positions.held[k, :d].all()]
             if held:
-                origins[held] = design.origins[held]
+                origins[held] = design.positions.origins[held]
                 first = rotations[held[0]].T @ (seen[held[0], members[0]] - origins[held[0]])
                 balls[members[0]] = np.where(np.isnan(first), balls[members[0]], first)
             continue
-        shape, poses = _assemble(seen[places][:, members], design.balls[members], d)
+        shape, poses = _assemble(seen[places][:, members], design.balls.places[members], d)
         turn, shift = _into_frame(design, shape, poses, places, members)
-        balls[members] = np.where(np.isnan(shape), design.balls[members], shape @ turn.T + shift)
+        balls[members] = np.where(
+            np.isnan(shape), design.balls.places[members], shape @ turn.T + shift
+        )
         for place, (rotation, origin) in zip(places, poses, strict=True):
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
@@ -53,7 +55,9 @@ def initial_state(design: Design, x: Array) -> State:
     for k in design.gauge_positions:
         rows = readings.position == k
         if rows.any():
-            origins[k] = fit_sphere(x[rows] + design.probes[readings.probe[rows]], origins[k])[0]
+            origins[k] = fit_sphere(
+                x[rows] + design.probes.offsets[readings.probe[rows]], origins[k]
+            )[0]
     state = State(balls, rotations, origins, np.zeros(len(design.model.parameters)))
     for one in design.observations:
         state = one.started(design, x, state)
@@ -63,9 +67,9 @@ def initial_state(design: Design, x: Array) -> State:
 def _mean_locations(design: Design, x: Array) -> Array:
     """Where each ball was seen in each position (k, n, d), NaN where it was not."""
     readings = design.readings
-    total = np.zeros((len(design.position_names), len(design.ball_names), design.dimension))
+    total = np.zeros((len(design.positions.names), len(design.balls.names), design.dimension))
     count = np.zeros(total.shape[:2])
-    np.add.at(total, (readings.position, readings.ball), x + design.probes[readings.probe])
+    np.add.at(total, (readings.position, readings.ball), x + design.probes.offsets[readings.probe])
     np.add.at(count, (readings.position, readings.ball), 1.0)
     with np.errstate(invalid="ignore"):
         return np.asarray(total / count[:, :, None])
@@ -128,12 +132,14 @@ def _into_frame(
     members: Integers,
 ) -> tuple[Array, Array]:
     """Motion that takes the assembled shape into the artefact's own frame."""
-    held = [k for k in places if design.held[k].all()]
+    held = [k for k in places if design.positions.held[k].all()]
     if held:
         rotation, origin = poses[places.index(held[0])]
-        turn = design.rotations[held[0]].T @ rotation
-        return turn, design.rotations[held[0]].T @ (origin - design.origins[held[0]])
-    target, certified = design.balls.copy(), np.zeros(len(members), bool)
+        turn = design.positions.rotations[held[0]].T @ rotation
+        return turn, design.positions.rotations[held[0]].T @ (
+            origin - design.positions.origins[held[0]]
+        )
+    target, certified = design.balls.places.copy(), np.zeros(len(members), bool)
     for one in design.observations:
         ball, axis = one.fixing()
         if len(ball):

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..design.arrays import pose_size
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ..geometry.motions import pose_size
 from ..geometry.positions import ball_coordinates
 from ..inputs.messages import ExperimentError, Message, Steps
 from ..inputs.problems import Problems, written_text

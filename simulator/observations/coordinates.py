@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from pydantic import Field, Tag
 
 from ..design.arrays import Design
-from ..estimation.parameters import AXIS_NAMES
 from ..experiment.lookup import References, frozen
 from ..experiment.position_sections import CalibratedBalls, SomeAxisLengthsSettings, Text
 from ..geometry.artefacts import BallLayout, Name, corners
+from ..geometry.motions import AXIS_NAMES
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.quantities import PositiveLength
 from ..inputs.settings import FORM, Settings, hint, listing

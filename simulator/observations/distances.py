@@ -57,7 +57,7 @@ class Distances(BallObservations):
 
     def name(self, design: Design, k: int) -> str:
         first, second = int(self.first[k]), int(self.second[k])
-        return f"distance {design.ball_label(first)} to {design.ball_names[second]}"
+        return f"distance {design.ball_label(first)} to {design.balls.names[second]}"
 
 
 def no_distances() -> Distances:

@@ -11,16 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.arrays import (
-    Design,
-    Observations,
-    Rows,
-    State,
-    locations,
-    probe_offsets,
-    reading_uncertainties,
-    unknown_lengths,
-)
+from ..design.arrays import Design, Observations, Rows, State, locations, reading_uncertainties
 from ..estimation.parameters import SharedLayout, shared_layout
 from ..machines.protocol import Array, ErrorModel, Integers
 from .joint_lengths import LengthArrays, LengthWhitening, length_whitening_of
@@ -68,7 +59,11 @@ class Lengths(LengthArrays, Observations):
 
     def weights(self, design: Design, state: State) -> Array:
         own = 1.0 / self.uncertainty[self.uncertainty > 0.0]
-        return np.append(own, 1.0 / design.repeatability) if self.with_repeatability.any() else own
+        return (
+            np.append(own, 1.0 / design.machine.repeatability)
+            if self.with_repeatability.any()
+            else own
+        )
 
     def alike(self, design: Design, state: State) -> Lengths:
         return replace(
@@ -87,15 +82,15 @@ class Lengths(LengthArrays, Observations):
 
     def name(self, design: Design, k: int) -> str:
         position = design.readings.position[self.first[k]]
-        return f"{length_name(design, k)} in position {design.position_names[position]}"
+        return f"{length_name(design, k)} in position {design.positions.names[position]}"
 
 
 def length_whitening(design: Design) -> LengthWhitening:
     """What makes uncorrelated observations of unit variance of the lengths of standards."""
     given, readings = design.of(Lengths), design.readings
     noise = reading_uncertainties(design, readings) / np.sqrt(readings.repeats)[:, None]
-    standard = design.ball_artefact[readings.ball[given.first]]
-    place = readings.position[given.first] * len(design.probe_names) + readings.probe[given.first]
+    standard = design.balls.artefact[readings.ball[given.first]]
+    place = readings.position[given.first] * len(design.probes.names) + readings.probe[given.first]
     return length_whitening_of(given, noise, standard, place)
 
 
@@ -105,13 +100,13 @@ def length_name(design: Design, length: int, of_reading: bool = True) -> str:
     """
     given, readings = design.of(Lengths), design.readings
     ball = int(readings.ball[given.first[length]])
-    artefact = design.artefact_names[design.ball_artefact[ball]]
+    artefact = design.artefacts.names[design.balls.artefact[ball]]
     if given.second[length] < 0:
         return f"radius of {artefact}" + (
-            f" to ball {design.ball_names[ball]}" if of_reading else ""
+            f" to ball {design.balls.names[ball]}" if of_reading else ""
         )
     return (
-        f"length {design.ball_names[ball]}-{design.ball_names[readings.ball[given.second[length]]]}"
+        f"length {design.balls.names[ball]}-{design.balls.names[readings.ball[given.second[length]]]}"
         f" of {artefact}"
     )
 
@@ -132,7 +127,7 @@ def _length_derivative(
         along = found.unit[end.rows]
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
         rows[end.rows, layout.model] += end.sign * np.einsum("md,mdn->mn", along, by_model)
-        if design.free_offsets is not None:
+        if design.probes.free.any():
             by_offset = offset_sensitivity(design.model, end.points, state.a, end.offsets)
             columns = layout.offset_columns[end.probe]
             np.add.at(
@@ -186,7 +181,7 @@ def _measured(design: Design, state: State, x: Array | None) -> _Measured:
         (-1.0, given.second, np.flatnonzero(~given.to_pivot)),
     ):
         readings = design.readings.select(chosen[rows])
-        p = probe_offsets(design, state)[readings.probe]
+        p = state.probes[readings.probe]
         if x is not None:
             points = x[chosen[rows]]
         else:
@@ -240,9 +235,9 @@ def length_values(design: Design, state: State) -> Array:
     unknown ones.
     """
     given = design.of(Lengths)
-    if given.free is None or not len(design.length_names):
+    if given.free is None or not len(design.unknown_lengths.names):
         return given.value
-    return np.where(given.free >= 0, unknown_lengths(design, state)[given.free], given.value)
+    return np.where(given.free >= 0, state.lengths[given.free], given.value)
 
 
 def true_lengths(design: Design, truth: State) -> Array:
@@ -266,16 +261,16 @@ def true_lengths(design: Design, truth: State) -> Array:
 def _measured_lengths(design: Design, origins: Array, x: Array) -> Array | None:
     """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
     given = design.of(Lengths)
-    if given.free is None or not len(design.length_names):
+    if given.free is None or not len(design.unknown_lengths.names):
         return None
-    seen = x + design.probes[design.readings.probe]
+    seen = x + design.probes.offsets[design.readings.probe]
     other = np.where(
         given.to_pivot[:, None],
         origins[design.readings.position[given.first]],
         seen[np.maximum(given.second, 0)],
     )
     length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
-    found = design.drawn_lengths.copy()
+    found = design.unknown_lengths.drawn.copy()
     for number in np.unique(given.free[given.free >= 0]):
         found[number] = length[given.free == number].mean()
     return found

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..design.arrays import Design, Observations, Rows, State, Words, probe_offsets
+from ..design.arrays import Design, Observations, Rows, State, Words
 from ..estimation.parameters import shared_layout
 from ..geometry.motions import vector_from_rotation, vector_rate
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
@@ -76,7 +76,7 @@ class Priors(Observations):
         """Values (m,) at `state` of what these are about."""
         of_poses = _pose_values(design, state)[self.position, self.component]
         axis = np.minimum(self.component, design.dimension - 1)
-        of_probes = probe_offsets(design, state)[self.probe, axis]
+        of_probes = state.probes[self.probe, axis]
         of_model = self.by_model @ state.a if len(self) else np.zeros(0)
         return np.where(
             self.position >= 0, of_poses, np.where(self.probe >= 0, of_probes, of_model)
@@ -107,7 +107,7 @@ class Priors(Observations):
 
 def _pose_values(design: Design, state: State) -> Array:
     """Origins and rotations against the nominal pose (k, pose size)."""
-    turned = vector_from_rotation(state.rotations @ design.rotations.transpose(0, 2, 1))
+    turned = vector_from_rotation(state.rotations @ design.positions.rotations.transpose(0, 2, 1))
     return np.concatenate([state.origins, turned], axis=1)
 
 

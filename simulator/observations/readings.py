@@ -11,15 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..design.arrays import (
-    Design,
-    Readings,
-    State,
-    locations,
-    pose_size,
-    probe_offsets,
-    reading_uncertainties,
-)
+from ..design.arrays import Design, Readings, State, locations, reading_uncertainties
+from ..geometry.motions import pose_size
 from ..machines.protocol import Array, ErrorModel
 
 # Metres: of the size of probe offsets.
@@ -44,7 +37,7 @@ class ReadingBlocks:
 
 def expected_readings(design: Design, state: State, readings: Readings) -> Array:
     """Scale readings (m, d) of a machine without errors, true location less probe offset."""
-    return locations(design, state, readings) - probe_offsets(design, state)[readings.probe]
+    return locations(design, state, readings) - state.probes[readings.probe]
 
 
 def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
@@ -92,7 +85,7 @@ def reading_blocks(
     None.
     """
     d = design.dimension
-    p = probe_offsets(design, state)[readings.probe]
+    p = state.probes[readings.probe]
     rotation = state.rotations[readings.position]
     arm = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
     true = arm + state.origins[readings.position]
@@ -108,6 +101,6 @@ def reading_blocks(
     by_pose[:, range(d), range(d)] = -weight
     by_pose[:, :, d:] = -weight[:, :, None] * rotation_sensitivity(arm)
     by_offset = None
-    if design.free_offsets is not None:
+    if design.probes.free.any():
         by_offset = weight[:, :, None] * offset_sensitivity(design.model, x, state.a, p)
     return ReadingBlocks(residual, -weight[:, :, None] * rotation, by_pose, by_model, by_offset)

@@ -111,7 +111,7 @@ def drawn_values(
     true: list[float] = []
     names = list(experiment.artefacts)
     first_ball = {
-        name: int(np.flatnonzero(design.ball_artefact == names.index(name))[0]) for name in names
+        name: int(np.flatnonzero(design.balls.artefact == names.index(name))[0]) for name in names
     }
     for item in experiment.calibration:
         true += item.true_values(truth.balls, first_ball[item.artefact]).tolist()

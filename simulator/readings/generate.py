@@ -6,15 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..design.arrays import (
-    Design,
-    Readings,
-    State,
-    locations,
-    nominal_state,
-    probe_offsets,
-    reading_uncertainties,
-)
+from ..design.arrays import Design, Readings, State, locations, nominal_state, reading_uncertainties
 from ..machines.protocol import Array, ErrorModel, Integers
 from ..machines.truth import TrueMachine
 from ..observations.joint_lengths import FLAT
@@ -59,7 +51,7 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
     """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
     readings = design.readings.expanded()
-    p = probe_offsets(design, truth)[readings.probe]
+    p = truth.probes[readings.probe]
     return readings, scale_readings(design.model, locations(design, truth, readings), truth.a, p)
 
 
@@ -85,7 +77,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     gauge the places of its ball; lengths that share balls move these together. Lengths without
     certificates are as drawn.
     """
-    balls = design.balls.copy()
+    balls = design.balls.places.copy()
     known = [one for one in design.observations if one.balls.shape[1]]
     rows = [one.rows(design, nominal_state(design), None) for one in known]
     d, off = design.dimension, np.concatenate([np.zeros(0), *(one.residual for one in rows)])
@@ -124,7 +116,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     pivoted = given.select(given.to_pivot)
     for certificate in np.unique(pivoted.certificate):
         k = int(np.flatnonzero(pivoted.certificate == certificate)[0])
-        own = design.ball_artefact == design.ball_artefact[design.readings.ball[pivoted.first[k]]]
+        own = design.balls.artefact == design.balls.artefact[design.readings.ball[pivoted.first[k]]]
         true = pivoted.value[k] + pivoted.uncertainty[k] * generator.standard_normal()
         balls[own] *= true / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
     given = given.select(~given.to_pivot)
@@ -132,7 +124,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     pairs, first = np.unique(ends, axis=1, return_index=True)
     ball, times = np.unique(pairs, return_counts=True)
     # Of artefacts whose lengths share balls.
-    shared = np.isin(design.ball_artefact[pairs[0]], design.ball_artefact[ball[times > 1]])
+    shared = np.isin(design.balls.artefact[pairs[0]], design.balls.artefact[ball[times > 1]])
     if shared.any():
         of_shared = given.select(first[shared])
         wanted = of_shared.value + of_shared.uncertainty * generator.standard_normal(len(of_shared))

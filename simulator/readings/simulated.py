@@ -50,7 +50,7 @@ def simulated_readings(
     :raises ExperimentError: the true machine's errors are so large that there is no reading.
     """
     design = lay_out(experiment)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(experiment.true_machine, design.model, *corners)
     )

@@ -140,13 +140,13 @@ def diagonals() -> np.ndarray:
     design = lay_out(quickstart())
     problem = dense.planned(design, 5, 5)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (
-        design.upper - design.lower
+        design.machine.volume.size
     )
-    offsets = np.tile(design.probes[design.point_probe], (8, 1))
+    offsets = np.tile(design.probes.offsets[design.evaluation.probe], (8, 1))
 
     def lengths(step: dense.Values) -> dense.Values:
         places = dense.corrected(
-            problem, design.lower + corners, dense.unpack(problem, step)[3], offsets
+            problem, design.machine.volume.lower + corners, dense.unpack(problem, step)[3], offsets
         )
         return dense.length(places[:4] - places[:3:-1])
 

@@ -40,7 +40,7 @@ def perturbed(design: Design, seed: int = 3) -> State:
     generator = np.random.default_rng(seed)
     layout = shared_layout(design)
     shared = 1e-3 * generator.standard_normal(len(layout))
-    balls = 1e-2 * generator.standard_normal(design.balls.shape)
+    balls = 1e-2 * generator.standard_normal(design.balls.places.shape)
     return moved(design, nominal_state(design), layout.pose_columns, shared, balls, layout.model)
 
 
@@ -54,7 +54,7 @@ def test_readings(design: Design) -> None:
         there = moved(design, state, layout.pose_columns, shared, balls, layout.model)
         return reading_blocks(design, there, chosen, x).residual
 
-    zero, still = np.zeros(len(layout)), np.zeros(design.balls.shape)
+    zero, still = np.zeros(len(layout)), np.zeros(design.balls.places.shape)
     by_shared = central_difference(lambda s: residual(s, still), zero, STEP)
     assert_derivative(blocks.by_model, by_shared[:, :, layout.model], RELATIVE)
     columns = layout.pose_columns[chosen.position]
@@ -79,11 +79,11 @@ def test_calibration(design: Design, kind: type[Observations]) -> None:
     found = given.rows(design, state, None)
 
     def residual(balls: np.ndarray) -> np.ndarray:
-        there = replace(state, balls=balls.reshape(design.balls.shape))
+        there = replace(state, balls=balls.reshape(design.balls.places.shape))
         return given.rows(design, there, None).residual
 
     expected = central_difference(residual, state.balls.ravel(), STEP)
-    dense = np.zeros((len(given), *design.balls.shape))
+    dense = np.zeros((len(given), *design.balls.places.shape))
     for j in range(given.balls.shape[1]):
         dense[np.arange(len(given)), given.balls[:, j]] += found.by_ball[:, j]
     assert found.by_shared is None

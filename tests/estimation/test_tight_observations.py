@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.reference import dense
-from tests.reference.designs import corner_sides, grid, plate_design, six_positions
+from tests.reference.designs import altered, corner_sides, grid, plate_design, six_positions
 
 Real = NDArray[np.float64]
 
@@ -53,7 +53,9 @@ def design_of(positions: tuple[int, ...], certificate: str, repeatability: float
     n = len(design.model.parameters)
     none, empty = np.zeros(0, np.int64), np.zeros(0)
     priors = Priors((), none, none, none, np.zeros((0, n)), empty, empty)
-    return replace(design, points=np.random.default_rng(3).random((6, 3))).observed(priors)
+    return altered(design, evaluation={"points": np.random.default_rng(3).random((6, 3))}).observed(
+        priors
+    )
 
 
 def with_known(design: Design, known: Known) -> Design:
@@ -70,7 +72,7 @@ def with_known(design: Design, known: Known) -> Design:
             )
         return _with_prior(design, -1, -1, row, u)
     if known.kind == "pose":
-        free = np.argwhere(~design.held)
+        free = np.argwhere(~design.positions.held)
         # Of what is held nothing can be known.
         position, component = free[draw.integers(len(free))].tolist() if len(free) else (-1, -1)
         return _with_prior(design, position, component, np.zeros(len(design.model.parameters)), u)
@@ -78,7 +80,7 @@ def with_known(design: Design, known: Known) -> Design:
         readings = design.readings
         uncertainty = readings.uncertainty
         if uncertainty is None:
-            uncertainty = np.tile(design.repeatability, (len(readings), 1))
+            uncertainty = np.tile(design.machine.repeatability, (len(readings), 1))
         uncertainty = uncertainty.copy()
         at = int(draw.integers(0, len(readings))), int(draw.integers(0, 3))
         uncertainty[at] = min(u, uncertainty[at])
@@ -86,7 +88,7 @@ def with_known(design: Design, known: Known) -> Design:
     if known.kind == "distance":
         first, second = draw.choice(9, 2, replace=False).tolist()
         old = design.of(Distances)
-        value = np.sqrt(((design.balls[first] - design.balls[second]) ** 2).sum())
+        value = np.sqrt(((design.balls.places[first] - design.balls.places[second]) ** 2).sum())
         return design.observed(
             Distances(
                 np.append(old.first, first),
@@ -102,7 +104,7 @@ def with_known(design: Design, known: Known) -> Design:
         Coordinates(
             np.append(given.ball, ball),
             np.append(given.axis, axis),
-            np.append(given.value, design.balls[ball, axis]),
+            np.append(given.value, design.balls.places[ball, axis]),
             np.append(given.uncertainty, u),
         )
     )
@@ -112,7 +114,9 @@ def _with_prior(
     design: Design, position: int, component: int, row: Real, uncertainty: float
 ) -> Design:
     old = design.of(Priors)
-    value = design.origins[position, component] if position >= 0 and component < 3 else 0.0
+    value = (
+        design.positions.origins[position, component] if position >= 0 and component < 3 else 0.0
+    )
     return design.observed(
         Priors(
             (*old.names, f"prior {len(old)}"),
@@ -128,7 +132,7 @@ def _with_prior(
 
 def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     """The dense reference's problem, its rows without their uncertainties, and these."""
-    alike = replace(design, repeatability=np.ones(3)).observed(
+    alike = altered(design, machine={"repeatability": np.ones(3)}).observed(
         replace(design.of(Distances), uncertainty=np.ones(len(design.of(Distances)))),
         replace(design.of(Coordinates), uncertainty=np.ones(len(design.of(Coordinates)))),
     )
@@ -136,7 +140,7 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     uncertainty = design.readings.uncertainty
     if uncertainty is None:
-        uncertainty = np.tile(design.repeatability, (len(design.readings), 1))
+        uncertainty = np.tile(design.machine.repeatability, (len(design.readings), 1))
     priors = np.zeros((len(design.of(Priors)), problem.parameters))
     start = problem.parameters - len(problem.a)
     known = design.of(Priors)

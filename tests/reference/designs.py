@@ -5,7 +5,7 @@ alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings
@@ -198,4 +198,4 @@ def grid_experiment(n: int, points: int = 200, position_coefficients: int = 5) -
     design = plate_design(
         balls, six_positions(), corner_sides(balls), position_coefficients=position_coefficients
     )
-    return replace(design, points=np.random.default_rng(1).random((points, 3)))
+    return altered(design, evaluation={"points": np.random.default_rng(1).random((points, 3))})

@@ -33,7 +33,7 @@ def fitted(text: str, folder: Path) -> tuple[Design, State, Real]:
     """A design with noisy readings, and the estimate from them."""
     given = experiment(folder, text)
     design = lay_out(given)
-    corners = tuple(design.lower.tolist()), tuple(design.upper.tolist())
+    corners = design.machine.volume.corners
     on_truth, truth = on_true_machine(
         design, true_machine(given.true_machine, design.model, *corners)
     )
@@ -51,7 +51,7 @@ def jacobian(design: Design, state: State, x: Real) -> Real:
     s = len(layout)
 
     def residuals(step: Real) -> Real:
-        shift = np.zeros_like(design.balls)
+        shift = np.zeros_like(design.balls.places)
         shift[balls] = step[s:].reshape(-1, design.dimension)
         there = moved(
             design,
