@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 from .common import add_file, percentage
 
 if TYPE_CHECKING:
-    from ..checking.check_files import CheckedDesign
+    from .check_files import CheckedDesign
 
 FORMATS = ("text", "github", "junit", "json")
 AS_EXPECTED, NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 0, 1, 2, 3
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "check",
@@ -65,7 +66,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
         default=[],
         help=(
             "what a design must reach, too, as in ballplate reach: lengths (U6 within"
-            ' target_accuracy), tasks, or a quantity such as "U6 average 0.5 um"; may be repeated'
+            ' target_uncertainty), tasks, or a quantity such as "U6 average 0.5 um"; may be repeated'
         ),
     )
     parser.add_argument(
@@ -89,13 +90,13 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 def run(options: Namespace) -> int:
     """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
-    from ..checking.check_files import Wanted, check_files
-    from ..checking.file_patterns import matching_files
-    from ..checking.github import advice_lines, annotation_lines
-    from ..checking.junit import junit_report
-    from ..requirements.goals import GoalError, parse_goal
+    from ..planning.requirements.goals import GoalError, parse_goal
+    from .check_files import Wanted, check_files
     from .common import print_json, print_lines
     from .excerpts import print_errors
+    from .file_patterns import matching_files
+    from .github import advice_lines, annotation_lines
+    from .junit import junit_report
 
     workspace = Path(os.environ["GITHUB_WORKSPACE"]) if os.environ.get("GITHUB_WORKSPACE") else None
     try:

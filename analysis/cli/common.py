@@ -97,7 +97,7 @@ def add_picture(parser: Any, name: str, help: str) -> None:
 
 
 def _picture(text: str) -> Path:
-    from ..report.svg import PICTURES
+    from ..presentation.svg import PICTURES
 
     if Path(text).suffix.lower() not in PICTURES:
         raise ArgumentTypeError(f'a picture\'s name ends in {", ".join(PICTURES)}, unlike "{text}"')

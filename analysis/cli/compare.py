@@ -12,7 +12,7 @@ PAIR_SETS = ("corner sides", "corner diagonals", "corners", "neighbours", "brace
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "compare",
-        help="compare a rival estimator with the full one on synthetic data",
+        help="compare an alternative estimator with the full one on synthetic data",
         description=(
             "Estimate synthetic data sets of the file's true machine with the full estimator and"
             " with one that uses distances or lengths alone, and tell how far the distances that"
@@ -54,7 +54,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
-    """Add the choice of the pairs of balls whose distances a rival estimator uses."""
+    """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
     parser.add_argument(
         "--pairs",
         choices=PAIR_SETS,

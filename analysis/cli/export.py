@@ -14,7 +14,7 @@ from .outputs import PARQUET, add_force, add_output, write_outputs
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ..sweeps.store import Results
+    from ..sweeps.store import StoredResults
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -67,13 +67,13 @@ def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
         )
 
 
-def warn_of_damage(path: Path, found: Results, count: int) -> bool:
+def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
     """Tell what of a store could not be read; whether there is anything."""
     from ..sweeps.store import unread
     from ..sweeps.store_file import GO_ON
 
-    go_on = GO_ON if found.damage else "ballplate sweep computes anew what is missing"
-    text = unread(path, found.unreadable, found.strays, count, found.damage, go_on)
+    go_on = GO_ON if results.damage else "ballplate sweep computes anew what is missing"
+    text = unread(path, results.unreadable, results.strays, count, results.damage, go_on)
     if text:
         print(text, file=sys.stderr)
     return bool(text)

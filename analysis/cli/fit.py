@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.reading_files import ObservedReadings
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "fit",

@@ -16,7 +16,7 @@ from .outputs import Writer, add_force, add_output, text_writer, write_outputs
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
-    from ..length_map.length_map import Settings
+    from ..error_maps.length_map import LengthMapSettings
 
 NOT_AS_EXPECTED, WRONG_USAGE, BAD_FILE = 1, 2, 3
 # Lines of a table of all lengths.
@@ -41,7 +41,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser.add_argument(
         "--target",
         metavar="LENGTH",
-        help='instead of target_accuracy, such as "0.5 um + L/1000000"',
+        help='instead of target_uncertainty, such as "0.5 um + L/1000000"',
     )
     parser.add_argument(
         "--grid",
@@ -102,8 +102,8 @@ def _factor(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ..length_map.length_map import length_map
-    from ..length_map.length_tables import length_data, length_lines, pair_csv, point_csv
+    from ..error_maps.length_map import length_map
+    from ..error_maps.length_tables import length_data, length_lines, pair_csv, point_csv
     from .progress import progress
 
     experiment = single(options)
@@ -127,7 +127,7 @@ def run(options: Namespace) -> int:
     if options.pairs is not None:
         writers[options.pairs] = _of_lines(pair_csv(experiment, settings))
     if options.plot is not None:
-        from ..report.lengths import draw_lengths
+        from ..report.length_plots import draw_lengths
 
         writers[options.plot] = partial(draw_lengths, found)
     is_written = write_outputs(writers, options.force)
@@ -142,22 +142,24 @@ def run(options: Namespace) -> int:
     return 0 if is_expected and not is_missed else NOT_AS_EXPECTED
 
 
-def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
+def _settings(experiment: Experiment, options: Namespace) -> LengthMapSettings | str:
     """What was asked for, or why it cannot be."""
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
     from ballplate.simulator.inputs.settings import hint
 
-    from ..length_map.length_map import MOST_POINTS, Settings
+    from ..error_maps.length_map import MOST_POINTS, LengthMapSettings
     from ..uncertainty.tasks import expansion
 
     try:
-        stated = None if experiment.target_accuracy is None else experiment.target_accuracy.stated
+        stated = (
+            None if experiment.target_uncertainty is None else experiment.target_uncertainty.stated
+        )
         target = stated if options.target is None else parse_length_function(options.target)
     except QuantityError as error:
         return f"--target: {error}"
     if target is None:
         return (
-            'the file states no target_accuracy; add it, or give --target, such as "0.5 um +'
+            'the file states no target_uncertainty; add it, or give --target, such as "0.5 um +'
             ' L/1000000"'
         )
     d = experiment.dimension
@@ -174,7 +176,7 @@ def _settings(experiment: Experiment, options: Namespace) -> Settings | str:
         return f'unknown probe "{probe}"; {hint(probe, experiment.probes)}'
     factor = experiment.coverage_factor
     expanded = options.coverage_factor or expansion(factor)
-    return Settings(grid, probe, target, expanded, options.with_repeatability, factor)
+    return LengthMapSettings(grid, probe, target, expanded, options.with_repeatability, factor)
 
 
 def _of_lines(lines: Iterable[str]) -> Writer:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.machines.description import Three
     from ballplate.simulator.machines.protocol import Array
 
-    from ..volumetric.volumetric_errors import AlongAxis, Volumetric
+    from ..error_maps.volumetric_errors import AlongAxis, Volumetric
 
 WRONG_USAGE, BAD_FILE = 2, 3
 
@@ -85,7 +85,7 @@ def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
 
 
 def _grid(text: str) -> tuple[int, int, int]:
-    from ..volumetric.volumetric_errors import MOST_POINTS
+    from ..error_maps.volumetric_errors import MOST_POINTS
 
     parts = [part.strip() for part in text.split(",")]
     if len(parts) == 3 and all(
@@ -104,7 +104,7 @@ def _grid(text: str) -> tuple[int, int, int]:
 
 
 def _points(text: str) -> int:
-    from ..volumetric.volumetric_errors import MOST_POINTS
+    from ..error_maps.volumetric_errors import MOST_POINTS
 
     found = count(text)
     if not 2 <= found <= MOST_POINTS:
@@ -138,7 +138,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.experiment.machine_file import load_machine
     from ballplate.simulator.inputs.messages import Message
 
-    from ..volumetric.volumetric_errors import Volumetric, along_axes
+    from ..error_maps.volumetric_errors import Volumetric, along_axes
 
     doubts: list[Message] = []
     machine = load_machine(options.file, doubts)
@@ -155,7 +155,7 @@ def run(options: Namespace) -> int:
         print("ballplate map: --points is for --line; leave it out", file=sys.stderr)
         return WRONG_USAGE
     if options.error is not None:
-        from ..volumetric.volumetric_tables import why_not_along
+        from ..error_maps.volumetric_tables import why_not_along
 
         every = {one.error.name: one for one in along_axes(machine)}
         if options.error not in every:
@@ -178,22 +178,21 @@ def run(options: Namespace) -> int:
     return _on_a_line(built, start, end, options)
 
 
-def _of_one(found: AlongAxis, options: Namespace) -> int:
-    from ..report.volumetric import draw_along
-    from ..volumetric.volumetric_tables import along_csv, along_data, along_lines
+def _of_one(along: AlongAxis, options: Namespace) -> int:
+    from ..error_maps.volumetric_tables import along_csv, along_data, along_lines
+    from ..report.volumetric_plots import draw_along
 
-    status = _drawn(options, partial(draw_along, found))
+    status = _drawn(options, partial(draw_along, along))
     if options.format == "json":
-        print_json([along_data(found)])
+        print_json([along_data(along)])
     else:
-        print_lines(along_lines(found) if options.format == "text" else list(along_csv(found)))
+        print_lines(along_lines(along) if options.format == "text" else list(along_csv(along)))
     return status
 
 
 def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace) -> int:
-    from ..report.volumetric import draw_line
-    from ..volumetric.volumetric_errors import between
-    from ..volumetric.volumetric_tables import (
+    from ..error_maps.volumetric_errors import between
+    from ..error_maps.volumetric_tables import (
         error_csv,
         error_data,
         error_lines,
@@ -201,6 +200,7 @@ def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace
         length_line,
         machine_data,
     )
+    from ..report.volumetric_plots import draw_line
 
     found = machine.errors(between(start, end, options.points or POINTS))
     length = machine.lengths(start[None], end[None])
@@ -217,8 +217,7 @@ def _on_a_line(machine: Volumetric, start: Array, end: Array, options: Namespace
 
 
 def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
-    from ..report.volumetric import draw_grid
-    from ..volumetric.volumetric_tables import (
+    from ..error_maps.volumetric_tables import (
         diagonal_data,
         diagonal_lines,
         error_csv,
@@ -227,6 +226,7 @@ def _on_a_grid(machine: Volumetric, options: Namespace) -> int:
         machine_data,
         machine_lines,
     )
+    from ..report.volumetric_plots import draw_grid
 
     found = machine.errors(machine.grid(options.grid))
     diagonals = machine.diagonals()

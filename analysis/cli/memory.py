@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from ..running.memory import want_of_memory
+from ballplate.simulator.computing.memory import want_of_memory
 
 # What makes a command's work smaller.
 SMALLER = {

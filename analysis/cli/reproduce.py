@@ -12,6 +12,7 @@ from .common import trial_count
 WRONG_USAGE = 2
 
 
+# In one piece: one option after the other, with its help.
 def add_parser(commands) -> None:  # type: ignore[no-untyped-def]
     parser = commands.add_parser(
         "reproduce",
@@ -136,10 +137,10 @@ def _certified(options: Namespace) -> int:
 
     from ballplate.designs import shipped
 
-    from ..certified.answers import answers
-    from ..certified.problems import certified_problems, read_results
-    from ..certified.score import all_right, scores
-    from ..certified.score_tables import score_data, score_lines
+    from ..reproduction.certified_answers import answers
+    from ..reproduction.certified_problems import certified_problems, read_results
+    from ..reproduction.score import all_right, scores
+    from ..reproduction.score_tables import score_data, score_lines
     from .common import print_json, print_lines
     from .progress import progress
 

@@ -26,8 +26,8 @@ from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.priors import Priors
 from ballplate.simulator.readings.reading_files import ObservedReadings
 
+from ..presentation.formatting import aligned, finite, number
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.formatting import aligned, finite, number
 from ..results.parts import adjustment_data, adjustment_lines
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")

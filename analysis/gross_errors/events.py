@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 
 from .patterns import Patterns
 
@@ -46,7 +46,7 @@ def event_groups(given: Patterns) -> list[Integers]:
 def _by_ball(given: Patterns) -> list[Integers]:
     """Groups of all certified distances of one ball, of balls with as many together."""
     columns = given.of_kind("distance")
-    ends = given.design.of(Distances).first, given.design.of(Distances).second
+    ends = given.design.of(CalibratedDistances).first, given.design.of(CalibratedDistances).second
     first, second = (end[given.subject[columns]] for end in ends)
     by_width: dict[int, list[Integers]] = {}
     for ball in np.unique([first, second]).tolist():

@@ -6,7 +6,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import length_name
 
 from .patterns import Patterns
@@ -46,7 +46,7 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
 
 def common_ball(design: Design, distances: Integers) -> int:
     """The ball that several distances have in common; of two between the same balls, the first."""
-    ends = design.of(Distances).balls[distances]
+    ends = design.of(CalibratedDistances).balls[distances]
     return next(int(ball) for ball in ends[0] if (ends == ball).any(axis=1).all())
 
 

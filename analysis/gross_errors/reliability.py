@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Functions, function_name
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.numerics.rounding import comparable
 
-from ..results.formatting import SHOWN, aligned, finite, number
-from ..results.result import Result
+from ..presentation.formatting import SHOWN, aligned, finite, number
+from ..presentation.result import Result
 from ..uncertainty.quantities import QUANTITIES
 from .effects import LENGTHS, MOST_PLACES, SYMBOLS
 from .names import name

@@ -50,7 +50,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class PoolDesign:
     """All positions that may be chosen, laid out as one design, and the columns of shared
     parameters.
 
@@ -82,7 +82,7 @@ class Drawn:
         return np.concatenate([self.layout.scale[self.own] * STEP, np.ones(self.certificates)])
 
 
-def draw(experiment: Experiment, positions: Sequence[Position]) -> Drawn:
+def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     """Lay out an experiment with all `positions` that may be chosen, in their order.
 
     :raises ExperimentError: a prior is about a pose; what it means depends on the position that
@@ -98,10 +98,10 @@ def draw(experiment: Experiment, positions: Sequence[Position]) -> Drawn:
     if messages:
         raise ExperimentError(messages)
     design = lay_out(replace(experiment, positions=tuple(positions)))
-    return Drawn(design, shared_layout(design), nominal_state(design))
+    return PoolDesign(design, shared_layout(design), nominal_state(design))
 
 
-def position_rows(drawn: Drawn) -> Iterator[Rows]:
+def position_rows(drawn: PoolDesign) -> Iterator[Rows]:
     """Rows of every position in order."""
     design, d = drawn.design, drawn.design.dimension
     place = design.readings.position[design.plate_readings]
@@ -139,7 +139,7 @@ def position_rows(drawn: Drawn) -> Iterator[Rows]:
         first = last
 
 
-def _length_rows(drawn: Drawn) -> dict[int, Rows]:
+def _length_rows(drawn: PoolDesign) -> dict[int, Rows]:
     """Rows of the lengths of standards and gauges, by position."""
     design, layout = drawn.design, drawn.layout
     if not len(design.of(Lengths)):
@@ -160,14 +160,14 @@ def _length_rows(drawn: Drawn) -> dict[int, Rows]:
     return found
 
 
-def _of_shared(drawn: Drawn, shared: Array) -> Rows:
+def _of_shared(drawn: PoolDesign, shared: Array) -> Rows:
     """Rows (m, s) that no ball takes part in."""
     m = len(shared)
     none = np.zeros((m, 0, drawn.design.dimension))
     return Rows(np.zeros((m, 0), np.int64), none, shared, np.zeros((m, 0)))
 
 
-def always(drawn: Drawn) -> list[Rows]:
+def always(drawn: PoolDesign) -> list[Rows]:
     """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
     certificates.
     """
@@ -176,7 +176,7 @@ def always(drawn: Drawn) -> list[Rows]:
 
 
 def calibration_rows(
-    drawn: Drawn, experiment: Experiment, item: Calibration, name: str
+    drawn: PoolDesign, experiment: Experiment, item: Calibration, name: str
 ) -> list[Rows]:
     """Rows of a calibration item that may be chosen; of a length standard, of its unknown length.
 
@@ -207,7 +207,7 @@ def calibration_rows(
     return [_of_shared(drawn, row * drawn.scale)]
 
 
-def _of_observations(drawn: Drawn, design: Design) -> list[Rows]:
+def _of_observations(drawn: PoolDesign, design: Design) -> list[Rows]:
     """Rows of all observations that are not formed of readings, of a design with the same balls and
     parameters.
     """

@@ -12,11 +12,11 @@ from typing import Any
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.inputs.settings import listing
 
-from .changeover import Kind, Visit, changeover, cheapest, kind_of, probes_of
+from .changeover import Setup, Visit, changeover, cheapest, kind_of, probes_of
 
 __all__ = [
     "Completion",
-    "Kind",
+    "Setup",
     "RunSheet",
     "Step",
     "changeover",

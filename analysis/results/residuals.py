@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.numerics.rounding import comparable
 from ballplate.simulator.observations.lengths import Lengths, length_deviations
 from ballplate.simulator.observations.readings import reading_blocks, reading_weights
 

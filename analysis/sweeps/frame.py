@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Results, Store, chosen_sweep, definition_of, results
+from .store import Store, StoredResults, chosen_sweep, definition_of, results
 
 if TYPE_CHECKING:
     import pandas
@@ -33,13 +33,15 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
     return frame_of(results(store, number, len(defined["cells"])), defined)
 
 
-def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame:
+def frame_of(results: StoredResults, defined: dict[str, Any] | None) -> pandas.DataFrame:
     """The table of `frame`; without a definition it has no columns for the axes."""
     import pandas
 
     axes, cells = (defined["axes"], defined["cells"]) if defined is not None else ([], [])
-    columns: dict[str, Any] = {"cell": found.cells}
-    chosen = np.array(cells, np.int64).reshape(len(cells), len(axes))[found.cells] if axes else None
+    columns: dict[str, Any] = {"cell": results.cells}
+    chosen = (
+        np.array(cells, np.int64).reshape(len(cells), len(axes))[results.cells] if axes else None
+    )
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
         is_whole = all(
@@ -48,11 +50,11 @@ def frame_of(found: Results, defined: dict[str, Any] | None) -> pandas.DataFrame
         if axis["unit"] == "1" and is_whole:
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
-    columns |= {"status": found.statuses, "reason": found.reasons, **found.figures}
+    columns |= {"status": results.statuses, "reason": results.reasons, **results.figures}
     columns |= {
-        "data_set_seed": found.seeds,
-        "fingerprint": found.keys,
-        "duration_s": found.seconds,
+        "data_set_seed": results.seeds,
+        "fingerprint": results.keys,
+        "duration_s": results.seconds,
     }
-    columns |= {f"{name}_version": texts for name, texts in found.versions.items()}
+    columns |= {f"{name}_version": texts for name, texts in results.versions.items()}
     return pandas.DataFrame(columns)

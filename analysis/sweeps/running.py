@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ballplate.simulator.inputs.messages import in_one_line
 from filelock import FileLock, Timeout
 
-from ..results.result import Result
+from ..presentation.result import Result
 from .bundle import Bundle, changes, definition
 from .execute import Runner, Summary, run_sweep
 from .frame import frame

@@ -23,7 +23,7 @@ import numpy as np
 from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..montecarlo.tally import QuantityTally, Tally
+from ..montecarlo.accumulator import Accumulator, QuantityAccumulator
 from .fingerprint import METHOD, METHODS, method_of
 from .load import MOST_CELLS
 from .store_file import (
@@ -49,7 +49,7 @@ from .stored import (
     salvaged_rows,
     texts_of,
 )
-from .task import Row
+from .task import CellResult
 
 FORMAT = f"ballplate sweep store {NEWEST}"
 
@@ -409,7 +409,7 @@ def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
         )
 
 
-def add_rows(store: Store, sweep: int, rows: Iterable[Row]) -> None:
+def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
     """Write rows: on disk when this returns. A result that is there already stays, unless it had
     failed.
     """
@@ -482,7 +482,7 @@ def _text(store: Store, value: str) -> int:
     return store.texts[value]
 
 
-def block_tally(store: Store, key: str, block: int) -> Tally | None:
+def block_tally(store: Store, key: str, block: int) -> Accumulator | None:
     """The sums of a replicate block; None where the cell has no replicates for a reason."""
     with _reading(store) as connection:
         row = connection.execute(
@@ -491,22 +491,22 @@ def block_tally(store: Store, key: str, block: int) -> Tally | None:
     return None if row is None or row[0] is None else _unpacked(row[0])
 
 
-def _packed(tally: Tally) -> bytes:
+def _packed(accumulator: Accumulator) -> bytes:
     """Sums as bytes: a line of JSON, then all arrays as 64-bit numbers."""
-    arrays = [tally.residual]
-    for one in tally.quantities:
+    arrays = [accumulator.residual]
+    for one in accumulator.quantities:
         arrays += [one.errors, one.squares, one.numbers, one.numbers_squared]
     head = {
-        "count": tally.count,
-        "failed": list(tally.failed),
-        "passes": tally.passes,
-        "rejected": tally.rejected,
+        "count": accumulator.count,
+        "failed": list(accumulator.failed),
+        "passes": accumulator.passes,
+        "rejected": accumulator.rejected,
         "sizes": [len(array) for array in arrays],
     }
     return json.dumps(head).encode() + b"\n" + np.concatenate(arrays).astype("<f8").tobytes()
 
 
-def _unpacked(content: bytes) -> Tally:
+def _unpacked(content: bytes) -> Accumulator:
     """The sums that `_packed` made bytes of.
 
     :raises UnreadableError: it did not.
@@ -517,8 +517,10 @@ def _unpacked(content: bytes) -> Tally:
         arrays = np.split(np.frombuffer(body, "<f8"), np.cumsum(head["sizes"])[:-1])
         if [len(array) for array in arrays] != head["sizes"] or len(arrays) % 4 != 1:
             raise ValueError
-        quantities = tuple(QuantityTally(*arrays[k : k + 4]) for k in range(1, len(arrays), 4))
-        return Tally(
+        quantities = tuple(
+            QuantityAccumulator(*arrays[k : k + 4]) for k in range(1, len(arrays), 4)
+        )
+        return Accumulator(
             head["count"],
             tuple(head["failed"]),
             head["passes"],
@@ -531,7 +533,7 @@ def _unpacked(content: bytes) -> Tally:
 
 
 @dataclass(frozen=True)
-class Results:
+class StoredResults:
     """Results of a sweep's cells (n,) in their order; `cells` count from 0, `seconds` is what each
     took.
 
@@ -555,7 +557,7 @@ class Results:
     damage: str
 
 
-def results(store: Store, sweep: int, count: int | None = None) -> Results:
+def results(store: Store, sweep: int, count: int | None = None) -> StoredResults:
     """Results of the first `count` cells of a sweep, or of all; cells that are not done yet are
     left out.
 
@@ -590,7 +592,7 @@ def results(store: Store, sweep: int, count: int | None = None) -> Results:
     rows = reading.rows
     kept_versions = [reading.texts.versions_of(row.versions) for row in rows]
     kinds = dict.fromkeys(name for one in kept_versions for name in one)
-    return Results(
+    return StoredResults(
         np.array([row.number for row in rows], np.int64),
         [row.key for row in rows],
         [row.status for row in rows],

@@ -20,11 +20,6 @@ Made = TypeVar("Made")
 Kind = TypeVar("Kind", bound="Observations")
 
 
-def pose_size(dimension: int) -> int:
-    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
-    return dimension * (dimension + 1) // 2
-
-
 @dataclass(frozen=True)
 class Readings:
     """Which ball is read in which position with which probe, and how often; all arrays (m,).

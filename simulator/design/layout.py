@@ -7,6 +7,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from ..computing.rounding import comparable
 from ..experiment.model import Experiment, Prior
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
@@ -14,10 +15,9 @@ from ..inputs.messages import ExperimentError
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
-from ..numerics.rounding import comparable
 from ..observations.balls import BallObservations
-from ..observations.coordinates import Coordinates, no_coordinates
-from ..observations.distances import Distances, no_distances
+from ..observations.coordinates import CalibratedCoordinates, no_coordinates
+from ..observations.distances import CalibratedDistances, no_distances
 from ..observations.length_standards import standard_lengths
 from ..observations.priors import Priors
 from ..observations.radius import RadiusCalibration
@@ -32,6 +32,7 @@ DEFAULT_SEED = 1
 FLAT = 1e-9
 
 
+# In one piece: every array of a design is laid out beside those whose order it shares.
 def lay_out(experiment: Experiment) -> Design:
     """Design of an experiment.
 
@@ -203,8 +204,8 @@ def _readings(
 def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallObservations]:
     """Observations of the balls of plates, by kind: what all items of a kind state."""
     parts: dict[type[BallObservations], list[BallObservations]] = {
-        Distances: [no_distances()],
-        Coordinates: [no_coordinates()],
+        CalibratedDistances: [no_distances()],
+        CalibratedCoordinates: [no_coordinates()],
     }
     for item in experiment.calibration:
         if experiment.artefacts[item.artefact].role == "plate":

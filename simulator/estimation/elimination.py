@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design, Rows, State
 from ..machines.protocol import Array, Integers
-from ..numerics.threads import scipy_linalg, single_threaded
 from ..observations.readings import reading_blocks, reading_weights
 from .graded import Collected, without_balls
 from .parameters import SharedLayout

@@ -32,7 +32,7 @@ from ..machines.truth import TruthError, true_machine
 from ..observations.calibration import Calibration
 from ..observations.distances import DistanceCalibration
 from ..observations.radius import RadiusCalibration
-from .curves import read_curves
+from .curve_files import read_curves
 from .lookup import References
 from .machine_file import load_machine
 from .model import SLIGHTLY, Evaluation, Floats, Machine, Position, Volume

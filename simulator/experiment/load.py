@@ -149,6 +149,8 @@ def build(
         return None, list(too_many.messages)
 
 
+# In one piece: the order in which sections are resolved, each from those before it, stands in one
+# place.
 def _build(
     root: Node, source: Path, name: str | None, planning: bool
 ) -> tuple[Experiment | None, list[Message]]:
@@ -217,7 +219,7 @@ def _build(
         positions=tuple(positions.values()),
         calibration=tuple(calibrations.values()),
         evaluation=evaluation,
-        target_accuracy=target_of(sections),
+        target_uncertainty=target_of(sections),
         sigma=sections.get("sigma"),
         expected_rank_deficiency=sections.get("expected_rank_deficiency"),
         seed=sections.get("seed"),

@@ -13,7 +13,7 @@ Steps = tuple[Step, ...]
 
 # Errors of a file that are told; beyond, some slip repeats itself.
 MOST_MESSAGES = 1000
-ENOUGH = f"more than {MOST_MESSAGES} errors; mend these first"
+MORE_ERRORS = f"more than {MOST_MESSAGES} errors; mend these first"
 
 # Names of a file may hold what would break a line in two or reach the terminal as a command.
 UNPRINTABLE = re.compile(
@@ -54,8 +54,8 @@ class ExperimentError(Exception):
         return type(self), (self.messages,)
 
 
-def _by_number(found: re.Match[str]) -> str:
-    number = ord(found[0])
+def _by_number(match: re.Match[str]) -> str:
+    number = ord(match[0])
     return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
 
 

@@ -29,7 +29,7 @@ HARDLY_FLAT = 1e-3
 
 
 @dataclass(frozen=True)
-class Coordinates(BallObservations):
+class CalibratedCoordinates(BallObservations):
     """Calibrated ball co-ordinates in the artefact's frame; arrays (m,), metres."""
 
     word: ClassVar[str] = "coordinate"
@@ -58,10 +58,10 @@ class Coordinates(BallObservations):
         return self.ball, self.axis
 
 
-def no_coordinates() -> Coordinates:
+def no_coordinates() -> CalibratedCoordinates:
     """No calibrated co-ordinates."""
     none, empty = np.zeros(0, np.int64), np.zeros(0)
-    return Coordinates(none, none, empty, empty)
+    return CalibratedCoordinates(none, none, empty, empty)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +80,9 @@ class CoordinateCalibration(Calibration):
     standard_uncertainties: Array
     kind: Literal["coordinates"] = "coordinates"
 
-    def observed(self, first: int) -> Coordinates:
+    def observed(self, first: int) -> CalibratedCoordinates:
         count = len(self.axes)
-        return Coordinates(
+        return CalibratedCoordinates(
             np.repeat(first + self.balls, count),
             np.tile(np.array(self.axes, np.int64), len(self.balls)),
             self.values.ravel(),

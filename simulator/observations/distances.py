@@ -28,7 +28,7 @@ MOST_TIED_BALLS = 3000
 
 
 @dataclass(frozen=True)
-class Distances(BallObservations):
+class CalibratedDistances(BallObservations):
     """Calibrated distances between two balls of an artefact; arrays (m,), lengths in metres.
 
     `dimensions` is 2 where only the first two co-ordinates of the artefact's frame count.
@@ -60,10 +60,10 @@ class Distances(BallObservations):
         return f"distance {design.ball_label(first)} to {design.balls.names[second]}"
 
 
-def no_distances() -> Distances:
+def no_distances() -> CalibratedDistances:
     """No calibrated distances."""
     none, empty = np.zeros(0, np.int64), np.zeros(0)
-    return Distances(none, none, none, empty, empty)
+    return CalibratedDistances(none, none, none, empty, empty)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +89,10 @@ class DistanceCalibration(Calibration):
 
     are_lengths: ClassVar[bool] = True
 
-    def observed(self, first: int) -> Distances:
+    def observed(self, first: int) -> CalibratedDistances:
         ends = np.asarray(self.pairs + first, np.int64)
         dimensions = np.full(len(ends), self.dimensions)
-        return Distances(
+        return CalibratedDistances(
             ends[:, 0], ends[:, 1], dimensions, self.values, self.standard_uncertainties
         )
 

@@ -16,8 +16,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.estimation.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
@@ -118,9 +118,9 @@ def test_nothing_depends_on_the_order_of_balls_and_positions(seed: int) -> None:
             ),
         ).observed(
             replace(
-                design.of(Distances),
-                first=new_ball[design.of(Distances).second],
-                second=new_ball[design.of(Distances).first],
+                design.of(CalibratedDistances),
+                first=new_ball[design.of(CalibratedDistances).second],
+                second=new_ball[design.of(CalibratedDistances).first],
             )
         )
     )
@@ -136,8 +136,14 @@ def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
     scaled = altered(
         design, machine={"repeatability": factor * design.machine.repeatability}
     ).observed(
-        replace(design.of(Distances), uncertainty=factor * design.of(Distances).uncertainty),
-        replace(design.of(Coordinates), uncertainty=factor * design.of(Coordinates).uncertainty),
+        replace(
+            design.of(CalibratedDistances),
+            uncertainty=factor * design.of(CalibratedDistances).uncertainty,
+        ),
+        replace(
+            design.of(CalibratedCoordinates),
+            uncertainty=factor * design.of(CalibratedCoordinates).uncertainty,
+        ),
     )
     by_statement, _, _ = judged(scaled)
     by_estimate, _, _ = judged(design, factor)

@@ -22,8 +22,8 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -
             state.origins + poses[:, :2]
         )[r.position]
         corrected = x @ np.array([[1.0 / (1.0 + gamma), 0.0], [alpha / (1.0 + gamma), 1.0]])
-        d, k = design.of(Distances), design.of(Coordinates)
+        d, k = design.of(CalibratedDistances), design.of(CalibratedCoordinates)
         between = balls[d.first] - balls[d.second]
         return np.concatenate(
             [

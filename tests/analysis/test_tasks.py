@@ -18,7 +18,7 @@ from ballplate.simulator.estimation.parameters import SharedLayout, shared_layou
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.uncertainty.quantities import task_distances
 from ballplate.uncertainty.summaries import uncertainties
 
@@ -30,7 +30,7 @@ TASKS = """\
 evaluation:
   probe: down
   tasks:
-    - {name: bore distance, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_accuracy: 0.1 um}
+    - {name: bore distance, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_uncertainty: 0.1 um}
     - {name: from side to side, from: [0 mm, 300 mm, 400 mm], to: [900 mm, 400 mm, 450 mm], probes: [right, left]}
     - {name: height, from: [0 mm, 0 mm, 0 mm], to: [0 mm, 0 mm, 1 m], probe: front}
 """
@@ -134,7 +134,8 @@ def test_undetermined_tasks_are_told_as_such() -> None:
         },
     ).observed(
         replace(
-            design.of(Distances), **{name: v[:0] for name, v in vars(design.of(Distances)).items()}
+            design.of(CalibratedDistances),
+            **{name: v[:0] for name, v in vars(design.of(CalibratedDistances)).items()},
         )
     )
     quantity = judged(design)[0]["tasks"]

@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.expansion import Expansion
+from ballplate.montecarlo.reference import Reference, Truth, reference
+from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.trials import run_trials
 from ballplate.simulator.design.arrays import State, nominal_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.montecarlo.expansion import Expansion
-from ballplate.simulator.montecarlo.reference import Reference, Truth, reference
-from ballplate.simulator.montecarlo.replicates import BATCH, draw, estimate_batch
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.readings import reading_blocks
 from joblib import Parallel, delayed
 from scipy.optimize import least_squares
@@ -121,7 +121,7 @@ def by_scipy(shared: Reference, k: int) -> State:
             for ball in np.arange(len(design.balls.places))[group.ball].tolist()
         ]
         x[rows] += drawn.moved[k][:, group.rows].T
-    pairs = design.of(Distances)
+    pairs = design.of(CalibratedDistances)
     real = shared.truth.state.balls
     apart = np.sqrt(((real[pairs.first] - real[pairs.second]) ** 2).sum(axis=1))
     observed = design.observed(replace(pairs, value=apart + drawn.errors[0][k]))
@@ -141,7 +141,7 @@ def by_scipy(shared: Reference, k: int) -> State:
     def residuals(v: Array) -> Array:
         state = state_of(v)
         blocks = reading_blocks(observed, state, observed.readings, x)
-        tied = observed.of(Distances).rows(observed, state, x)
+        tied = observed.of(CalibratedDistances).rows(observed, state, x)
         return np.concatenate([blocks.residual.ravel(), tied.residual])
 
     def jacobian(v: Array) -> Array:
@@ -157,7 +157,7 @@ def by_scipy(shared: Reference, k: int) -> State:
             free = used[:, j] >= 0
             rows[at[free], :, n * d + used[free, j]] = blocks.by_pose[free, :, j]
         rows[:, :, n * d + layout.model.start :] = blocks.by_model
-        tied = observed.of(Distances).rows(observed, state, x)
+        tied = observed.of(CalibratedDistances).rows(observed, state, x)
         below = np.zeros((len(tied.residual), len(v)))
         for axis in range(d):
             below[np.arange(len(below)), d * pairs.first + axis] = tied.by_ball[:, 0, axis]

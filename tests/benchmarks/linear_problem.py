@@ -8,7 +8,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.parameters import SharedLayout, shared_layout
 from ballplate.simulator.machines.protocol import Integers
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.readings import reading_blocks
 from numpy.typing import NDArray
 
@@ -65,9 +65,9 @@ def linear_problem(design: Design) -> LinearProblem:
         by_ball=blocks.by_ball,
         by_pose=blocks.by_pose,
         by_model=blocks.by_model,
-        first=design.of(Distances).first,
-        second=design.of(Distances).second,
-        along=design.of(Distances).rows(design, state, None).by_ball[:, 0],
+        first=design.of(CalibratedDistances).first,
+        second=design.of(CalibratedDistances).second,
+        along=design.of(CalibratedDistances).rows(design, state, None).by_ball[:, 0],
     )
 
 

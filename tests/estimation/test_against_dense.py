@@ -13,8 +13,8 @@ from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.readings import expected_readings
 from ballplate.uncertainty.pairs import all_pairs
@@ -115,12 +115,12 @@ def planar_distances() -> Design:
     """
     balls = grid(4) + np.array([0.0, 0.0, 0.02]) * (np.arange(16) % 3)[:, None]
     design = plate_design(balls, six_positions(), neighbours(grid(4)), coordinates=(0, 3, 12))
-    flat = np.full(len(design.of(Distances)), 2)
+    flat = np.full(len(design.of(CalibratedDistances)), 2)
     flat[::3] = 3
-    first, second = design.of(Distances).first, design.of(Distances).second
+    first, second = design.of(CalibratedDistances).first, design.of(CalibratedDistances).second
     between = (balls[first] - balls[second]) * (np.arange(3) < flat[:, None])
     value = np.sqrt((between**2).sum(axis=1))
-    return design.observed(replace(design.of(Distances), dimensions=flat, value=value))
+    return design.observed(replace(design.of(CalibratedDistances), dimensions=flat, value=value))
 
 
 def with_length_standard(design: Design, projected: bool) -> Design:
@@ -226,7 +226,9 @@ def two_artefacts() -> Design:
             np.concatenate([first.probe, second.probe]),
             np.concatenate([first.repeats, second.repeats]),
         ),
-    ).observed(replace(extra.of(Coordinates), ball=extra.of(Coordinates).ball + balls))
+    ).observed(
+        replace(extra.of(CalibratedCoordinates), ball=extra.of(CalibratedCoordinates).ball + balls)
+    )
 
 
 def deficient_grid_of_four() -> Design:

@@ -14,8 +14,8 @@ from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import (
     exact_readings,
     noisy_certificate,
@@ -49,15 +49,21 @@ def exactly_calibrated(design: Design, truth: State) -> Design:
     none = np.random.default_rng(0)
     certified = noisy_certificate(
         design.observed(
-            replace(design.of(Distances), uncertainty=0 * design.of(Distances).uncertainty),
-            replace(design.of(Coordinates), uncertainty=0 * design.of(Coordinates).uncertainty),
+            replace(
+                design.of(CalibratedDistances),
+                uncertainty=0 * design.of(CalibratedDistances).uncertainty,
+            ),
+            replace(
+                design.of(CalibratedCoordinates),
+                uncertainty=0 * design.of(CalibratedCoordinates).uncertainty,
+            ),
         ),
         truth,
         none,
     )
     return design.observed(
-        replace(design.of(Distances), value=certified.of(Distances).value),
-        replace(design.of(Coordinates), value=certified.of(Coordinates).value),
+        replace(design.of(CalibratedDistances), value=certified.of(CalibratedDistances).value),
+        replace(design.of(CalibratedCoordinates), value=certified.of(CalibratedCoordinates).value),
     )
 
 

@@ -11,8 +11,8 @@ from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.readings import expected_readings, reading_blocks
 
@@ -32,7 +32,7 @@ def design(request: pytest.FixtureRequest) -> Design:
     full = request.param == "full"
     model = kinematic_model(ARRANGEMENTS["FB1"], 4, 3, (0, 0, 0), (1, 1, 1), full)
     return replace(built, model=model).observed(
-        replace(built.of(Distances), dimensions=np.array([2, 3, 2, 3]))
+        replace(built.of(CalibratedDistances), dimensions=np.array([2, 3, 2, 3]))
     )
 
 
@@ -73,7 +73,7 @@ def test_readings(design: Design) -> None:
     assert np.abs(by_ball).sum() == pytest.approx(np.abs(own).sum())
 
 
-@pytest.mark.parametrize("kind", [Distances, Coordinates])
+@pytest.mark.parametrize("kind", [CalibratedDistances, CalibratedCoordinates])
 def test_calibration(design: Design, kind: type[Observations]) -> None:
     state, given = perturbed(design), design.of(kind)
     found = given.rows(design, state, None)

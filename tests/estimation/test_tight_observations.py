@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.priors import Priors
 from ballplate.uncertainty.summaries import point_pairs
 from hypothesis import given, settings
@@ -87,10 +87,10 @@ def with_known(design: Design, known: Known) -> Design:
         return replace(design, readings=replace(readings, uncertainty=uncertainty))
     if known.kind == "distance":
         first, second = draw.choice(9, 2, replace=False).tolist()
-        old = design.of(Distances)
+        old = design.of(CalibratedDistances)
         value = np.sqrt(((design.balls.places[first] - design.balls.places[second]) ** 2).sum())
         return design.observed(
-            Distances(
+            CalibratedDistances(
                 np.append(old.first, first),
                 np.append(old.second, second),
                 np.append(old.dimensions, 3),
@@ -99,9 +99,9 @@ def with_known(design: Design, known: Known) -> Design:
             )
         )
     ball, axis = int(draw.integers(0, 9)), int(draw.integers(0, 3))
-    given = design.of(Coordinates)
+    given = design.of(CalibratedCoordinates)
     return design.observed(
-        Coordinates(
+        CalibratedCoordinates(
             np.append(given.ball, ball),
             np.append(given.axis, axis),
             np.append(given.value, design.balls.places[ball, axis]),
@@ -133,8 +133,13 @@ def _with_prior(
 def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
     """The dense reference's problem, its rows without their uncertainties, and these."""
     alike = altered(design, machine={"repeatability": np.ones(3)}).observed(
-        replace(design.of(Distances), uncertainty=np.ones(len(design.of(Distances)))),
-        replace(design.of(Coordinates), uncertainty=np.ones(len(design.of(Coordinates)))),
+        replace(
+            design.of(CalibratedDistances), uncertainty=np.ones(len(design.of(CalibratedDistances)))
+        ),
+        replace(
+            design.of(CalibratedCoordinates),
+            uncertainty=np.ones(len(design.of(CalibratedCoordinates))),
+        ),
     )
     problem = dense.planned(alike, COEFFICIENTS, COEFFICIENTS)
     rows = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
@@ -158,8 +163,8 @@ def unweighted(design: Design) -> tuple[dense.Problem, Real, Real]:
             priors[k, 3 * len(problem.plate_balls) + problem.free_poses.index(pose)] = 1.0
     stated = [
         uncertainty.ravel(),
-        design.of(Distances).uncertainty,
-        design.of(Coordinates).uncertainty,
+        design.of(CalibratedDistances).uncertainty,
+        design.of(CalibratedCoordinates).uncertainty,
         known.uncertainty,
     ]
     return problem, np.concatenate([rows, priors]), np.concatenate(stated)

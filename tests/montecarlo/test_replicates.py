@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ballplate.montecarlo.expansion import Direct, Expansion
+from ballplate.montecarlo.reference import RankDeficientError, Reference, Truth, reference
+from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
-from ballplate.simulator.montecarlo.expansion import Direct, Expansion
-from ballplate.simulator.montecarlo.reference import NoReferenceError, Reference, Truth, reference
-from ballplate.simulator.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.priors import Priors
 
@@ -170,8 +170,8 @@ def plane() -> Design:
         readings=Readings(ball, position, np.zeros(48, np.int64), np.ones(48, np.int64)),
         evaluation={"points": np.zeros((0, 2))},
     ).observed(
-        small(pairs=False).of(Distances),
-        Coordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
+        small(pairs=False).of(CalibratedDistances),
+        CalibratedCoordinates(certified, np.tile([0, 1], 16), balls.ravel(), np.full(32, 3e-7)),
     )
 
 
@@ -203,7 +203,7 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
     errors = {
         one.word: of_one[k] for one, of_one in zip(design.observations, drawn.errors, strict=True)
     }
-    pairs, known = design.of(Distances), design.of(Coordinates)
+    pairs, known = design.of(CalibratedDistances), design.of(CalibratedCoordinates)
     counts = np.arange(design.dimension) < pairs.dimensions[:, None]
     apart = (real.balls[pairs.first] - real.balls[pairs.second]) * counts
     observed = design.observed(
@@ -297,7 +297,7 @@ def test_a_batch_is_the_same_whatever_came_before() -> None:
 
 
 def test_a_deficient_design_has_no_replicates() -> None:
-    design = small().observed(small(pairs=False).of(Distances))
+    design = small().observed(small(pairs=False).of(CalibratedDistances))
     design = altered(design, probes={"offsets": np.zeros_like(design.probes.offsets)})
-    with pytest.raises(NoReferenceError, match="deficient"):
+    with pytest.raises(RankDeficientError, match="deficient"):
         reference(design, truth(design))

@@ -11,8 +11,8 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.priors import no_priors
 from numpy.typing import NDArray
@@ -168,14 +168,16 @@ def plate_design(
         held=held,
         readings=Readings(ball, position, probe, np.ones(len(ball), np.int64)),
         observations=(
-            Distances(
+            CalibratedDistances(
                 first,
                 second,
                 np.full(len(first), 3),
                 np.sqrt(((balls[first] - balls[second]) ** 2).sum(axis=1)),
                 np.full(len(first), SIGMA),
             ),
-            Coordinates(certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)),
+            CalibratedCoordinates(
+                certified, axis, balls[certified, axis], np.full(len(certified), SIGMA)
+            ),
             no_lengths(),
             no_priors(),
         ),

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.gross_errors.cause_search import FAMILY, Search, diagnosis
 from ballplate.gross_errors.events import Cause, cause
 from ballplate.gross_errors.power import noncentrality
-from ballplate.gross_errors.search import FAMILY, Search, diagnosis
 from ballplate.gross_errors.suspects import Diagnosis
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.design.layout import lay_out
@@ -27,7 +27,7 @@ from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import TrueMachine, true_machine
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import observe
 from numpy.typing import NDArray
@@ -87,8 +87,8 @@ class World:
 
     def of_certificate(self, distance: int) -> float:
         rows = np.zeros(len(self.search.left.residual))
-        rows[-len(self.design.of(Distances)) + distance] = (
-            1.0 / self.design.of(Distances).uncertainty[distance]
+        rows[-len(self.design.of(CalibratedDistances)) + distance] = (
+            1.0 / self.design.of(CalibratedDistances).uncertainty[distance]
         )
         return self._detectable(rows)
 
@@ -167,10 +167,10 @@ def probe_offset(world: World, data: DataSet, generator: Generator) -> DataSet:
 
 
 def certificate(world: World, data: DataSet, generator: Generator) -> DataSet:
-    k = int(generator.integers(len(world.design.of(Distances))))
-    value = data.design.of(Distances).value.copy()
+    k = int(generator.integers(len(world.design.of(CalibratedDistances))))
+    value = data.design.of(CalibratedDistances).value.copy()
     value[k] += world.of_certificate(k) * generator.choice([-1.0, 1.0])
-    design = data.design.observed(replace(data.design.of(Distances), value=value))
+    design = data.design.observed(replace(data.design.of(CalibratedDistances), value=value))
     return replace(data, design=design, cause=Cause("distance", (k,)))
 
 

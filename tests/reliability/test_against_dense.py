@@ -20,8 +20,8 @@ from ballplate.simulator.estimation.hat import row_places, whitened_residuals
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.readings import expected_readings
 from numpy.typing import NDArray
@@ -156,9 +156,11 @@ def test_plates_against_complex_steps(make: Callable[[], Design]) -> None:
     places = row_places(design)
     # Distances stand before co-ordinates there.
     readings = np.arange(places["reading"].stop)
-    distances = places["reading"].stop + np.arange(len(design.of(Distances)))
+    distances = places["reading"].stop + np.arange(len(design.of(CalibratedDistances)))
     coordinates = (
-        places["reading"].stop + len(design.of(Distances)) + np.arange(len(design.of(Coordinates)))
+        places["reading"].stop
+        + len(design.of(CalibratedDistances))
+        + np.arange(len(design.of(CalibratedCoordinates)))
     )
     rows = np.concatenate([readings, coordinates, distances])
     assert result.deficiency == (2 if make is two_open_directions else 0)

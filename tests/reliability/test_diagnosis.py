@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.gross_errors.search import diagnosis
+from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.suspects import Diagnosis, Suspect
 from ballplate.gross_errors.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design
@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.parameters import shared_layout
 from ballplate.simulator.experiment.load import load
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 from ballplate.simulator.readings.reading_files import ObservedReadings, observe, read_readings
 from numpy.typing import NDArray
@@ -131,7 +131,7 @@ def certified_wrongly(design: Design, ball: int, share: float) -> tuple[Design, 
     """The design with all certified distances of a ball too long by a share, and which these
     are.
     """
-    given = design.of(Distances)
+    given = design.of(CalibratedDistances)
     mine = (given.first == ball) | (given.second == ball)
     value = given.value * np.where(mine, 1.0 + share, 1.0)
     return design.observed(replace(given, value=value)), np.flatnonzero(mine).tolist()
@@ -144,7 +144,11 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
     (one,) = diagnosed(design, x, True)[1].suspects
     assert (one.patterns.kind[one.columns] == "distance").all()
     assert sorted(one.patterns.subject[one.columns].tolist()) == mine and len(mine) == 2
-    true = 5e-6 / (1.0 + 5e-6) * design.of(Distances).value[one.patterns.subject[one.columns]]
+    true = (
+        5e-6
+        / (1.0 + 5e-6)
+        * design.of(CalibratedDistances).value[one.patterns.subject[one.columns]]
+    )
     assert (abs(one.values - true) < 4.0 * one.standard_uncertainties).all()
     words = f"certified distances of ball {design.ball_label(ball)}: to "
     assert words in diagnosis_lines(Diagnosis((one,)))[0]
@@ -154,9 +158,9 @@ def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) 
 def test_one_wrong_distance_is_not_laid_to_all_of_a_ball(wrong: int, tmp_path: Path) -> None:
     for seed in range(4):
         right, x = drawn(tmp_path, 1.0, seed=seed)
-        value = right.of(Distances).value.copy()
+        value = right.of(CalibratedDistances).value.copy()
         value[wrong] += 10e-6
-        design = right.observed(replace(right.of(Distances), value=value))
+        design = right.observed(replace(right.of(CalibratedDistances), value=value))
         (one,) = diagnosed(design, x, True)[1].suspects
         assert one.patterns.kind[one.pattern] == "distance" and len(one.columns) == 1
         assert one.patterns.subject[one.pattern] == wrong

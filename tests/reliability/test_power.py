@@ -9,20 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.cause_search import diagnosis
 from ballplate.gross_errors.leftover import Columns, leftover
 from ballplate.gross_errors.patterns import Patterns, patterns
 from ballplate.gross_errors.power import alarm_limit, chance_of_alarm, noncentrality
 from ballplate.gross_errors.redundancy import reliability_of
 from ballplate.gross_errors.reliability import Reliability
-from ballplate.gross_errors.search import diagnosis
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.layout import lay_out
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.hat import hat_rows, row_count
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.observations.coordinates import Coordinates
-from ballplate.simulator.observations.distances import Distances
+from ballplate.simulator.observations.coordinates import CalibratedCoordinates
+from ballplate.simulator.observations.distances import CalibratedDistances
 from ballplate.simulator.observations.lengths import Lengths
 from ballplate.simulator.observations.readings import rotation_sensitivity
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
@@ -180,11 +180,11 @@ def biased(
             x,
         )
     elif kind == "scale":
-        value = design.of(Distances).value * (1.0 + size)
-        known = design.of(Coordinates)
+        value = design.of(CalibratedDistances).value * (1.0 + size)
+        known = design.of(CalibratedCoordinates)
         return (
             design.observed(
-                replace(design.of(Distances), value=value),
+                replace(design.of(CalibratedDistances), value=value),
                 replace(known, value=known.value * (1.0 + size)),
             ),
             x,
